@@ -294,6 +294,13 @@ def _sharpness(tracks: Sequence[Kept]) -> float:
     return float(SHARPNESSES[int(np.argmax(likely))])
 
 
+def _rounded(values: Any) -> Any:
+    """Return values as JSON holds them, numbers to four digits."""
+    if isinstance(values, dict):
+        return {name: _rounded(value) for name, value in values.items()}
+    return [_rounded(value) for value in values] if np.ndim(values) else float(f"{float(values):.4g}")
+
+
 def _none(doubt: Calibration, tracks: Sequence[Kept]) -> Array:
     """Return the coefficients (3,) of the log-odds that no mode is right: the truth is far from the nearest one."""
     signs = np.array([none_features(doubt.log(seen)) for one in tracks for seen in one.seen])
@@ -441,7 +448,7 @@ def posterior(
             said += [judgement(doubt, one) for one in his]
         if table is not None:
             doubt = doubt_of(mine)
-            table.write_text(json.dumps({"temperature": TEMPERATURE, **doubt.as_dict()}) + "\n", encoding="utf-8")
+            table.write_text(json.dumps({"temperature": TEMPERATURE, **_rounded(vars(doubt))}) + "\n", encoding="utf-8")
     others = [one for one in kept if one.track.seen.method in OTHERS]
     return {
         "coverage": coverages(said),

@@ -11,7 +11,7 @@ Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 - `window` is the likeliest path through the last frames, the weights of states, and sampled paths.
 - `refinement` searches around the path, `smoothing` filters the estimates over time.
 - `calibration` makes the posterior's intervals hold, `lost_model` gives the probability that a frame is lost.
-- `tracker` processes one frame after the other, `factory` checks the settings and is registered.
+- `tracker` has the settings, and processes one frame after the other.
 
 >>> import posefit
 >>> track = posefit.track("walk-a", method="exemplars", train=["walk-b", "walk-c"], frames=(0, 10))
@@ -26,6 +26,6 @@ from posefit.hooks import RegisterTracker
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `exemplars`."""
-    from posefit_exemplars.factory import exemplars
+    from posefit_exemplars.tracker import ExemplarTracker
 
-    register("exemplars", exemplars)
+    register("exemplars", ExemplarTracker)

@@ -16,6 +16,7 @@ from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
 
 BINS = 36  # of a full turn: two states of one pose in one bin are one
 SPEEDS = (0.8, 1.0, 1.25)  # at which a clip may be followed
+OWN = SPEEDS.index(1.0)  # the clip's own speed
 TURN = np.radians(7.0)  # how far a candidate turns away from its clip, to either side, or not at all
 NEAR_GROUPS = 4  # groups of poses that a state goes on to
 MAX_SHARES = 20  # of a beam: similar poses with similar yaws have at most one of them
@@ -52,7 +53,10 @@ class Beam:
 
     def chosen(self, rows: Rows) -> "Beam":
         """Return some of the states."""
-        return Beam(self.states[rows], self.yaws[rows], self.parents[rows], self.totals[rows], self.places[rows])
+        return Beam(*(getattr(self, name)[rows] for name in NAMES))
+
+
+NAMES = ("states", "yaws", "parents", "totals", "places")  # of a beam's arrays
 
 
 def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> Rows:
@@ -70,13 +74,10 @@ def diverse_best(exemplars: Exemplars, beam: Beam, totals: Array, most: int) -> 
 
 def merged(*beams: Beam) -> Beam:
     """Return the states of all beams; of several of one pose in one bin of yaw the one of least total."""
-    names = ("states", "yaws", "parents", "totals", "places")
-    states, yaws, parents, totals, places = (np.concatenate([getattr(one, name) for one in beams]) for name in names)
-    every = Beam(states, yaws, parents, totals, places)
-    code = states * BINS + bins_of(yaws)
-    order = np.lexsort((totals, code))
-    first = np.diff(code[order], prepend=-1) != 0
-    return every.chosen(order[first])
+    every = Beam(*(np.concatenate([getattr(beam, name) for beam in beams]) for name in NAMES))
+    code = every.states * BINS + bins_of(every.yaws)
+    order = np.lexsort((every.totals, code))
+    return every.chosen(order[np.diff(code[order], prepend=-1) != 0])
 
 
 def bins_of(yaws: Array) -> Rows:
@@ -88,8 +89,8 @@ def bins_of(yaws: Array) -> Rows:
 class Continuations:
     """Where the clips of a beam's states go on, at each of the speeds."""
 
-    codes: list[Codes]  # (n, D) at a speed
-    ways: list[Array]  # (n,) what the root's way costs at a speed
+    codes: Codes  # (speeds, n, D)
+    ways: Array  # (speeds, n) what the root's displacement costs
     yaws: Array  # (n,) at the clip's own speed
     places: Array  # (n, 3) at the clip's own speed
 
@@ -98,88 +99,60 @@ class Continuations:
         """Return where clips are so much later, and how far from `root` (3,), where it is known, they put the body."""
         ahead = [exemplars.after(beam.states, seconds * speed) for speed in SPEEDS]
         places = [beam.places + about_vertical(way, beam.yaws) for _, _, way in ahead]
-        ways = [np.zeros(len(beam)) for _ in SPEEDS]
+        ways = np.zeros((len(SPEEDS), len(beam)))
         if root is not None:
-            offs = [((place - root) ** 2).sum(axis=1) / (2.0 * steps.pace**2) for place in places]
-            ways = [np.minimum(np.log1p(off), steps.jump) for off in offs]  # or nothing might be within reach
-        own = SPEEDS.index(1.0)
-        return cls([codes for codes, _, _ in ahead], ways, beam.yaws + ahead[own][1], places[own])
+            offs = ((np.array(places) - root) ** 2).sum(axis=2) / (2.0 * steps.pace**2)
+            ways = np.minimum(np.log1p(offs), steps.jump)  # or nothing might be within reach
+        return cls(np.stack([codes for codes, _, _ in ahead]), ways, beam.yaws + ahead[OWN][1], places[OWN])
 
-    def costs(self, rows: Rows, codes: Codes, steps: Steps) -> Array:
-        """Return what steps from some states to poses of these codes (m, D) cost (rows, m), at the best speed."""
+    def costs(self, codes: Codes, steps: Steps) -> Array:
+        """Return what steps to poses of these codes (m, D) cost (n, m), at the best speed."""
         double = 2.0 * steps.spread**2
         each = zip(self.codes, self.ways, strict=True)
         return np.asarray(
-            np.minimum.reduce([squared_distances(code[rows], codes) / double + way[rows, None] for code, way in each])
+            np.minimum.reduce([squared_distances(code, codes) / double + way[:, None] for code, way in each])
         )
 
 
 def next_states(
     exemplars: Exemplars, beam: Beam, seconds: float, steps: Steps, most: int, root: Array | None = None
 ) -> Beam:
-    """Return the states that those of a beam may be in so much later, each by its cheapest step; at most so many.
+    """Return the states that those of a beam may reach in `seconds`, each by its cheapest step; at most `most`.
 
     A pose costs half the square of its distance, over the spread, from what its parent's clip did next at one of the
     speeds; a yaw half the square of its turn away from the clip's own. Where the root is known to be at `root` (3,),
-    its distance d from where the clip's own way leads costs log(1 + d^2 / 2 / pace^2), which allows a
-    person to be faster or slower than all clips.
+    its distance d from where the clip leads costs log(1 + d^2 / 2 / pace^2): a person may be faster than all clips.
     """
     ahead = Continuations.of(exemplars, beam, seconds, steps, root)
     centres = exemplars.codes[exemplars.centres]
     near = min(NEAR_GROUPS, len(centres))
-    groups = np.argpartition(squared_distances(ahead.codes[SPEEDS.index(1.0)], centres), near - 1, axis=1)[:, :near]
-    limit = beam.totals.min() + steps.jump + MAX_EXCESS_COST
-    codes, ways = np.stack(ahead.codes), np.stack(ahead.ways)
+    groups = np.argpartition(squared_distances(ahead.codes[OWN], centres), near - 1, axis=1)[:, :near]
+    limit, scale = beam.totals.min() + steps.jump + MAX_EXCESS_COST, 1.0 / (2.0 * steps.spread**2)
+    poses = exemplars.grouped, exemplars.bounds, scale, limit
     least, owners, touched = np.full(len(exemplars), np.inf), *np.empty((2, len(exemplars)), dtype=np.int64)
     bins = bins_of(ahead.yaws)
-    groups_reached: list[tuple[Rows, Rows, Array]] = []
-    for one in np.unique(bins):
-        rows = np.flatnonzero(bins == one)
-        count = kernels.cheapest_steps(
-            codes,
-            ways,
-            beam.totals,
-            rows,
-            groups,
-            exemplars.grouped,
-            exemplars.bounds,
-            1.0 / (2.0 * steps.spread**2),
-            limit,
-            least,
-            owners,
-            touched,
-        )
+    by_bin: list[tuple[Rows, Rows, Array]] = []
+    for number in np.unique(bins):
+        origins = ahead.codes, ahead.ways, beam.totals, np.flatnonzero(bins == number), groups
+        count = kernels.cheapest_steps(*origins, *poses, least, owners, touched)
         reached, total = touched[:count].copy(), least[touched[:count]]
         least[reached] = np.inf
         if count > most // FACINGS:
             best = np.argpartition(total, most // FACINGS)[: most // FACINGS]
             reached, total = reached[best], total[best]
-        groups_reached.append((exemplars.members[reached], owners[reached], total))
-    states, parents, totals = (np.concatenate(parts) for parts in zip(*groups_reached, strict=True))
-    turns = np.repeat([0.0, -TURN, TURN], len(states))
-    states, parents, totals = (np.tile(one, 3) for one in (states, parents, totals))
-    every = Beam(
-        states,
-        ahead.yaws[parents] + turns,
-        parents,
-        totals + 0.5 * (turns / steps.turning) ** 2,
-        ahead.places[parents],
-    )
-    found_all = merged(every)
-    return found_all.chosen(diverse_best(exemplars, found_all, found_all.totals, most))
+        by_bin.append((exemplars.members[reached], owners[reached], total))
+    states, parents, totals = (np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True))
+    turns = np.repeat([0.0, -TURN, TURN], len(states) // 3)
+    totals = totals + 0.5 * (turns / steps.turning) ** 2
+    every = merged(Beam(states, ahead.yaws[parents] + turns, parents, totals, ahead.places[parents]))
+    return every.chosen(diverse_best(exemplars, every, every.totals, most))
 
 
 def jump_states(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
-    """Return states as the best of a beam may jump to them."""
-    best = int(beam.totals.argmin())
-    many = len(states)
-    return Beam(
-        states,
-        yaws,
-        np.full(many, best),
-        np.full(many, beam.totals[best] + steps.jump),
-        np.repeat(beam.places[best : best + 1], many, axis=0),
-    )
+    """Return states to which the best of a beam jumps."""
+    best, many = int(beam.totals.argmin()), len(states)
+    places = np.repeat(beam.places[best : best + 1], many, axis=0)
+    return Beam(states, yaws, np.full(many, best), np.full(many, beam.totals[best] + steps.jump), places)
 
 
 def squared_distances(some: Codes, others: Codes) -> Codes:
@@ -225,7 +198,7 @@ def transition_costs(transition: Transition, *, steps: Steps) -> Array:
     """
     exemplars, before, beam, root = transition.exemplars, transition.before, transition.beam, transition.root
     ahead = Continuations.of(exemplars, before, transition.seconds, steps, root)
-    costs = ahead.costs(np.arange(len(before)), exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
+    costs = ahead.costs(exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
         costs += root_deviation_costs(beam.places, ahead.places[:, None], transition.eye, steps)

@@ -7,11 +7,9 @@ are multiples of it.
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any, Self
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.frame_costs import FrameCosts
 
 FILE = "calibration.json"
+ARRAYS = ("slopes", "joint_spreads", "angle_spreads", "joint_factors", "angle_factors", "none")  # of a `Calibration`
 MIN_COST = 0.1  # per cent
 MIN_SPREAD = 0.002  # metres
 MAX_LOG_ODDS = 30.0  # logarithm
@@ -46,7 +45,7 @@ def probability_of(odds: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What makes intervals, and weights of modes, of a frame hold as often as they claim."""
+    """The corrections with which a frame's intervals and weights of modes hold as often as they claim."""
 
     slopes: Array  # (4,) of the logarithm of the expected error, over `evidence`
     range: tuple[float, float]  # of that logarithm in the training data
@@ -61,43 +60,21 @@ class Calibration:
         """Return the logarithm of the expected error, from `evidence` (4,)."""
         return float(np.clip(self.slopes @ evidence, *self.range))
 
-    def none_right(self, log: float) -> float:
-        """Return the probability that no mode is right, from the logarithm of the expected error."""
-        return probability_of(float(self.none @ none_features(log)))
-
     def recalibration(self, log: float) -> Recalibration:
         """Return the recalibration of a frame, from the logarithm of its expected error."""
-        error = math.exp(log)
-        spreads = error * self.joint_spreads, error * self.angle_spreads
+        spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
         factors = self.joint_factors, self.angle_factors
-        return Recalibration(*spreads, *factors, sharpness=self.sharpness, none=self.none_right(log))
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it, to four digits."""
-        return {name: _rounded(np.asarray(getattr(self, name))) for name in NAMES}
-
-    @classmethod
-    def from_dict(cls, held: Mapping[str, Any]) -> Self:
-        """Return what `as_dict` gave."""
-        low, high = held["range"]
-        arrays = {name: np.array(held[name]) for name in ARRAYS}
-        return cls(range=(low, high), sharpness=held["sharpness"], **arrays)
-
-
-NAMES = tuple(one.name for one in fields(Calibration))
-ARRAYS = tuple(name for name in NAMES if name not in ("range", "sharpness"))
-
-
-def _rounded(values: Array) -> Any:
-    if values.ndim:
-        return [_rounded(one) for one in values]
-    return float(f"{float(values):.4g}")
+        none = probability_of(float(self.none @ none_features(log)))
+        return Recalibration(*spreads, *factors, sharpness=self.sharpness, none=none)
 
 
 @cache
 def stored_calibration() -> Calibration:
-    """Return the calibration that was fitted on the library's own people."""
-    return Calibration.from_dict(json.loads(files("posefit_exemplars").joinpath(FILE).read_text("utf-8")))
+    """Return the calibration that was fitted on the library's own people by `docs/studies/posterior.py`."""
+    stored = json.loads(files("posefit_exemplars").joinpath(FILE).read_text("utf-8"))
+    low, high = stored["range"]
+    arrays = {name: np.array(stored[name]) for name in ARRAYS}
+    return Calibration(range=(low, high), sharpness=stored["sharpness"], **arrays)
 
 
 def recalibrated(posterior: Posterior, pose: Array, cost: float, look: FrameCosts) -> Posterior:

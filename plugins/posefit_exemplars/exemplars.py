@@ -4,7 +4,7 @@ Poses are compared by codes: a few numbers a pose.
 """
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -106,7 +106,7 @@ class Exemplars:
 
     @classmethod
     def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
-        """Return the states of motions, as the person with this skeleton would move; and of their mirror images.
+        """Return the states of motions as the person with this skeleton would move, and of their mirror images.
 
         A frame nearer than two centimetres to the last one kept is left out. Raises ValueError where a motion has a
         single frame.
@@ -116,68 +116,55 @@ class Exemplars:
         for motion in motions:
             if len(motion) < 2:
                 raise InputError(f"{motion.name} must have at least 2 frames to be followed, got 1")
-        sources = [(motion, image) for image in (False, True)[: 1 + mirrored] for motion in motions]
 
-        def clip(motion: Motion, image: bool) -> Motion:
-            return mirror_image(motion) if image else motion  # made when needed: all at once would be large
+        def sources() -> Iterator[Motion]:
+            yield from motions
+            if mirrored:
+                yield from map(mirror_image, motions)  # made when needed: all at once would be large
 
-        coding = Coding.of(skeleton, (clip(*one).poses for one in sources))
-        kept: list[tuple[Array, Codes, Array, Array]] = []
-        for source in sources:
-            motion = clip(*source)
+        coding = Coding.of(skeleton, (motion.poses for motion in sources()))
+        thinned: list[tuple[Array, Codes, Array, Array]] = []
+        for motion in sources():
             codes = coding.coded(motion.poses)
             rows = thinned_frames(codes)
-            kept.append((motion.poses[rows], codes[rows], motion.translations[rows], rows / motion.fps))
-        poses, codes, paths, times = (np.concatenate(parts) for parts in zip(*kept, strict=True))
-        clips = np.repeat(np.arange(len(kept)), [len(one[0]) for one in kept])
+            thinned.append((motion.poses[rows], codes[rows], motion.translations[rows], rows / motion.fps))
+        poses, codes, paths, times = (np.concatenate(parts) for parts in zip(*thinned, strict=True))
+        clips = np.repeat(np.arange(len(thinned)), [len(frames) for frames, *_ in thinned])
         centres, owners = groups(codes, GROUPS)
         kinds = np.argmin([((codes - codes[centre]) ** 2).sum(axis=1) for centre in centres[:KINDS]], axis=0)
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
-        lasts = np.searchsorted(clips, np.arange(len(kept)), "right") - 1
-        squares = (codes**2).sum(axis=1)
-        return cls(
-            poses,
-            codes,
-            squares,
-            paths,
-            times,
-            clips,
-            lasts,
-            centres,
-            members,
-            bounds,
-            owners,
-            codes[members],
-            kinds,
-            coding,
-        )
+        lasts = np.searchsorted(clips, np.arange(len(thinned)), "right") - 1
+        frames = poses, codes, (codes**2).sum(axis=1), paths, times, clips, lasts
+        return cls(*frames, centres, members, bounds, owners, codes[members], kinds, coding)
 
     def __len__(self) -> int:
         return len(self.poses)
 
     def after(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
-        """Return codes (n, D) of what came so long after some states, how far they turned (n,) and went (n, 3).
+        """Return codes (n, D) of what came `seconds` after some states, how far they turned (n,) and went (n, 3).
 
-        The way is that of a body whose yaw was 0. Between two poses all is interpolated; a clip that ends goes on with
-        its last pose.
+        Displacements are those of a body whose yaw was 0. Between two poses all is interpolated; a clip that has
+        ended stays in its last pose.
         """
         last = self.lasts[self.clips[states]]
         length = 1.0 + float(self.times.max())  # of the line on which all clips lie one after the other
         line = self.clips * length + self.times
-        wanted = np.minimum(self.times[states] + seconds, self.times[last])
-        before = np.searchsorted(line, self.clips[states] * length + wanted, "right") - 1
+        times = np.minimum(self.times[states] + seconds, self.times[last])
+        before = np.searchsorted(line, self.clips[states] * length + times, "right") - 1
         following = np.minimum(before + 1, last)
         gap = np.maximum(self.times[following] - self.times[before], 1e-9)
-        share = np.clip((wanted - self.times[before]) / gap, 0.0, 1.0)
-        codes = (1.0 - share)[:, None] * self.codes[before] + share[:, None] * self.codes[following]
-        yaws = (1.0 - share) * self.poses[before, 0] + share * self.poses[following, 0]
-        paths = (1.0 - share)[:, None] * self.paths[before] + share[:, None] * self.paths[following]
-        ways = about_vertical(paths - self.paths[states], -self.poses[states, 0])
-        return codes.astype(np.float32), yaws - self.poses[states, 0], ways
+        share = np.clip((times - self.times[before]) / gap, 0.0, 1.0)[:, None]
 
-    def drawn(self, count: int, rng: np.random.Generator) -> Rows:
-        """Return poses drawn at random, of a group as often as the root of its size says.
+        def interpolated(values: Array | Codes) -> Array:
+            return np.asarray((1.0 - share) * values[before] + share * values[following])
+
+        yaws, directions = interpolated(self.poses[:, :1])[:, 0], self.poses[states, 0]
+        displacements = about_vertical(interpolated(self.paths) - self.paths[states], -directions)
+        return interpolated(self.codes).astype(np.float32), yaws - directions, displacements
+
+    def draw(self, count: int, rng: np.random.Generator) -> Rows:
+        """Return poses drawn at random, of a group in proportion to the square root of its size.
 
         With equal weights of poses nearly all would stand; with equal weights of groups nearly all would be acrobatic.
         """
@@ -186,9 +173,15 @@ class Exemplars:
         group = np.minimum(np.searchsorted(ends, rng.uniform(0.0, ends[-1], count), "right"), len(sizes) - 1)
         return self.members[self.bounds[group] + (rng.random(count) * sizes[group]).astype(np.int64)]
 
-    def of_groups(self, chosen: Rows) -> Rows:
-        """Return the poses of some groups."""
-        return np.concatenate([self.members[self.bounds[g] : self.bounds[g + 1]] for g in chosen])
+    def group_members(self, group: int) -> Rows:
+        """Return the poses of a group."""
+        return self.members[self.bounds[group] : self.bounds[group + 1]]
+
+    def turned(self, states: Rows, yaws: Array) -> Array:
+        """Return copies of the poses (n, 66) of some states, turned to yaws (n,)."""
+        poses = self.poses[states]
+        poses[:, 0] = yaws
+        return poses
 
 
 # the key and the states of the latest motions: restarts, builds and cells of a sweep learn from the same ones
@@ -199,15 +192,11 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
     """Return the states of motions; the latest are kept for the same motions and skeleton."""
     global _latest
     digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
-    for array in (
-        skeleton.offsets,
-        skeleton.axes,
-        *(motion.skeleton.axes for motion in motions),
-        *(motion.poses for motion in motions),
-    ):
-        digest.update(np.ascontiguousarray(array).tobytes())
+    arrays = [skeleton.offsets, skeleton.axes]
     for motion in motions:
-        digest.update(motion.translations.tobytes())
+        arrays += [motion.skeleton.axes, motion.poses, motion.translations]
+    for array in arrays:
+        digest.update(array.tobytes())
     key = digest.digest()
     latest = _latest  # read once: another thread may replace it at any time
     if latest is None or latest[0] != key:

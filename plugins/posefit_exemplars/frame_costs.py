@@ -5,13 +5,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.camera import Camera
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs
-from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
-
-Views = list[tuple[Camera, Silhouette]]
 
 SMALL = 40  # pixels: no side of a small picture is shorter
 FACTORS = (4, 2, 1)
@@ -21,54 +17,50 @@ class FrameCosts:
     """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
 
     def __init__(self, task: Task, observation: Observation) -> None:
-        self._task = task
-        self._full: Views = list(zip(task.cameras, observation.silhouettes, strict=True))
+        self._task, silhouettes = task, observation.silhouettes
         sides = [side for camera in task.cameras for side in (camera.width, camera.height)]
         factor = next((factor for factor in FACTORS if min(sides) >= factor * SMALL), 1)
-        self._small = [(coarser_camera(camera, factor), coarser_silhouette(one, factor)) for camera, one in self._full]
+        self._scene = task.body, task.cameras, silhouettes
+        self._small_scene = (
+            task.body,
+            [coarser_camera(camera, factor) for camera in task.cameras],
+            [coarser_silhouette(silhouette, factor) for silhouette in silhouettes],
+        )
         self.share = 1.0 / factor**2  # effort of a cost in the small picture, as a share of one at full size
         self.skeleton, self.cameras = task.body.skeleton, len(task.cameras)
         self.yaw, self.usable = observation.yaw, observation.usable
         known = observation.translation if task.translation == "known" else None
         self.root = None if known is None else np.asarray(known, dtype=np.float64)  # (3,) metres, where it is known
         # (3,) where the only camera stands that shows the person; None with several, which also show the depth
-        only = only_camera(task.cameras, observation.silhouettes)
+        only = only_camera(task.cameras, silhouettes)
         self.eye: Array | None = None if only is None else only.position
 
     def placed(self, poses: Array, places: Array) -> Array:
         """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
         if self.root is not None:
             return np.repeat(self.root[None], len(poses), axis=0)
-        if self._task.translation == "known":
-            return places
-        cameras, silhouettes = zip(*self._full, strict=True)
-        return align(self._task.body, cameras, silhouettes, poses, places)
+        return places if self._task.translation == "known" else align(*self._scene, poses, places)
 
     def small(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses in the small picture."""
-        return self._costs(self._small, poses, places)
+        return pose_costs(*self._small_scene, poses, places, threads=self._task.threads)[0]
 
     def full(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses."""
-        return self._costs(self._full, poses, places)
+        return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
 
     def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""
-        cameras, silhouettes = zip(*self._full, strict=True)
-        costs, counts = pose_costs(self._task.body, cameras, silhouettes, pose[None], place[None])
+        costs, counts = pose_costs(*self._scene, pose[None], place[None])
         return float(costs[0]), counts[:, 0]
 
     def twins(self, pose: Array, place: Array) -> Array:
         """Return the costs of a pose's twins (1 + cameras,): mirrored, and reflected along each camera's line of sight.
 
-        Where roots are aligned, a twin stands off the reported place by the difference of both aligned places.
+        Where roots are aligned, a twin is as far off the reported place as both aligned places are apart.
         """
-        skeleton, one = self.skeleton, pose[None]
-        reflected = [reflected_poses(skeleton, one, facing(camera, place)) for camera in self._task.cameras]
-        poses = np.concatenate([one, mirrored_poses(skeleton, one), *reflected])
+        skeleton, poses = self.skeleton, pose[None]
+        reflected = [reflected_poses(skeleton, poses, facing(camera, place)) for camera in self._task.cameras]
+        poses = np.concatenate([poses, mirrored_poses(skeleton, poses), *reflected])
         places = self.placed(poses, np.repeat(place[None], len(poses), axis=0))
         return self.full(poses[1:], place + places[1:] - places[0])
-
-    def _costs(self, views: Views, poses: Array, places: Array) -> Array:
-        cameras, silhouettes = zip(*views, strict=True)
-        return pose_costs(self._task.body, cameras, silhouettes, poses, places, threads=self._task.threads)[0]

@@ -21,7 +21,7 @@ def cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, scale, limit,
         for g in near[r]:
             for k in range(bounds[g], bounds[g + 1]):
                 best = min(least[k], limit)
-                found = False
+                cheaper = False
                 for s in range(ahead.shape[0]):
                     before = totals[r] + ways[s, r]
                     if before < best:
@@ -34,8 +34,8 @@ def cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, scale, limit,
                                 away += step * step
                             d += STRETCH
                         if away < bound:
-                            best, found = before + scale * away, True
-                if found:
+                            best, cheaper = before + scale * away, True
+                if cheaper:
                     if least[k] == np.inf:
                         touched[count] = k
                         count += 1

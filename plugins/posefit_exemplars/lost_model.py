@@ -19,47 +19,35 @@ from typing import Any, Self
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
-from posefit.uncertainty.modes import Posterior
 from posefit.uncertainty.sides import second_side
 from posefit_exemplars.calibration import probability_of
 
 FITTED = Path(__file__).with_name("lost_model.json")  # made by `docs/studies/lost.py --store`
-REACHES: Mapping[str, float] = {
-    "lately": 0.2,
-    "in general": 1.0,
-}  # seconds that the means reach back
+REACHES = {"lately": 0.2, "in general": 1.0}  # seconds that the means reach back
 
 
-def _log(floor: float) -> Callable[[float], float]:
+def _log_above(floor: float) -> Callable[[float], float]:
     return lambda value: math.log(max(value, 0.0) + floor)
-
-
-def _as_it_is(value: float) -> float:
-    return value
 
 
 # The evidence of a frame, each with the scale on which it enters the models.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
-    "cost": _log(1.0),  # of the reported pose, where the person is visible
+    "cost": _log_above(1.0),  # of the reported pose, where the person is visible
     "reflected": math.log,  # the least cost of poses reflected along a line of sight, over the cost
     "mirrored": math.log,  # the cost of the mirror image, over the cost
-    "farthest": _log(0.01),  # metres between the reported pose and the farthest sampled track
-    "second": _as_it_is,  # weight of the tracks that have left and right exchanged
-    "ahead": _as_it_is,  # metres a second by which the root goes where it faces
-    "speed": _as_it_is,  # metres a second by which it goes anywhere
-    "across": _as_it_is,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
-    "views": _as_it_is,  # cameras that show something of the person, at most `MAX_VIEWS`
+    "farthest": _log_above(0.01),  # metres between the reported pose and the farthest sampled track
+    "second": float,  # weight of the tracks that have left and right exchanged
+    "ahead": float,  # metres a second by which the root goes where it faces
+    "speed": float,  # metres a second by which it goes anywhere
+    "across": float,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
+    "views": float,  # cameras that show something of the person, at most `MAX_VIEWS`
 }
-DEFAULTS = {
-    "reflected": 1.0,
-    "mirrored": 1.0,
-}  # before the first value; else 0
+DEFAULTS = {"reflected": 1.0, "mirrored": 1.0}  # before the first value; of other evidence 0
 MAX_VIEWS = 2  # nothing was fitted with more cameras
 TWIN_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
 MOTION_SECONDS = 0.5  # over which the root's motion is measured
@@ -73,9 +61,10 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
     Its `details` hold whether it is `usable` and the costs of its `twins`; see `FrameCosts.twins`.
     """
     assert frame.posterior is not None
+    distances = joint_distances(skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose))
     visible = [camera for camera, counts in zip(cameras, frame.areas, strict=True) if counts.any()] or cameras
     values = {
-        "farthest": greatest_distance(skeleton, frame.posterior, frame.pose),
+        "farthest": float(distances.mean(axis=1).max()),
         "second": second_side(skeleton, frame.posterior, frame.pose),
         "across": across(visible, float(frame.pose[0]), frame.translation),
         "views": float(min(len(visible), MAX_VIEWS)),
@@ -104,15 +93,6 @@ def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
     0 with several cameras, as one of them shows what another does not.
     """
     return abs(math.sin(yaw - facing(cameras[0], place))) if len(cameras) == 1 else 0.0
-
-
-def greatest_distance(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:
-    """Return the greatest distance between a pose (66,) and a track of a posterior: metres, the mean over joints.
-
-    Roots are at the same point.
-    """
-    every = joint_distances(skeleton.joints(posterior.poses), skeleton.joints(pose))
-    return float(every.mean(axis=1).max())
 
 
 class EvidenceMeans:
@@ -148,13 +128,10 @@ class LogisticModel:
         return probability_of(float(features[self.rows] @ self.weights) + self.bias)
 
     @classmethod
-    def from_dict(cls, held: Mapping[str, Any]) -> Self:
-        """Return the model that JSON holds. Raises ValueError where it uses unknown evidence."""
-        unknown = sorted(set(held["weights"]) - set(NAMES))
-        if unknown:
-            raise InputError(f"weights must be of evidence that frames have, got {', '.join(unknown)}")
-        rows = [NAMES.index(name) for name in held["weights"]]
-        return cls(rows, np.array(list(held["weights"].values()), dtype=np.float64), float(held["bias"]))
+    def from_dict(cls, stored: Mapping[str, Any]) -> Self:
+        """Return the model that JSON holds."""
+        rows = [NAMES.index(name) for name in stored["weights"]]
+        return cls(rows, np.array(list(stored["weights"].values()), dtype=np.float64), float(stored["bias"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +143,10 @@ class FailureClassifier:
     unknown: float  # the probability of exchanged sides from which they are
 
     @classmethod
-    def from_dict(cls, held: Mapping[str, Any]) -> Self:
-        """Return the models that JSON holds. Raises ValueError where one uses unknown evidence."""
-        models = LogisticModel.from_dict(held["lost"]), LogisticModel.from_dict(held["sides"])
-        return cls(*models, float(held["unknown"]))
+    def from_dict(cls, stored: Mapping[str, Any]) -> Self:
+        """Return the models that JSON holds."""
+        models = (LogisticModel.from_dict(stored[name]) for name in ("lost", "sides"))
+        return cls(*models, unknown=float(stored["unknown"]))
 
 
 @cache
@@ -195,15 +172,12 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         evidence |= root_motion(places, float(frame.pose[0]), task.fps, backwards=task.backwards)
         features = memory.features(evidence)
         exchanged = classifier.sides.probability(features)
+        # left and right are unknown, or else known unless no sample has them as reported
+        second_side = float(exchanged < classifier.unknown)
+        recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=second_side)
         yield replace(
             frame,
             lost=classifier.lost.probability(features),
-            posterior=_sided(frame.posterior, exchanged >= classifier.unknown),
+            posterior=replace(frame.posterior, recalibration=recalibration),
             details={**frame.details, "evidence": evidence, "exchanged": exchanged},
         )
-
-
-def _sided(posterior: Posterior, unknown: bool) -> Posterior:
-    """Return a posterior whose left and right are unknown, or known unless no sample has them as reported."""
-    model = posterior.recalibration or Recalibration()
-    return replace(posterior, recalibration=replace(model, second_side=float(not unknown)))

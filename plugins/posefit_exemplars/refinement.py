@@ -1,7 +1,6 @@
 """A search around a pose of the path: in the directions in which poses that are like it differ."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,32 +16,19 @@ LIKE = 600  # poses of the exemplars whose differences are searched
 COMPONENTS = 28  # of them
 REACH = 3.0  # standard deviations of a component to either side
 YAW = np.radians(3.0)  # standard deviation; the yaws of exemplars are free
-CARRIED = 0.95  # of what the frame before was off the path: most of it is the person's own way, which stays
+CARRIED = 0.95  # share of the last frame's offset from the path: most of it is the person's own style, which stays
 SPREAD = 0.5  # standard deviations of a component with which the search begins
 
 Make = Callable[[Space, np.random.Generator], Optimiser]
 
 
-@dataclass(frozen=True, eq=False)
 class Surroundings:
-    """The box around a pose: a coordinate a component, and one for the yaw. A `Space`."""
+    """The `Space` around a pose (66,): a coordinate for each of `axes` (d, 66), standard deviations in radians."""
 
-    pose: Array  # (66,)
-    axes: Array = field(repr=False)  # (d, 66) radians: a component's standard deviation each, and the yaw's
-    start: Start
-    half: Array = field(init=False, repr=False)
-    centre: Array = field(init=False, repr=False)
-    periodic: NDArray[np.bool_] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "half", np.full(self.dimensions, REACH))
-        object.__setattr__(self, "centre", np.zeros(self.dimensions))
-        object.__setattr__(self, "periodic", np.zeros(self.dimensions, dtype=bool))
-
-    @property
-    def dimensions(self) -> int:
-        """How many coordinates a proposal has."""
-        return len(self.axes)
+    def __init__(self, pose: Array, axes: Array, start: Start) -> None:
+        self.pose, self.axes, self.start, self.dimensions = pose, axes, start, len(axes)
+        self.centre, self.half = np.zeros(len(axes)), np.full(len(axes), REACH)
+        self.periodic = np.zeros(len(axes), dtype=bool)
 
     def poses(self, proposals: Array) -> Array:
         """Return the poses (n, 66) of proposals (n, d)."""
@@ -52,16 +38,12 @@ class Surroundings:
         """Return which proposals (n, d) lie in the box (n,)."""
         return np.asarray((np.abs(proposals) <= 1.0).all(axis=1))
 
-    def moved(self, proposals: Array, origin: "Surroundings") -> Array:
-        """Return the proposals (n, d) that mean here what these mean in `origin`."""
-        return np.asarray(np.clip((origin.centre + origin.half * proposals) / self.half, -1.0, 1.0))
-
 
 def surroundings(exemplars: Exemplars, pose: Array, code: Codes, off: Array) -> Surroundings:
-    """Return where to search around a pose (66,) with a code (D,), beginning `off` (66,) from it, as far as that fits.
+    """Return where to search around a pose (66,) with a code (D,), from an offset `off` (66,), as far as that fits.
 
-    The axes are the principal components of what the poses of the nearest codes are off their mean, the root's pitch
-    and roll among their angles, but not the yaw.
+    The axes are the principal components of the poses of the nearest codes, the root's pitch and roll among their
+    angles, but not the yaw.
     """
     apart = exemplars.squares - 2.0 * (exemplars.codes @ code)
     like = min(LIKE, len(apart))
@@ -76,8 +58,7 @@ def surroundings(exemplars: Exemplars, pose: Array, code: Codes, off: Array) -> 
     axes = np.vstack([directions[:, kept].T * lengths[:, None], np.eye(1, ANGLES) * YAW])
     begin = np.append((off @ directions[:, kept]) / lengths, off[0] / YAW)
     begin = np.clip(CARRIED * begin / REACH, -2.0 / REACH, 2.0 / REACH)
-    d = len(axes)
-    return Surroundings(pose, axes, Start(begin, np.full(d, SPREAD / REACH), np.zeros(d)))
+    return Surroundings(pose, axes, Start(begin, np.full(len(axes), SPREAD / REACH), np.zeros(len(axes))))
 
 
 def refined(
@@ -88,10 +69,10 @@ def refined(
     evaluations: int,
     rng: np.random.Generator,
 ) -> tuple[Array, int]:
-    """Return the pose (66,) that an optimiser finds, and its evaluations.
+    """Return the best pose (66,) of an optimiser, and its evaluations.
 
-    Added to the `cost` (n,) of poses (n, 66) is the pull, half of it times the squares of how many standard deviations
-    a proposal is from the path, and as much from where the search began.
+    Added to the `cost` (n,) of poses (n, 66) is half the `pull` times the squared distances, in standard deviations, of
+    a proposal from the path and from where the search began.
     """
     begin = space.start.mean
 
@@ -99,7 +80,6 @@ def refined(
         away = (proposals**2).sum(axis=1) + ((proposals - begin) ** 2).sum(axis=1)
         return np.asarray(cost(space.poses(proposals)) + 0.5 * pull * REACH**2 * away)
 
-    found = minimise(evaluate, make(space, rng), evaluations, budget_known=True)
-    if float(evaluate(begin[None])[0]) <= found.cost:
-        return space.poses(begin[None])[0], found.evaluations + 1
-    return space.poses(found.proposal[None])[0], found.evaluations + 1
+    best = minimise(evaluate, make(space, rng), evaluations, budget_known=True)
+    proposal = begin if float(evaluate(begin[None])[0]) <= best.cost else best.proposal
+    return space.poses(proposal[None])[0], best.evaluations + 1

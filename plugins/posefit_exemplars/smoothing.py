@@ -28,7 +28,7 @@ class Estimate:
     evaluations: float
     seconds: float
     cpu_seconds: float
-    drawn: SampledPaths | None = None  # where the sampled paths are
+    paths: SampledPaths | None = None
 
 
 def smoothed(frames: Iterable[Estimate], spread: float, ahead: int) -> Iterator[Frame]:
@@ -38,8 +38,8 @@ def smoothed(frames: Iterable[Estimate], spread: float, ahead: int) -> Iterator[
     """
     recent: deque[Estimate] = deque()
     here = 0  # where in `recent` the next frame to yield is
-    for one in frames:
-        recent.append(one)
+    for estimate in frames:
+        recent.append(estimate)
         if len(recent) - here > ahead:
             yield _frame(recent, here, spread)
             here += 1
@@ -66,20 +66,28 @@ def smoothed_pose(poses: Array, places: Array, here: int, spread: float) -> tupl
 
 
 def _frame(recent: Sequence[Estimate], here: int, spread: float) -> Frame:
-    one = recent[here]
-    poses, places = (np.array([getattr(each, name) for each in recent]) for name in ("pose", "place"))
+    estimate, look = recent[here], recent[here].look
+    poses, places = np.array([near.pose for near in recent]), np.array([near.place for near in recent])
     pose, place = smoothed_pose(poses, places, here, spread)
-    if one.look.root is not None:
-        place = one.place
-    cost, areas = one.look.measured(pose, place)
-    used, history = int(np.ceil(one.evaluations)) + 1, np.array([cost])
-    details: dict[str, Any] = {"usable": one.look.usable}
-    posterior, seconds, cpu_seconds = None, one.seconds, one.cpu_seconds
-    if one.drawn is not None:
-        began, begun = time.perf_counter(), time.process_time()
-        details["twins"] = one.look.twins(pose, place) if one.look.usable else np.empty(0)
+    if look.root is not None:
+        place = estimate.place
+    cost, areas = look.measured(pose, place)
+    start, cpu_start = time.perf_counter(), time.process_time()
+    details: dict[str, Any] = {"usable": look.usable}
+    posterior, used = None, int(np.ceil(estimate.evaluations)) + 1
+    if estimate.paths is not None:
+        details["twins"] = look.twins(pose, place) if look.usable else np.empty(0)
         used += len(details["twins"])
-        posterior = recalibrated(one.drawn.about(pose, place), pose, cost, one.look)
-        seconds, cpu_seconds = seconds + time.perf_counter() - began, cpu_seconds + time.process_time() - begun
-    more: dict[str, Any] = {"details": details, "cpu_seconds": cpu_seconds, "posterior": posterior}
-    return Frame(pose, place, cost, areas, used, seconds, history, **more)
+        posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, look)
+    return Frame(
+        pose,
+        place,
+        cost,
+        areas,
+        used,
+        estimate.seconds + time.perf_counter() - start,
+        np.array([cost]),
+        details=details,
+        cpu_seconds=estimate.cpu_seconds + time.process_time() - cpu_start,
+        posterior=posterior,
+    )

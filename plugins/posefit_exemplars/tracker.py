@@ -1,17 +1,24 @@
-"""The tracker: the work of each frame, and the path that is reported `lag` frames later."""
+"""The tracker: its settings, the work of each frame, and the path that is reported `lag` frames later."""
 
+import importlib
 import math
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import cast
 
 import numpy as np
 
+from posefit import settings
 from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.fitting.check import at_least, positive
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
+from posefit.registry import registry
 from posefit_exemplars.beam import (
     TURN,
     Beam,
@@ -23,14 +30,16 @@ from posefit_exemplars.beam import (
     merged,
     next_states,
     root_deviation_costs,
+    transition_costs,
 )
-from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.exemplars import Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.smoothing import SMOOTHED, Estimate, smoothed
 from posefit_exemplars.window import FrameStates, Sampler, frame_states, mean_near, state_weights, viterbi_state
 
+MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 WIDTH = 400  # states of a beam
 FULL = 0.35  # share of the budget that is for full-size costs of states
 REFINED = 0.45  # share that is for refining
@@ -39,8 +48,8 @@ GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated;
 FIRST_GROUPS = 200
 OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a search everywhere
 FACING = np.radians(45.0)  # tolerance of a yaw that is given, to either side
-AWAY = 4.0  # cost of a state, over the temperature, whose yaw is off by twice as much,
-PACE = 30.0  # at this frame rate
+AWAY = 4.0  # cost over the temperature of a state whose yaw is off by twice as much, at this frame rate:
+PACE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,37 +58,84 @@ class _PendingFrame:
 
     states: FrameStates
     look: FrameCosts
-    usable: bool
     evaluations: float
     seconds: float
     cpu_seconds: float
 
 
-@dataclass(frozen=True, eq=False)
 class ExemplarTracker:
-    """Follows a person along the likeliest path through recorded clips."""
+    """The likeliest path through recorded clips (Toyama and Blake, 2001).
 
-    task: Task
-    exemplars: Exemplars = field(repr=False)
-    steps: Steps
-    transitions: Transitions
-    temperature: float
-    lag: int  # later frames that are used before a pose is reported
-    make: Make | None  # an optimiser that refines; None where nothing does
-    pull: float
-    smoothing: float  # thirtieths of a second
-    samples: int  # ways that are drawn; 0 is none
-    power: float  # of the likelihoods, in the posterior that they are drawn from
+    Distances and turns in the settings are for a thirtieth of a second, whatever the frame rate.
+
+    Settings:
+        spread: distance of joints from where a clip goes on, metres, root mean square; above 0.
+        turning_degrees: standard deviation of turns away from the clip; above 0.
+        jump: cost of a step to any other pose, in units of cost over the temperature; 0 or more.
+        temperature: divides silhouette costs; above 0. Errors of successive frames are correlated, so more than 1.
+        straying: distance of an aligned root from where its clip goes on, to the side or up, metres; above 0.
+        depth: the same towards or away from a single camera, metres; above 0.
+        pace: distance of a known root from where its clip goes on, metres; above 0.
+        lag: later frames that are used before a pose is reported, 0 or more.
+        mirrored: whether the mirror images of all clips are learned from as well.
+        refiner: the optimiser that searches around the path, or "none".
+        pull: cost of a standard deviation away from the path, beside the silhouette, 0 or more.
+        smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
+        transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
+        samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
+        posterior_temperature: divides silhouette costs in that posterior; above 0.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        *,
+        spread: float = 0.03,
+        turning_degrees: float = 4.0,
+        jump: float = 12.0,
+        temperature: float = 2.0,
+        straying: float = 0.01,
+        depth: float = 0.03,
+        pace: float = 0.008,
+        lag: int = 15,
+        mirrored: bool = True,
+        refiner: str = "cma",
+        pull: float = 0.3,
+        smoothing: float = 1.0,
+        transitions: str = "clips",
+        samples: int = 24,
+        posterior_temperature: float = 8.0,
+    ) -> None:
+        distances = {"spread": spread, "straying": straying, "depth": depth, "pace": pace}
+        temperatures = {"temperature": temperature, "posterior_temperature": posterior_temperature}
+        for name, value in {**distances, "turning_degrees": turning_degrees, **temperatures}.items():
+            positive(name, value)
+        for name, value in {"jump": jump, "pull": pull, "smoothing": smoothing, "lag": lag, "samples": samples}.items():
+            at_least(name, value, 0)
+        if task.evaluations < MIN_EVALUATIONS:
+            raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
+        intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
+        slack, turning = math.sqrt(intervals), math.radians(turning_degrees)
+        fastest = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
+        self.task, self.exemplars = task, exemplars_of(task.training, task.body.skeleton, mirrored)
+        self.steps = Steps(spread * slack, turning * slack, jump, straying, depth, pace * intervals, fastest)
+        self.transitions: Transitions = partial(transition_costs, steps=self.steps)
+        if transitions != "clips":
+            self.transitions = partial(_checked, _named(transitions))
+        self.temperature, self.lag, self.pull, self.samples = temperature / intervals, lag, pull, samples
+        self.smoothing = smoothing * task.fps / 30.0  # frames
+        self.power = temperature / posterior_temperature  # of the likelihoods in the posterior
+        # the number of waiting frames that are only for smoothing
+        self.ahead = min(math.ceil(SMOOTHED * self.smoothing), lag)
+        self.make: Make | None = None  # the optimiser that refines
+        if refiner != "none":
+            factory = registry().optimiser(refiner)
+            self.make = partial(factory, **settings.planned(factory, {}, int(REFINED * task.evaluations)))
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        frames = smoothed(self._refined(observations, rng), self.smoothing * self.task.fps / 30.0, self._ahead)
+        frames = smoothed(self._refined(observations, rng), self.smoothing, self.ahead)
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
-
-    @property
-    def _ahead(self) -> int:
-        """The number of waiting frames that are only for smoothing."""
-        return min(math.ceil(SMOOTHED * self.smoothing * self.task.fps / 30.0), self.lag)
 
     def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame, before it is smoothed."""
@@ -87,12 +143,12 @@ class ExemplarTracker:
         latest: FrameStates | None = None
         off, sampler = np.zeros(ANGLES), Sampler(self.exemplars, self.samples, self.power, rng)
         for observation in observations:
-            began, begun = time.perf_counter(), time.process_time()
+            start, cpu_start = time.perf_counter(), time.process_time()
             look = FrameCosts(self.task, observation)
-            latest, used = self._evaluated(look, observation, latest, rng)
-            spent = time.perf_counter() - began, time.process_time() - begun
-            waiting.append(_PendingFrame(latest, look, observation.usable, used, *spent))
-            if len(waiting) > self.lag - self._ahead:
+            latest, used = self._evaluated(look, latest, rng)
+            seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
+            waiting.append(_PendingFrame(latest, look, used, seconds, cpu_seconds))
+            if len(waiting) > self.lag - self.ahead:
                 estimate, off = self._estimated(waiting, off, sampler, rng)
                 yield estimate
         while waiting:
@@ -100,11 +156,11 @@ class ExemplarTracker:
             yield estimate
 
     def _evaluated(
-        self, look: FrameCosts, observation: Observation, before: FrameStates | None, rng: np.random.Generator
+        self, look: FrameCosts, before: FrameStates | None, rng: np.random.Generator
     ) -> tuple[FrameStates, float]:
         """Return the states of a frame, and the evaluations that they took."""
         latest, seconds, root = None if before is None else before.beam, 1.0 / self.task.fps, look.root
-        if latest is not None and not observation.usable:
+        if latest is not None and not look.usable:
             beam = next_states(self.exemplars, latest, seconds, self.steps, WIDTH, root)
             if root is not None:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
@@ -115,18 +171,18 @@ class ExemplarTracker:
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
-        if latest is None and self.task.first_pose is not None:
-            given = self._given(self.task.first_pose, around)
-            beams = [replace(elsewhere, totals=elsewhere.totals + self.steps.jump), given]
         if latest is not None:
             beams.append(next_states(self.exemplars, latest, seconds, self.steps, around, root))
+        elif self.task.first_pose is not None:
+            first = self._first_states(self.task.first_pose, around)
+            beams = [replace(elsewhere, totals=elsewhere.totals + self.steps.jump), first]
         beam = self._placed(look, merged(*beams), latest is not None)
-        away = yaw_costs(beam.yaws, observation.yaw) * PACE / self.task.fps
+        away = yaw_costs(beam.yaws, look.yaw) * PACE / self.task.fps
         totals = beam.totals + away + look.small(self._poses(beam), beam.places) / self.temperature
         used = (looked + len(beam)) * look.share
-        kept = diverse_best(self.exemplars, beam, totals, full)
-        beam = beam.chosen(kept)
-        fits = away[kept] + look.full(self._poses(beam), beam.places) / self.temperature
+        best = diverse_best(self.exemplars, beam, totals, full)
+        beam = beam.chosen(best)
+        fits = away[best] + look.full(self._poses(beam), beam.places) / self.temperature
         used += len(beam)
         best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
@@ -144,19 +200,20 @@ class ExemplarTracker:
         """Return states that fit, from anywhere, and the number of small pictures that were evaluated."""
         taken = min(GROUPS_TAKEN if before is not None else FIRST_GROUPS, max(most // (4 * OF_A_GROUP), 1))
         count = max(most - taken * OF_A_GROUP, 1)
-        states, middle, reach = self.exemplars.drawn(count, rng), 0.0, np.pi
+        states, middle, reach = self.exemplars.draw(count, rng), 0.0, np.pi
         known = self.task.yaw if before is None and look.yaw is None else look.yaw
         if known is not None:
             middle, reach = known, FACING
         yaws = middle + rng.uniform(-reach, reach, count)
         beam = self._placed(look, self._started(states, yaws, before), False)
         best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
-        members = [self._members_of(int(self.exemplars.owners[states[row]]), rng) for row in best]
-        states, yaws = np.concatenate(members), np.repeat(yaws[best], [len(some) for some in members])
-        return self._started(states, yaws, before), len(beam)
+        groups = [self.exemplars.group_members(self.exemplars.owners[states[row]]) for row in best]
+        some = [rows if len(rows) <= OF_A_GROUP else rng.choice(rows, OF_A_GROUP, replace=False) for rows in groups]
+        yaws = np.repeat(yaws[best], [len(rows) for rows in some])
+        return self._started(np.concatenate(some), yaws, before), len(beam)
 
-    def _given(self, angles: Array, most: int) -> Beam:
-        """Return the states, at most so many, that are most like a first pose whose angles (63,) and yaw are known."""
+    def _first_states(self, angles: Array, most: int) -> Beam:
+        """Return the states, at most `most`, nearest to a first pose whose angles (63,) and yaw are known."""
         yaw = self.task.yaw or 0.0
         code = self.exemplars.coding.coded(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
         apart = self.exemplars.squares - 2.0 * (self.exemplars.codes @ code)
@@ -172,19 +229,13 @@ class ExemplarTracker:
         many = len(states)
         return Beam(states, yaws, np.full(many, -1), np.zeros(many), np.repeat(self.task.anchor[None], many, axis=0))
 
-    def _members_of(self, group: int, rng: np.random.Generator) -> Rows:
-        members = self.exemplars.of_groups(np.array([group]))
-        return members if len(members) <= OF_A_GROUP else rng.choice(members, OF_A_GROUP, replace=False)
-
     def _poses(self, beam: Beam) -> Array:
-        poses = self.exemplars.poses[beam.states]
-        poses[:, 0] = beam.yaws
-        return poses
+        return self.exemplars.turned(beam.states, beam.yaws)
 
-    def _placed(self, look: FrameCosts, beam: Beam, begun: bool = True) -> Beam:
-        """Return states with aligned roots; the distance from where they were expected adds to their costs."""
+    def _placed(self, look: FrameCosts, beam: Beam, expected: bool) -> Beam:
+        """Return states with aligned roots; where they were `expected`, the distance from there adds to their costs."""
         places = look.placed(self._poses(beam), beam.places)
-        if not begun or self.task.translation == "known":
+        if not expected or self.task.translation == "known":
             return replace(beam, places=places)
         off = root_deviation_costs(places, beam.places, look.eye, self.steps)
         return replace(beam, places=places, totals=beam.totals + off)
@@ -196,15 +247,15 @@ class ExemplarTracker:
 
         The path's pose is the weighted mean of similar states. The search begins at the offset of the frame before.
         """
-        began, begun = time.perf_counter(), time.process_time()
-        window = [one.states for one in waiting]
+        start, cpu_start = time.perf_counter(), time.process_time()
+        window = [frame.states for frame in waiting]
         row, likely, oldest = viterbi_state(window), state_weights(window), waiting.popleft()
-        drawn = sampler.drawn(window, row)
+        paths = sampler.draw(window, row)
         beam, look, evaluations = oldest.states.beam, oldest.look, oldest.evaluations
         codes = self.exemplars.codes[beam.states]
         path, place, code = mean_near(row, likely, codes, self._poses(beam), beam.places)
-        pose = path + off if oldest.usable else path
-        if self.make is not None and oldest.usable:
+        pose = path + off if look.usable else path
+        if self.make is not None and look.usable:
             count = int(REFINED * self.task.evaluations)
             space = surroundings(self.exemplars, path, code, off)
 
@@ -214,11 +265,11 @@ class ExemplarTracker:
             pose, used = refined(space, cost, self.make, self.pull, count, rng)
             evaluations += used
             off = wrapped(pose - path)
-        if oldest.usable:
+        if look.usable:
             place = look.placed(pose[None], place[None])[0]
-        seconds = oldest.seconds + time.perf_counter() - began
-        cpu_seconds = oldest.cpu_seconds + time.process_time() - begun
-        return Estimate(pose, place, look, evaluations, seconds, cpu_seconds, drawn), off
+        seconds = oldest.seconds + time.perf_counter() - start
+        cpu_seconds = oldest.cpu_seconds + time.process_time() - cpu_start
+        return Estimate(pose, place, look, evaluations, seconds, cpu_seconds, paths), off
 
 
 def yaw_costs(yaws: Array, known: float | None) -> Array:
@@ -226,3 +277,25 @@ def yaw_costs(yaws: Array, known: float | None) -> Array:
     if known is None:
         return np.zeros(len(yaws))
     return np.asarray(AWAY * np.clip(np.abs(wrapped(yaws - known)) / FACING - 1.0, 0.0, 1.0))
+
+
+def _named(name: str) -> Transitions:
+    """Return the function MODULE:FUNCTION. Raises ValueError where there is none."""
+    module, _, function = name.partition(":")
+    try:
+        model = getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(
+            f"transitions must be clips or MODULE:FUNCTION that can be imported, got {name}: {error}"
+        ) from None
+    if not callable(model):
+        raise InputError(f"transitions must name a function, got {name}, which is a {type(model).__name__}")
+    return cast(Transitions, model)
+
+
+def _checked(transitions: Transitions, transition: Transition) -> Array:
+    """Return the costs of a model of transitions. Raises ValueError where they are not one finite number a step."""
+    costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
+    if costs.shape != shape or not np.isfinite(costs).all():
+        raise InputError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
+    return costs

@@ -53,20 +53,25 @@ def frame_states(beam: Beam, fits: Array, before: FrameStates | None, steps: Arr
 def viterbi_state(window: Sequence[FrameStates]) -> int:
     """Return the state of the first frame on the likeliest path to the last one."""
     row = int(window[-1].beam.totals.argmin())
-    for one in window[:0:-1]:
-        row = int(one.beam.parents[row])
+    for frame in window[:0:-1]:
+        row = int(frame.beam.parents[row])
     return row
 
 
 def state_weights(window: Sequence[FrameStates]) -> Array:
     """Return the weights (n,) of the states of the first frame, given all frames up to the last; they sum to 1."""
     backward = np.ones(len(window[-1].beam))
-    for one in window[:0:-1]:
-        assert one.kernel is not None
-        backward = one.kernel @ (backward * one.likelihoods)  # RABINER1989 (backward)
+    for frame in window[:0:-1]:
+        assert frame.kernel is not None
+        backward = frame.kernel @ (backward * frame.likelihoods)  # RABINER1989 (backward)
         backward /= backward.max()
     products = window[0].forward * backward
     return np.asarray(products / products.sum())
+
+
+def squares_apart(codes: Codes, code: Codes, turns: Array) -> Array:
+    """Return the squared distances (n,) of codes (n, D) from one, and of turns (n,) from 0, in standard deviations."""
+    return np.asarray(((codes - code) ** 2).sum(axis=1) / SIMILAR**2 + (wrapped(turns) / SIMILAR_YAW) ** 2)
 
 
 def mean_near(row: int, weights: Array, codes: Codes, poses: Array, places: Array) -> tuple[Array, Array, Codes]:
@@ -74,9 +79,7 @@ def mean_near(row: int, weights: Array, codes: Codes, poses: Array, places: Arra
 
     The mean of all would be between a stride and its mirrored half-cycle where both are likely.
     """
-    apart = ((codes - codes[row]) ** 2).sum(axis=1) / SIMILAR**2
-    turned = wrapped(poses[:, 0] - poses[row, 0]) / SIMILAR_YAW
-    share = weights * np.exp(-0.5 * (apart + turned**2))
+    share = weights * np.exp(-0.5 * squares_apart(codes, codes[row], poses[:, 0] - poses[row, 0]))
     share[row] += np.finfo(np.float64).tiny
     share /= share.sum()
     pose = poses[row] + share @ wrapped(poses - poses[row])
@@ -92,10 +95,10 @@ def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
     `power` is what the likelihoods of silhouettes are raised to: below 1, the posterior is wider.
     """
     backward = np.ones(len(window[-1].beam), dtype=np.float32)
-    for one in window[:0:-1]:
-        assert one.kernel is not None
-        likely = backward * one.likelihoods**power
-        backward = one.kernel @ (likely / likely.max()).astype(np.float32)  # GODSILL2004 (messages)
+    for frame in window[:0:-1]:
+        assert frame.kernel is not None
+        likely = backward * frame.likelihoods**power
+        backward = frame.kernel @ (likely / likely.max()).astype(np.float32)  # GODSILL2004 (messages)
     return np.asarray(backward, dtype=np.float64)
 
 
@@ -144,16 +147,12 @@ class Sampler:
         self._rng = rng.spawn(1)[0]  # of its own: reported poses do not depend on the number of paths
         self._rows: Rows | None = None
 
-    def drawn(self, window: Sequence[FrameStates], path: int) -> SampledPaths | None:
+    def draw(self, window: Sequence[FrameStates], path: int) -> SampledPaths | None:
         """Return the paths in the first frame of a window, whose likeliest state is `path`; None for no paths."""
         if not self._count:
             return None
         self._rows = sample_states(window, self._rows, self._count, self._power, self._rng)
         beam = window[0].beam
-        states, yaws = beam.states[self._rows], beam.yaws[self._rows]
-        poses = self._exemplars.poses[states]
-        poses[:, 0] = yaws
-        codes = self._exemplars.codes
-        apart = ((codes[states] - codes[beam.states[path]]) ** 2).sum(axis=1) / SIMILAR**2
-        apart += (wrapped(yaws - beam.yaws[path]) / SIMILAR_YAW) ** 2
-        return SampledPaths(poses, beam.places[self._rows], apart <= PATH_REACH**2)
+        states, yaws, codes = beam.states[self._rows], beam.yaws[self._rows], self._exemplars.codes
+        apart = squares_apart(codes[states], codes[beam.states[path]], yaws - beam.yaws[path])
+        return SampledPaths(self._exemplars.turned(states, yaws), beam.places[self._rows], apart <= PATH_REACH**2)

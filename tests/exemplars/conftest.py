@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import Silhouette
 from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.tracker import ExemplarTracker
 
 BUDGET = 1000
 EMPTY = [Silhouette.of(np.zeros((120, 160), dtype=bool))]
@@ -23,43 +25,50 @@ EMPTY = [Silhouette.of(np.zeros((120, 160), dtype=bool))]
 
 @dataclass(frozen=True)
 class Walk:
-    """What a tracker is told, what it sees, and what is true."""
+    """A tracker's task and observations, and the true motion."""
 
     task: Task
-    seen: Sequence[Observation]
+    observations: Sequence[Observation]
     motion: Motion
 
-    def told(self, **known: object) -> Task:
-        """Return the task, told something else."""
-        return replace(self.task, **known)  # type: ignore[arg-type]
+    def aligned(self) -> "Walk":
+        """Return the walk with an unknown root translation."""
+        observations = [replace(observation, translation=None) for observation in self.observations]
+        return replace(self, task=replace(self.task, translation="aligned"), observations=observations)
 
-    def off(self, frames: Sequence[Frame], first: int = 0) -> Array:
+    def hidden(self, first: int, last: int, *, usable: bool = False) -> "Walk":
+        """Return the walk with empty silhouettes from frame `first` to before `last`."""
+        observations = list(self.observations)
+        for k in range(first, last):
+            observations[k] = replace(observations[k], silhouettes=EMPTY, usable=usable)
+        return replace(self, observations=observations)
+
+    def track(self, first: int = 0, last: int | None = None, *, seed: int = 0, **settings: Any) -> list[Frame]:
+        """Return the frames of a track; fields of the task may be among the settings."""
+        known = {name: settings.pop(name) for name in [*settings] if hasattr(self.task, name)}
+        tracker = ExemplarTracker(replace(self.task, **known), **settings)
+        return list(tracker.track(self.observations[first:last], np.random.default_rng(seed)))
+
+    def errors_mm(self, frames: Sequence[Frame], first: int = 0) -> Array:
         """Return the mean distance of joints in each frame (T,), in millimetres."""
         skeleton = self.motion.skeleton
-        true = skeleton.joints(self.motion.poses, self.motion.translations)[first : first + len(frames)]
-        poses, places = (np.array([getattr(frame, name) for frame in frames]) for name in ("pose", "translation"))
-        return np.asarray(1000.0 * np.linalg.norm(skeleton.joints(poses, places) - true, axis=-1).mean(axis=1))
+        truth = skeleton.joints(self.motion.poses, self.motion.translations)[first : first + len(frames)]
+        joints = skeleton.joints(np.array([frame.pose for frame in frames]), [frame.translation for frame in frames])
+        return np.asarray(1000.0 * np.linalg.norm(joints - truth, axis=-1).mean(axis=1))
 
 
 def walk_of(motion: Motion, views: Sequence[float] = (45.0,), size: tuple[int, int] = (160, 120)) -> Walk:
-    """Return a walk as cameras see it, to be followed by what other built-in motions teach."""
+    """Return a walk before cameras, to be followed with other built-in motions as training."""
     scene = synthetic(motion, list(views), size, [], (None, None))
     training = [built_in.motion(name, frames=60) for name in ("walk-b", "walk-c", "run-b")]
-    task = Task(
-        Body.of(motion.skeleton),
-        scene.cameras,
-        BUDGET,
-        float(motion.poses[0, 0]),
-        motion.translations[0],
-        fps=motion.fps,
-        training=training,
-    )
+    yaw, place = float(motion.poses[0, 0]), motion.translations[0]
+    task = Task(Body.of(motion.skeleton), scene.cameras, BUDGET, yaw, place, fps=motion.fps, training=training)
     return Walk(task, list(scene.observations), motion)
 
 
 @pytest.fixture(autouse=True)
 def one_thread() -> Iterator[None]:
-    """Have matrices multiplied by one thread, as a track has them: on a busy machine more are ten times as slow."""
+    """Multiply matrices in one thread, as a track does: on a busy machine more are ten times as slow."""
     with threadpool_limits(1):
         yield
 

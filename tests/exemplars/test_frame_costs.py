@@ -1,25 +1,114 @@
-"""What a frame says of itself, of several cameras."""
+"""The costs of a frame, and the posterior and twins that a frame reports."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 
+from posefit.fitting.tracker import Observation
+from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in
+from posefit.motion.built_in import average_skeleton
 from posefit.silhouette.mask import Silhouette
+from posefit.uncertainty.calibration import Recalibration
+from posefit.uncertainty.modes import Posterior
+from posefit_exemplars.calibration import evidence, recalibrated, stored_calibration
 from posefit_exemplars.frame_costs import FrameCosts
-from tests.exemplars.conftest import walk_of
+from tests.cases import each
+from tests.exemplars.conftest import EMPTY, Walk, walk_of
+
+SKELETON = average_skeleton()
+STILL = np.zeros(66)
 
 
-def test_a_camera_that_sees_alone_cannot_tell_the_depth_however_many_there_are() -> None:
+def samples(spread: float) -> Posterior:
+    poses = spread * np.random.default_rng(0).standard_normal((24, 66))
+    return Posterior(poses, np.zeros((24, 3)), np.ones(24))
+
+
+def recalibration(cost: float, usable: bool = True) -> Recalibration:
+    look: Any = SimpleNamespace(skeleton=SKELETON, cameras=1, usable=usable)
+    corrections = recalibrated(samples(0.1), STILL, cost, look).recalibration
+    assert corrections is not None
+    return corrections
+
+
+def test_the_evidence_of_an_error_is_cost_spread_and_cameras() -> None:
+    one, two = (evidence(SKELETON, samples(0.1), STILL, 5.0, cameras) for cameras in (1, 2))
+    assert (one[0], one[1], one[3], two[3]) == (1.0, math.log(5.0), 0.0, 1.0)
+    assert evidence(SKELETON, samples(0.3), STILL, 5.0, 1)[2] > one[2]
+    assert np.isfinite(evidence(SKELETON, samples(0.0), STILL, 0.0, 1)).all()
+
+
+def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_nothing_is_visible() -> None:
+    good, bad = recalibration(2.0), recalibration(20.0)
+    assert (bad.joint_spreads[1:] > good.joint_spreads[1:]).all()
+    greatest = math.exp(stored_calibration().range[1]) * stored_calibration().joint_spreads
+    for cost in (0.0, 5.0):
+        np.testing.assert_allclose(recalibration(cost, usable=False).joint_spreads, greatest)
+
+
+def test_no_mode_is_likelier_to_be_right_where_the_expected_error_is_greater() -> None:
+    stored = stored_calibration()
+    assert stored.joint_factors.shape == (3, 27)
+    assert stored.angle_factors.shape == (3, 66)
+    none = [stored.recalibration(log).none for log in np.linspace(stored.range[0], -1.0, 20)]
+    assert np.all(np.diff(none) > 0.0)
+    assert none[0] < 0.05 < 0.5 < none[-1]
+    assert recalibration(5.0).none > 0.0
+
+
+@each("views", [(45.0,), (45.0, 135.0)])
+def test_twins_cost_what_the_mirrored_and_each_reflected_pose_costs(views: tuple[float, ...]) -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=1), views)
+    look, pose, place = FrameCosts(walk.task, walk.observations[0]), walk.motion.poses[0], walk.motion.translations[0]
+    skeleton = walk.motion.skeleton
+    reflected = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
+    twins = [mirrored_poses(skeleton, pose[None]), *reflected]
+    expected = [look.measured(twin[0], place)[0] for twin in twins]
+    np.testing.assert_allclose(look.twins(pose, place), expected)
+
+
+def test_a_twin_of_an_aligned_pose_is_aligned_too() -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=1)).aligned()
+    look, pose = FrameCosts(walk.task, walk.observations[0]), walk.motion.poses[0]
+    place = walk.motion.translations[0] + [0.02, -0.01, 0.0]  # as if smoothing had moved it
+    poses = np.concatenate([pose[None], mirrored_poses(walk.motion.skeleton, pose[None])])
+    placed = look.placed(poses, np.repeat(place[None], 2, axis=0))
+    moved = placed[1] + place - placed[0]
+    assert look.twins(pose, place)[0] == pytest.approx(look.measured(poses[1], moved)[0])
+
+
+def test_frames_report_their_twins_and_recalibration_and_count_the_evaluations(walker: Walk) -> None:
+    observations = [*walker.observations[:2], Observation(EMPTY, None, usable=False)]
+    walk = replace(walker, observations=observations)
+    sampled, plain = walk.track(samples=4), walk.track(samples=0)
+    for frame, other, observation in zip(sampled[:2], plain, observations, strict=False):
+        np.testing.assert_array_equal(frame.pose, other.pose)
+        assert frame.evaluations == other.evaluations + 2
+        twins = FrameCosts(walk.task, observation).twins(frame.pose, frame.translation)
+        np.testing.assert_allclose(frame.details["twins"], twins, atol=1e-9)
+        assert "twins" not in other.details
+    assert len(sampled[2].details["twins"]) == 0
+    assert sampled[2].evaluations == 1
+    for frame in sampled:
+        assert frame.posterior is not None
+        assert frame.posterior.recalibration is not None
+        assert frame.posterior.recalibration.sharpness == stored_calibration().sharpness
+
+
+def test_the_depth_is_unknown_where_one_camera_alone_shows_the_person() -> None:
     walk = walk_of(built_in.motion("walk", frames=3), (0.0, 90.0))
-    first, second = walk.task.cameras
-    one = walk.seen[0]
-    nothing = Silhouette.of(np.zeros((120, 160), dtype=bool), np.zeros((120, 160), dtype=bool))
-    assert FrameCosts(walk.task, one).eye is None
-    alone = FrameCosts(walk.task, replace(one, silhouettes=[nothing, one.silhouettes[1]])).eye
-    assert alone is not None
-    np.testing.assert_array_equal(alone, second.position)
-    only = FrameCosts(walk.told(cameras=[first]), replace(one, silhouettes=one.silhouettes[:1])).eye
-    assert only is not None
-    np.testing.assert_array_equal(only, first.position)
-    assert FrameCosts(walk.task, replace(one, silhouettes=[nothing, nothing])).eye is None
+    (first, second), shown = walk.task.cameras, walk.observations[0].silhouettes
+    unknown = Silhouette.of(np.zeros((120, 160), dtype=bool), np.zeros((120, 160), dtype=bool))
+    for cameras, silhouettes, eye in (
+        ((first, second), shown, None),
+        ((first, second), [unknown, unknown], None),
+        ((first, second), [unknown, shown[1]], second.position),
+        ((first,), shown[:1], first.position),
+    ):
+        look = FrameCosts(replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes))
+        np.testing.assert_array_equal(look.eye, eye)
