@@ -10,17 +10,24 @@ import click
 from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, options
 from posefit.cli.output import json_line, progress, results_alone, say
 from posefit.errors import InputError
+from posefit.progress import Progress
 
 
 @click.command()
 @options(TRACK)
 @FRAMES
-def track(as_json: bool, **options: Any) -> None:
+@click.option(
+    "--live", metavar="DEVICE|URL|-", help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures."
+)
+def track(as_json: bool, live: str | None, **options: Any) -> None:
     """Track a person through SOURCE.
 
     A built-in motion, an .amc or .bvh file, a folder or .npz of masks, a video; or what several cameras saw.
     """
     from posefit.tracking.front import track as run
+
+    if live is not None:
+        return _track_live(live, as_json, options)
 
     with results_alone() if as_json else nullcontext():
         result = run(progress=progress, say=say, **_arguments(options))
@@ -38,6 +45,23 @@ def fit(as_json: bool, **options: Any) -> None:
         result = run(say=say, **_arguments(options))
     degrees = [round(math.degrees(angle), 6) for angle in result.pose]
     _print(result.summary, as_json, {"pose_degrees": degrees}, options["out"], "open track.html, look at summary.png")
+
+
+def _track_live(live: str, as_json: bool, options: dict[str, Any]) -> None:
+    from posefit.tracking.live import track_live, write_live
+
+    if options["source"]:
+        raise InputError(f"SOURCE must be left out with --live, got {' '.join(options['source'])}")
+    if useless := [name for name in ("force", "resume", "rerun", "without_subject") if options[name]]:
+        raise InputError(f"--{useless[0].replace('_', '-')} must be left out with --live")
+    options = _arguments({**options, "source": ("live.mp4",)})  # for the options of a segmenter
+    out = options["out"]
+    for name in ("source", "out", "force", "resume", "rerun"):
+        options.pop(name)
+    frames = track_live(live, progress=Progress(say), **options)
+    summary = write_live(frames, out, (lambda frame: click.echo(json_line(frame.row))) if as_json else None)
+    latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
+    say(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
 
 
 def _print(summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, hint: str) -> None:

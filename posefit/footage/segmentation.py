@@ -163,20 +163,18 @@ class Segmentation:
         shows a person.
         """
         masks, valid = (empty_planes(len(self), self.size) for _ in range(2))
-        segmenter = self._segmenter or self._how.segmenter(self._film)
+        segmenter = self.learned()
         quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
         motion = CameraMotion(self.size)
         frames = self.video.frames(self.start, self.stop, self.size)
         for k, image in enumerate(progress(frames, len(self)) if progress else frames):
             if k % PERIOD == 0:
                 self._shifts.append(motion.shift(image))
-            result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+            result, row = self.person(segmenter, image, quality, self.start + k)
             self._facings.append(float(getattr(segmenter, "facing", math.nan)))
             self._middles.append(
                 float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
             )
-            part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
-            row = quality.row(self._film.cut(image), part, self.start + k)
             row["usable"] = int(row["usable"] and self.video.is_filmed(self.start + k))
             self.rows.append(row)
             masks[k], valid[k] = np.packbits(result.mask), np.packbits(result.valid)
@@ -189,6 +187,18 @@ class Segmentation:
         count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
         return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps)
+
+    def learned(self) -> Segmenter:
+        """Return the segmenter, which has learned the background."""
+        return self._segmenter or self._how.segmenter(self._film)
+
+    def person(
+        self, segmenter: Segmenter, image: Image, quality: FrameQuality, number: int
+    ) -> tuple[Person, dict[str, Any]]:
+        """Return the person in a frame of the working size, and the frame's quality."""
+        result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+        part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
+        return result, quality.row(self._film.cut(image), part, number)
 
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
         """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""

@@ -105,10 +105,13 @@ def scene_of(
         masks = [cleaned(read_masks(path, frames, label), path, holes) for path in paths]
         views = [CameraView(*clean, name=str(path)) for clean, path in zip(masks, paths, strict=True)]
     facing = view_degrees[0] if view_degrees else None
+    return combined(views, paths[0].stem, body_of(asf, height), known, facing, up, fps)
+
+
+def body_of(asf: str | Path | None, height: float | None) -> Body:
+    """Return the body of a skeleton file, or the average one, scaled to a height in metres."""
     body = Body.of(built_in.average_skeleton() if asf is None else read_asf(asf))
-    if height is not None:
-        body = body.scaled(height / body.stature, height / body.stature)
-    return combined(views, paths[0].stem, body, known, facing, up, fps)
+    return body if height is None else body.scaled(height / body.stature, height / body.stature)
 
 
 def _filmed(segmentation: Segmentation, progress: Progress) -> CameraView:
