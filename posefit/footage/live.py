@@ -1,0 +1,205 @@
+"""The frames of a camera, a network stream or a pipe as they come, and the person in each of them."""
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, islice
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import cv2
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.footage.images import PIXELS
+from posefit.footage.masks import FPS
+from posefit.footage.quality import FrameQuality
+from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.reading import quoted
+from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Mask
+
+STALL_SECONDS = 5.0  # without a frame, after which a stream counts as broken
+EMPTY_SECONDS = 3.0  # in which the scene is still empty, by default: VSMM 1.1
+MASK_LEVEL = 127  # a pixel of a grey frame that is brighter belongs to the person
+
+
+@dataclass(frozen=True, eq=False)
+class LiveImage:
+    """A frame of a stream: a picture (height, width, 3), or a mask in grey levels (height, width)."""
+
+    number: int  # in the stream, those counted that were skipped
+    arrived: float  # seconds of `time.perf_counter`
+    image: Image = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class LiveMask:
+    """The person in a frame of a stream."""
+
+    source: LiveImage
+    mask: Mask = field(repr=False)
+    valid: Mask = field(repr=False)
+    usable: bool  # whether it shows enough of the person to be searched
+
+
+class Stream:
+    """The frames of `source`: a device's number, an address that OpenCV opens, or "-", images on standard input.
+
+    Standard input holds binary PGM images, which are masks, or binary PPM images, one after another. A thread reads;
+    of the frames that come while one is tracked only the newest is kept. Raises InputError where a source cannot be
+    opened, a frame is damaged, or none comes for `STALL_SECONDS`.
+    """
+
+    def __init__(self, source: str, pipe: BinaryIO | None = None) -> None:
+        self.name, self.fps, self.count = source, FPS, 0
+        self._latest: LiveImage | None = None
+        self._ended, self._error = False, None
+        self._changed = threading.Condition()
+        frames: Iterator[Image]
+        if source == "-":
+            frames = netpbm_images(pipe or sys.stdin.buffer)
+        else:
+            capture = cv2.VideoCapture(int(source) if source.isdigit() else source)
+            if not capture.isOpened():
+                raise InputError(f"live must be a device or an address that can be opened, or -, got {quoted(source)}")
+            rate = capture.get(cv2.CAP_PROP_FPS)
+            self.fps = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else FPS
+            frames = _captured(capture)
+        threading.Thread(target=self._read, args=(frames,), daemon=True).start()
+
+    def __iter__(self) -> Iterator[LiveImage]:
+        while True:
+            with self._changed:
+                came = self._changed.wait_for(lambda: self._latest is not None or self._ended, STALL_SECONDS)
+                image, self._latest = self._latest, None
+            if image is not None:
+                yield image
+            elif not came:
+                raise InputError(f"{self.name}: expected a frame, got none for {STALL_SECONDS:g} s")
+            elif self._error is not None:
+                raise self._error
+            else:
+                return
+
+    def _read(self, frames: Iterator[Image]) -> None:
+        try:
+            for image in frames:
+                with self._changed:
+                    self._latest = LiveImage(self.count, time.perf_counter(), image)
+                    self.count += 1
+                    self._changed.notify()
+        except (InputError, OSError) as error:
+            self._error = InputError(f"{self.name}: {error}, after {self.count} frames")
+        finally:
+            with self._changed:
+                self._ended = True
+                self._changed.notify()
+
+
+def netpbm_images(stream: BinaryIO) -> Iterator[Image]:
+    """Yield the binary PGM (height, width) and PPM (height, width, 3: BGR) images of a stream.
+
+    Raises InputError for anything else, and for an image that breaks off.
+    """
+    while magic := stream.read(2):
+        if magic not in (b"P5", b"P6"):
+            raise InputError(f"expected binary PGM or PPM images, got {quoted(magic.decode('latin-1'))}")
+        width, height, most = (_number(stream) for _ in range(3))
+        if not (0 < width * height <= PIXELS and most == 255):
+            raise InputError(f"expected an image of at most {PIXELS // 10**6} million pixels in 255 levels")
+        shape = (height, width) if magic == b"P5" else (height, width, 3)
+        values = stream.read(int(np.prod(shape)))
+        if len(values) < np.prod(shape):
+            raise InputError("expected a whole image, got one that breaks off")
+        image = np.frombuffer(values, dtype=np.uint8).reshape(shape)
+        yield image if magic == b"P5" else np.ascontiguousarray(image[..., ::-1])
+
+
+def _number(stream: BinaryIO) -> int:
+    """Return the next number of a netpbm header, and read the byte after it."""
+    digits = b""
+    while len(digits) < 10:
+        byte = stream.read(1)
+        if byte == b"#":
+            while stream.read(1) not in (b"\n", b""):
+                pass
+        elif byte.isdigit():
+            digits += byte
+        elif digits or not byte.isspace():
+            break
+    if not (digits and byte.isspace()):
+        raise InputError("expected the header of an image, got something else")
+    return int(digits)
+
+
+def _captured(capture: Any) -> Iterator[Image]:
+    while True:
+        read, image = capture.read()
+        if not read:
+            capture.release()
+            return
+        yield image
+
+
+@dataclass(frozen=True, eq=False)
+class _FirstFrames:
+    """The first frames of a stream, as a video from which a segmenter learns."""
+
+    path: Path
+    fps: float
+    images: Sequence[Image] = field(repr=False)
+    claimed: int = 0
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.images[0].shape[1], self.images[0].shape[0]
+
+    def count(self) -> int:
+        return len(self.images)
+
+    def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
+        return (_resized(image, size) for image in self.images[start:stop:step])
+
+
+def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None]) -> Iterator[LiveMask]:
+    """Yield the person in the frames of a stream: grey frames are masks; others are segmented.
+
+    By default each pixel's background is its mean over the first three seconds, which have to show the empty scene.
+    """
+    images = iter(stream)
+    if (first := next(images, None)) is None:
+        raise InputError(f"{stream.name}: expected frames, got none")
+    if first.image.ndim == 2:
+        for live in chain([first], images):
+            if live.image.shape != first.image.shape:
+                raise _other_size(stream, first.image, live.image)
+            mask = live.image > MASK_LEVEL
+            yield LiveMask(live, mask, np.ones_like(mask), bool(mask.any() and not mask.all()))
+        return
+    count = max(1, round(EMPTY_SECONDS * stream.fps)) if how is None else 1
+    if how is None:
+        how = Extraction(background=f"0:{count}")
+        log(f"learning the background: keep the scene empty for {EMPTY_SECONDS:g} s")
+    learned = [first.image, *(live.image for live in islice(images, count - 1))]
+    video = _FirstFrames(Path(stream.name), stream.fps, learned)
+    segmentation = Segmentation(video, how, (None, None))
+    segmenter = segmentation.learned()
+    quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))
+    for live in images:
+        if live.image.shape != first.image.shape:
+            raise _other_size(stream, first.image, live.image)
+        image = _resized(live.image, segmentation.size)
+        person, row = segmentation.person(segmenter, image, quality, live.number)
+        yield LiveMask(live, person.mask, person.valid, bool(row["usable"]))
+
+
+def _resized(image: Image, size: tuple[int, int]) -> Image:
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _other_size(stream: Stream, first: Image, image: Image) -> InputError:
+    expected, came = ("x".join(map(str, frame.shape[1::-1])) for frame in (first, image))
+    return InputError(f"{stream.name}: expected frames of {expected}, got {came}")

@@ -1,0 +1,181 @@
+"""Tracks a person in frames as they come: `posefit track --live`."""
+
+import json
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from posefit.errors import InputError
+from posefit.files import check_new, check_place
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.cameras import CameraView, calibrated, combined
+from posefit.footage.live import LiveMask, Stream, live_masks
+from posefit.footage.masks import PackedMasks
+from posefit.footage.scene import Scene
+from posefit.footage.source import body_of
+from posefit.footage.training import training_clips, training_motions
+from posefit.geometry.calibration import Calibration
+from posefit.motion import built_in
+from posefit.progress import QUIET, Progress
+from posefit.silhouette.mask import Mask, Silhouette
+from posefit.tracking.follow import tracker_of
+from posefit.tracking.initialise import following, task_of
+from posefit.tracking.method import prepare
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart
+
+METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
+WHOLE = ("frames", "size", "label", "holes", "hypotheses", "passes", "smooth", "body_frames")  # need all frames
+LINES, ARRAYS = "frames.jsonl", "poses.npz"
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame:
+    """A tracked frame of a stream."""
+
+    number: int  # in the stream, those counted that were skipped
+    seconds: float  # from the first frame to this one
+    latency: float  # seconds from the frame to its pose
+    usable: bool  # whether it shows enough of the person; else its pose is held
+    frame: Frame
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The frame as frames.jsonl has it."""
+        return {
+            "frame": self.number,
+            "seconds": round(self.seconds, 4),
+            "latency_ms": round(1e3 * self.latency, 2),
+            "usable": self.usable,
+            "cost": round(self.frame.cost, 4),
+            "translation_m": np.round(self.frame.translation, 5).tolist(),
+            "pose_degrees": np.round(np.degrees(self.frame.pose), 4).tolist(),
+        }
+
+
+def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any) -> Iterator[LiveFrame]:
+    """Yield the tracked frames of a stream; of those that come while one is tracked all but the newest are skipped.
+
+    `source` is as for `posefit.footage.live.Stream`; options are those of `posefit.track`, and the method is
+    `sapso@pca` by default. The first second is buffered, to search the first pose. Raises InputError where an option
+    does not fit or needs all frames, and where the stream breaks off.
+    """
+    chosen = TrackOptions(**options)
+    for declared in fields(chosen):
+        if declared.name in WHOLE and getattr(chosen, declared.name) != declared.default:
+            raise InputError(f"{declared.name} must be left out with live, got {getattr(chosen, declared.name)}")
+    chosen = chosen.changed(method=chosen.method or METHOD, train=chosen.train or built_in.other_styles("walk"))
+    clips = training_clips(chosen.train, chosen.asf)
+    stream = Stream(source)
+    fps = chosen.fps or stream.fps
+    masks = live_masks(stream, chosen.extraction, progress.log)
+    first = list(islice(masks, TRIAL_FRAMES * TRIAL_STRIDE))
+    scene, straighten = _scene_of(first, source, fps, chosen)
+    waiting: deque[LiveMask] = deque()
+
+    def coming() -> Iterator[Observation]:
+        for live, observation in zip(first, scene.observations, strict=True):
+            waiting.append(live)
+            yield observation
+        for live in masks:
+            waiting.append(live)
+            yield Observation([Silhouette.of(*straighten(live))], usable=live.usable)
+
+    with threadpool_limits(1):
+        task = task_of(scene, chosen, training_motions(clips, fps))
+        method = prepare(chosen, task)
+        if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
+            progress.log(f"looking for the first pose, {restarts} times")
+            task = best_restart(task, scene.observations, following(method), restarts, chosen.seed)
+        tracker = tracker_of(method, scene, task)
+        for frame in tracker.track(coming(), np.random.default_rng(chosen.seed)):
+            live = waiting.popleft()
+            came, began = live.source.arrived, first[0].source.arrived
+            yield LiveFrame(live.source.number, came - began, time.perf_counter() - came, live.usable, frame)
+
+
+def _scene_of(
+    first: Sequence[LiveMask], name: str, fps: float, options: TrackOptions
+) -> tuple[Scene, Callable[[LiveMask], tuple[Mask, Mask]]]:
+    """Return the scene of the first frames, and what takes a lens's distortion out of a mask and its known pixels."""
+    if not any(live.usable for live in first):
+        raise InputError(f"{name}: expected a person in the first {len(first)} frames, got none")
+    size = (first[0].mask.shape[1], first[0].mask.shape[0])
+    packed = PackedMasks(
+        [f"{name}, frame {live.source.number}" for live in first],
+        size,
+        np.array([np.packbits(live.mask) for live in first]),
+        np.array([np.packbits(live.valid) for live in first]),
+        np.array([live.usable for live in first]),
+    )
+    facing = options.view_degrees[0] if options.view_degrees else None
+    body, view = body_of(options.asf, options.height), CameraView(packed, name)
+    scene = combined([view], name, body, options.camera, facing, options.up, fps)  # type: ignore[arg-type]
+    camera = next(iter(calibrated(options.camera, [None])), None)  # type: ignore[arg-type]
+    maps = camera.maps(size) if isinstance(camera, Calibration) and camera.distorted else None
+
+    def straighten(live: LiveMask) -> tuple[Mask, Mask]:
+        if maps is None:
+            return live.mask, live.valid
+        mask, valid = (cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) for plane in (live.mask, live.valid))
+        return np.asarray(mask != 0), np.asarray(valid != 0)
+
+    return scene, straighten
+
+
+def write_live(
+    frames: Iterator[LiveFrame], out: str | Path | None = None, on_frame: Callable[[LiveFrame], None] | None = None
+) -> dict[str, Any]:
+    """Return a summary of a live track, followed until its stream ends or Ctrl-C.
+
+    With `out`, a new folder gets frames.jsonl, a line a frame as it comes, and at the end poses.npz, also where the
+    stream breaks off. Raises InputError then, after both are written.
+    """
+    folder, latencies, last = None if out is None else Path(out), [], 0
+    if folder is not None:
+        check_new(folder)
+        check_place(folder)
+        folder.mkdir()
+    lines = None if folder is None else (folder / LINES).open("w", encoding="utf-8")
+    try:
+        for live in frames:
+            latencies.append(live.latency)
+            last = live.number
+            if lines is not None:
+                print(json.dumps(live.row), file=lines, flush=True)
+            if on_frame is not None:
+                on_frame(live)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        if folder is not None and lines is not None:
+            lines.close()
+            _write_arrays(folder)
+    median, slow = np.quantile(latencies, (0.5, 0.99)) if latencies else (np.nan, np.nan)
+    return {
+        "frames": len(latencies),
+        "skipped": last + 1 - len(latencies) if latencies else 0,
+        "latency_ms": {"p50": round(1e3 * median, 1), "p99": round(1e3 * slow, 1)},
+    }
+
+
+def _write_arrays(folder: Path) -> None:
+    """Write poses.npz from the lines that were written."""
+    with (folder / LINES).open(encoding="utf-8") as lines:
+        rows = [json.loads(line) for line in lines]
+    np.savez_compressed(
+        folder / ARRAYS,
+        frames=np.array([row["frame"] for row in rows], dtype=np.int64),
+        seconds=np.array([row["seconds"] for row in rows]),
+        poses=np.radians([row["pose_degrees"] for row in rows]).reshape(-1, 66),
+        translations=np.array([row["translation_m"] for row in rows]).reshape(-1, 3),
+        usable=np.array([row["usable"] for row in rows], dtype=bool),
+    )
