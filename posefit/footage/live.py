@@ -179,11 +179,13 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
             mask = live.image > MASK_LEVEL
             yield LiveMask(live, mask, np.ones_like(mask), bool(mask.any() and not mask.all()))
         return
-    count = max(1, round(EMPTY_SECONDS * stream.fps)) if how is None else 1
+    learned = [first.image]
     if how is None:
-        how = Extraction(background=f"0:{count}")
         log(f"learning the background: keep the scene empty for {EMPTY_SECONDS:g} s")
-    learned = [first.image, *(live.image for live in islice(images, count - 1))]
+        learned += [live.image for live in islice(images, round(EMPTY_SECONDS * stream.fps) - 1)]
+        how = Extraction(background=f"0:{len(learned)}")
+    else:
+        images = chain([first], images)
     video = _FirstFrames(Path(stream.name), stream.fps, learned)
     segmentation = Segmentation(video, how, (None, None))
     segmenter = segmentation.learned()

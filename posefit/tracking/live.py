@@ -159,7 +159,7 @@ def write_live(
         if folder is not None and lines is not None:
             lines.close()
             _write_arrays(folder)
-    median, slow = np.quantile(latencies, (0.5, 0.99)) if latencies else (np.nan, np.nan)
+    median, slow = np.quantile(latencies, (0.5, 0.99)).tolist() if latencies else (np.nan, np.nan)
     return {
         "frames": len(latencies),
         "skipped": last + 1 - len(latencies) if latencies else 0,

@@ -415,8 +415,9 @@ def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_pa
     assert "passed" in tests.stdout
     if kind == "segmenter":  # no motion is taken out of a video
         return
+    method = "@my-own" if kind == "prior" else "my-own"
     used = subprocess.run(
-        [sys.executable, "-m", "posefit", "track", "walk", f"--{kind}", "my-own", "--frames", "0:3", "--json"],
+        [sys.executable, "-m", "posefit", "track", "walk", "--method", method, "--frames", "0:3", "--json"],
         cwd=tmp_path,
         env=environment,
         capture_output=True,

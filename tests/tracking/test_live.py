@@ -1,0 +1,172 @@
+"""`posefit track --live`: streams of images, the person in them, and their poses."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+import threading
+
+import cv2
+import numpy as np
+import pytest
+
+from posefit.errors import InputError
+from posefit.footage import live
+from posefit.footage.live import LiveImage, Stream, live_masks, netpbm_images
+from posefit.footage.segmentation import Extraction
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion import built_in
+from posefit.silhouette.cost import project
+from posefit.tracking.live import track_live, write_live
+from tests.cases import each
+
+QUICK = {"evaluations": 200, "population_size": 20, "restarts": 2, "view_degrees": 45.0}
+
+
+def pgm(mask):
+    return b"P5\n# a comment\n%d %d\n255\n" % mask.shape[::-1] + (255 * mask.astype(np.uint8)).tobytes()
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """Masks (40, 120, 160) of a walk."""
+    motion = built_in.motion("walk")
+    body, place = Body.of(motion.skeleton), motion.translations[0]
+    camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(160, 120))
+    return [project(body, camera, motion.poses[k % len(motion)], place) for k in range(40)]
+
+
+@pytest.fixture
+def every_frame(monkeypatch):
+    """Make streams wait until the latest frame was taken, so that none is skipped."""
+    taken = threading.Semaphore(1)
+    iterate, read = Stream.__iter__, Stream._read
+
+    def iterating(self):
+        for image in iterate(self):
+            taken.release()
+            yield image
+
+    def paced(frames):
+        for frame in frames:
+            taken.acquire()
+            yield frame
+
+    monkeypatch.setattr(Stream, "__iter__", iterating)
+    monkeypatch.setattr(Stream, "_read", lambda self, frames: read(self, paced(frames)))
+
+
+def piped(monkeypatch, content):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+
+
+def test_images_are_read_one_after_another():
+    grey, colour = np.arange(6, dtype=np.uint8).reshape(2, 3), np.arange(18, dtype=np.uint8).reshape(2, 3, 3)
+    content = b"P5 3 2 255\n" + grey.tobytes() + b"P6\n#a\n3\n2\n255 " + colour.tobytes()
+    images = list(netpbm_images(io.BytesIO(content)))
+    np.testing.assert_array_equal(images[0], grey)
+    np.testing.assert_array_equal(images[1], colour[..., ::-1])
+
+
+@each(
+    "content, expected",
+    [
+        (b"GIF89a", "binary PGM or PPM"),
+        (b"P5 3 2 65535\n" + bytes(12), "255 levels"),
+        (b"P5 99999 99999 255\n", "million pixels"),
+        (b"P5 3 -2 255\n" + bytes(6), "header"),
+        (b"P5 3 2 255\n" + bytes(5), "breaks off"),
+    ],
+)
+def test_damaged_images_are_refused(content, expected):
+    with pytest.raises(InputError, match=expected):
+        list(netpbm_images(io.BytesIO(content)))
+
+
+def test_only_the_newest_frame_is_kept(walk):
+    stream = Stream("-", io.BytesIO(b"".join(map(pgm, walk))))
+    with stream._changed:
+        stream._changed.wait_for(lambda: stream._ended)
+    images = list(stream)
+    assert [image.number for image in images] == [39]
+    assert stream.count == 40
+
+
+def test_a_stalled_stream_ends_with_one_line(monkeypatch):
+    monkeypatch.setattr(live, "STALL_SECONDS", 0.05)
+    reading, writing = os.pipe()
+    with open(reading, "rb", buffering=0) as pipe, pytest.raises(InputError, match="-: expected a frame, got none"):
+        next(iter(Stream("-", pipe)))
+    os.close(writing)
+
+
+def test_the_first_frames_are_the_background(every_frame):
+    rng = np.random.default_rng(0)
+    empty = rng.integers(60, 90, (120, 160, 3), dtype=np.uint8)
+    person = empty.copy()
+    person[30:100, 70:95] = 220
+    ppm = [b"P6 160 120 255\n" + image.tobytes() for image in [*[empty] * 90, *[person] * 3]]
+    masks = list(live_masks(Stream("-", io.BytesIO(b"".join(ppm))), None, lambda _: None))
+    assert [mask.source.number for mask in masks] == [90, 91, 92]
+    overlap = (masks[0].mask & (person != empty).any(axis=2)).sum() / masks[0].mask.sum()
+    assert overlap > 0.95
+
+
+def test_a_picture_of_the_empty_scene_may_be_given(every_frame, tmp_path):
+    empty = np.full((120, 160, 3), 70, dtype=np.uint8)
+    person = empty.copy()
+    person[30:100, 70:95] = 220
+    cv2.imwrite(str(tmp_path / "empty.png"), empty)
+    stream = Stream("-", io.BytesIO(b"".join(b"P6 160 120 255\n" + image.tobytes() for image in [empty, person])))
+    masks = list(live_masks(stream, Extraction(background=str(tmp_path / "empty.png")), lambda _: None))
+    assert [mask.source.number for mask in masks] == [0, 1]
+    assert masks[1].mask.sum() == pytest.approx(70 * 25, abs=8)  # corners are rounded
+
+
+def test_masks_from_a_pipe_become_poses_on_disk(monkeypatch, every_frame, walk, tmp_path):
+    piped(monkeypatch, b"".join(map(pgm, walk)))
+    summary = write_live(track_live(**QUICK), tmp_path / "out")
+    rows = [json.loads(line) for line in (tmp_path / "out" / "frames.jsonl").read_text().splitlines()]
+    assert [row["frame"] for row in rows] == list(range(40))
+    assert (summary["frames"], summary["skipped"]) == (40, 0)
+    assert np.median([row["cost"] for row in rows]) < 30.0
+    with np.load(tmp_path / "out" / "poses.npz") as arrays:
+        assert arrays["poses"].shape == (40, 66)
+        assert arrays["translations"].shape == (40, 3)
+
+
+def test_a_broken_stream_leaves_its_frames_on_disk(monkeypatch, every_frame, walk, tmp_path):
+    piped(monkeypatch, b"".join(map(pgm, walk))[:-5])
+    with pytest.raises(InputError, match="breaks off, after 39 frames"):
+        write_live(track_live(**QUICK), tmp_path / "out")
+    with np.load(tmp_path / "out" / "poses.npz") as arrays:
+        assert len(arrays["poses"]) == 39
+
+
+@each(
+    "options, expected",
+    [
+        ({"hypotheses": 2}, "hypotheses must be left out with live, got 2"),
+        ({"smooth": True}, "smooth must be left out with live, got True"),
+    ],
+)
+def test_options_that_need_all_frames_are_refused(options, expected):
+    with pytest.raises(InputError, match=expected):
+        next(track_live(**options))
+
+
+def test_the_command_takes_no_source_beside_a_stream():
+    command = [sys.executable, "-m", "posefit", "track", "walk", "--live", "-"]
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == 2
+    assert done.stderr == "posefit: SOURCE must be left out with --live, got walk\n"
+
+
+def test_images_of_another_size_are_refused(every_frame, walk):
+    stream = Stream("-", io.BytesIO(pgm(walk[0]) + pgm(walk[0][:60])))
+    masks = live_masks(stream, None, lambda _: None)
+    assert isinstance(next(masks).source, LiveImage)
+    with pytest.raises(InputError, match="expected frames of 160x120, got 160x60"):
+        next(masks)
