@@ -27,7 +27,7 @@ from posefit.motion import built_in
 from posefit.progress import QUIET, Progress
 from posefit.silhouette.mask import Mask, Silhouette
 from posefit.tracking.follow import tracker_of
-from posefit.tracking.initialise import following, task_of
+from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart
@@ -94,7 +94,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         method = prepare(chosen, task)
         if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
             progress.log(f"looking for the first pose, {restarts} times")
-            task = best_restart(task, scene.observations, following(method), restarts, chosen.seed)
+            task = best_restart(task, scene.observations, method.follow, restarts, chosen.seed)
         tracker = tracker_of(method, scene, task)
         for frame in tracker.track(coming(), np.random.default_rng(chosen.seed)):
             live = waiting.popleft()
@@ -117,10 +117,11 @@ def _scene_of(
         np.array([live.usable for live in first]),
     )
     facing = options.view_degrees[0] if options.view_degrees else None
-    body, view = body_of(options.asf, options.height), CameraView(packed, name)
-    scene = combined([view], name, body, options.camera, facing, options.up, fps)  # type: ignore[arg-type]
-    camera = next(iter(calibrated(options.camera, [None])), None)  # type: ignore[arg-type]
-    maps = camera.maps(size) if isinstance(camera, Calibration) and camera.distorted else None
+    body, view = body_of(options.asf, options.height), CameraView(packed, (), name)
+    known = calibrated(options.camera, [None])  # type: ignore[arg-type]
+    scene = combined([view], name, body, known, facing, options.up, fps)
+    distorted = [camera for camera in known if isinstance(camera, Calibration) and camera.distorted]
+    maps = distorted[0].maps(size) if distorted else None
 
     def straighten(live: LiveMask) -> tuple[Mask, Mask]:
         if maps is None:
