@@ -98,12 +98,6 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
     assert down[v, u] == pytest.approx(239.5 + 510.0 * (y * bent + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y), abs=1e-3)
 
 
-def test_several_cameras_stand_in_one_file(tmp_path: Path) -> None:
-    path = tmp_path / "a.toml"
-    path.write_text(TOML + TOML.replace("[left]", "[right]").replace('"left"', '"right"').partition("[metadata]")[0])
-    assert [one.name for one in read_calibrations(path)] == ["left", "right"]
-
-
 @each(
     ("name", "text", "message"),
     [
@@ -112,6 +106,7 @@ def test_several_cameras_stand_in_one_file(tmp_path: Path) -> None:
         ("a.toml", TOML.replace("matrix", "matrx"), "no 'matrix'"),
         ("a.toml", TOML.replace("[ 640, 480]", "[ 640.5, 480]"), "an image size of 640.5 x 480"),
         ("a.toml", TOML.replace("500.0", "nan"), "finite numbers"),
+        ("a.toml", TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"), "a distortion of 3 numbers"),
         ("a.xml", "<calibration>", "XML that is broken"),
         ("a.xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><calibration/>", "document type"),
         ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
@@ -127,11 +122,6 @@ def test_a_file_that_is_no_calibration_is_named(tmp_path: Path, name: str, text:
         read_calibrations(tmp_path / name)
     assert str(tmp_path / name) in str(caught.value)
     assert "\n" not in str(caught.value).strip()
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="expected a calibration file, got nothing of that name"):
-        read_calibrations(tmp_path / "none.toml")
 
 
 def test_the_real_calibration_places_its_camera_ten_metres_off() -> None:
@@ -198,12 +188,6 @@ def test_numbers_are_those_that_opencv_reads(tmp_path: Path) -> None:
         (one,) = read_calibrations(tmp_path / name)
         np.testing.assert_array_equal(one.matrix, matrix)
         np.testing.assert_array_equal(one.distortion, np.array([0.1, 0.2, 0.3, 0.4], dtype=np.float32))
-
-
-def test_a_lens_has_as_many_numbers_as_opencv_knows(tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text(TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"))
-    with pytest.raises(ValueError, match="a distortion of 3 numbers"):
-        read_calibrations(tmp_path / "a.toml")
 
 
 @each(

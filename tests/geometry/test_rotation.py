@@ -96,19 +96,6 @@ def test_on_the_singularity_the_rotation_still_comes_back(pitch: float, roll: fl
     np.testing.assert_allclose(again, rotation, rtol=0.0, atol=1e-7)
 
 
-def test_a_quarter_turn_by_hand() -> None:
-    x, y, z = np.eye(3)
-    yaw, pitch, roll = (rotation_from_root_angles(QUARTER * axis) for axis in np.eye(3))
-    np.testing.assert_allclose([yaw @ z, pitch @ y, roll @ x], [x, z, y], atol=1e-12)
-    # Who pitches and then yaws faces where the yaw turns the pitched direction: z -> -y -> -y.
-    both = rotation_from_root_angles(np.array([QUARTER, QUARTER, 0.0]))
-    np.testing.assert_allclose(both @ z, -y, atol=1e-12)
-    np.testing.assert_allclose(both @ y, x, atol=1e-12)
-    # rx acts first, rz last: y -> z -> z -> z and z -> -y -> -y -> x.
-    joint = rotation_from_joint_angles(np.array([QUARTER, 0.0, QUARTER]))
-    np.testing.assert_allclose([joint @ y, joint @ z], [z, x], atol=1e-12)
-
-
 @given(triples, triples, triples)
 def test_the_geodesic_is_a_distance(a: Array, b: Array, c: Array) -> None:
     first, second, third = (rotation_from_joint_angles(angles) for angles in (a, b, c))

@@ -9,10 +9,7 @@ from hypothesis import strategies as st
 
 from posefit.arrays import Array
 from posefit.geometry.kernels import sines_cosines
-from posefit.geometry.rotation import (
-    rotation_from_joint_angles,
-    rotation_from_root_angles,
-)
+from posefit.geometry.rotation import rotation_from_joint_angles, rotation_from_root_angles
 from posefit.geometry.skeleton import (
     ANGLES,
     BONES,

@@ -99,12 +99,6 @@ def test_exchanged_limbs_leave_everything_else_where_it_is(limbs: str) -> None:
     np.testing.assert_array_equal(exchanged[:, :3], poses[:, :3])
 
 
-def test_the_opposite_yaw_is_half_a_turn_away_and_wrapped() -> None:
-    poses = np.zeros((2, ANGLES))
-    poses[:, 0] = [1.0, -1.0]
-    np.testing.assert_allclose(turned_poses(poses)[:, 0], [1.0 - np.pi, np.pi - 1.0])
-
-
 def test_limbs_that_are_none_are_a_mistake() -> None:
     with pytest.raises(ValueError, match="limbs must be one of legs, arms, got 'wings'"):
         exchanged_limbs(SKELETON, drawn(), "wings")  # type: ignore[arg-type]
