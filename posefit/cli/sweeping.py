@@ -39,20 +39,21 @@ def sweep(
     """
     from posefit.sweep import command
     from posefit.sweep.engines.engine import Limits
+    from posefit.sweep.estimate import TRIAL_SECONDS
 
-    limits = Limits(places.pop("cell_seconds"), places.pop("cell_gigabytes"))
-    where = command.Where(**places, limits=limits)
+    seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
+    start = command.engine(Limits(min(seconds, TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
     if dry_run:
-        lines = command.preview(plan, out, where=where, as_json=as_json)
+        lines = command.preview(plan, out, start, as_json)
         while some := _next(lines, as_json):
             click.echo(some)
         return
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        tally, status, shown = command.run_plan(plan, out, where=where, retry_quarantined=retry_quarantined, say=say)
-    click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out, shown))
-    context.exit(status)
+        tally = command.run_plan(plan, out, start, say, retry_quarantined)
+    click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
+    context.exit(command.exit_status(tally))
 
 
 def _next(lines: Iterator[str], as_json: bool) -> str:

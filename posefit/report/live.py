@@ -18,8 +18,7 @@ from typing import Any
 from posefit.errors import InputError
 from posefit.sweep.driver import read_lease
 from posefit.sweep.ledger import INDEX, LEASES, ROWS, SHORT, Ledger
-from posefit.sweep.locks import is_locked
-from posefit.sweep.log import SUFFIX
+from posefit.sweep.log import SUFFIX, is_locked
 
 LOOPBACK = "127.0.0.1"
 RELOAD_SECONDS = 5.0  # after which a page loads again, at least

@@ -4,7 +4,6 @@ import hashlib
 import io
 import json
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
@@ -42,23 +41,17 @@ class CellResult:
     joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
 
 
-class Cell(ABC):
+class _Spec:
     """Everything that one run depends on. `posefit.sweep.plan` makes cells that are checked.
 
     `version` is that of posefit and of the method's plugins, with digests of their sources: see `version_of`.
     """
 
-    method: str
-    settings: Mapping[str, Any]
-    evaluations: int
-    instance: int
-    seed: int
-    version: str
-
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell as JSON holds it."""
-        spec: dict[str, Any] = json.loads(json.dumps({one.name: getattr(self, one.name) for one in fields(self)}))  # type: ignore[arg-type]
+        values = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        spec: dict[str, Any] = json.loads(json.dumps(values))
         return spec
 
     @cached_property
@@ -66,32 +59,9 @@ class Cell(ABC):
         """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
         return hashlib.sha256(json_of(self.spec).encode()).hexdigest()
 
-    @property
-    @abstractmethod
-    def summary(self) -> str:
-        """The cell in one line, with everything that it is likely to differ by from others of its plan."""
-
-    @property
-    @abstractmethod
-    def kind(self) -> tuple[object, ...]:
-        """What the time of one of its evaluations depends on."""
-
-    @property
-    @abstractmethod
-    def total_evaluations(self) -> int:
-        """Its evaluations, of all frames."""
-
-    @abstractmethod
-    def trials(self) -> tuple[Self, Self]:
-        """Return two smaller cells of its kind, the smaller first, from which its time can be estimated."""
-
-    @abstractmethod
-    def measure(self) -> CellResult:
-        """Run the cell and return its result."""
-
 
 @dataclass(frozen=True)
-class TrackCell(Cell):
+class TrackCell(_Spec):
     """A motion that is tracked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
@@ -131,12 +101,10 @@ class TrackCell(Cell):
     @property
     def summary(self) -> str:
         """The cell in one line."""
-        more = [*settings_text(self.settings), *(f"{kind} {share:g}" for kind, share in self.corruption.items())]
         views = ", ".join(f"{view:g}" for view in self.view_degrees)
-        return (
-            f"{self.method} on {self.motion}, view {views}, instance {self.instance}, "
-            f"seed {self.seed}{''.join(f', {one}' for one in more)}"
-        )
+        where = f"{self.method} on {self.motion}, view {views}, instance {self.instance}, seed {self.seed}"
+        corruption = [f"{kind} {share:g}" for kind, share in self.corruption.items()]
+        return ", ".join([where, *settings_text(self.settings), *corruption])
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -158,6 +126,7 @@ class TrackCell(Cell):
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
         from posefit.footage.training import training_clips, training_motions
+        from posefit.geometry.skeleton import joint_distances
         from posefit.tracking.measures import MEASURES
         from posefit.tracking.options import TrackOptions
         from posefit.tracking.pipeline import track_scene
@@ -171,7 +140,8 @@ class TrackCell(Cell):
         options = TrackOptions(settings=settings_text(self.settings), hypotheses=self.hypotheses, **same)
         result = track_scene(scene, training, options)
         truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
-        errors, measured = _joint_errors_mm(truth, estimate), result.measures.as_dict()
+        errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
+        measured = result.measures.as_dict()
         row = {
             **{name: measured[name] for name in MEASURES if name not in UNLIKE},
             "warnings": result.summary["warnings"],
@@ -185,7 +155,7 @@ class TrackCell(Cell):
 
 
 @dataclass(frozen=True)
-class SearchCell(Cell):
+class SearchCell(_Spec):
     """An optimiser that searches a problem of a suite once."""
 
     method: str
@@ -225,9 +195,8 @@ class SearchCell(Cell):
 
         size = population(registry().optimiser(self.method), self.settings, self.evaluations)
         least = max(TRIAL_SEARCH_EVALUATIONS, size)
-        short, long = (
-            replace(self, evaluations=min(n, self.evaluations)) for n in (least, TRIAL_SEARCH_FACTOR * least)
-        )
+        sizes = (min(n, self.evaluations) for n in (least, TRIAL_SEARCH_FACTOR * least))
+        short, long = (replace(self, evaluations=evaluations) for evaluations in sizes)
         return short, long
 
     def measure(self) -> CellResult:
@@ -246,6 +215,9 @@ class SearchCell(Cell):
             "warnings": [],
         }
         return CellResult(row, b"")
+
+
+Cell = TrackCell | SearchCell
 
 
 def run_cell(cell: Cell) -> CellResult:
@@ -311,9 +283,8 @@ def _with_known_person(cell: TrackCell, scene: "Scene") -> "Scene":
 
     if not (cell.yaw_off_degrees or cell.body_off_percent):
         return scene
-    for_yaw, for_body = np.random.default_rng(
-        [RNG_STREAM_PERSON, cell.instance, *Path(cell.motion).stem.encode()]
-    ).spawn(2)
+    stream = [RNG_STREAM_PERSON, cell.instance, *Path(cell.motion).stem.encode()]
+    for_yaw, for_body = np.random.default_rng(stream).spawn(2)
     off = np.radians(cell.yaw_off_degrees) * for_yaw.uniform(-1.0, 1.0)
     yaw = None if cell.yaw_off_degrees >= ALL_AROUND or scene.yaw is None else scene.yaw + float(off)
     return replace(scene, yaw=yaw, body=varied(scene.body, cell.body_off_percent, for_body))
@@ -371,15 +342,6 @@ def _spent(frame: "Frame") -> "Array":
 def _joints(motion: "Motion | None") -> "Array":
     assert motion is not None
     return motion.skeleton.joints(motion.poses, motion.translations)
-
-
-def _joint_errors_mm(truth: "Array", estimate: "Array") -> "Array":
-    """Return each joint's mean distance (27,) in millimetres, both roots at one point, as in `mpjpe_mm`."""
-    import numpy as np
-
-    from posefit.geometry.skeleton import joint_distances
-
-    return np.asarray(1e3 * joint_distances(truth, estimate).mean(axis=0))
 
 
 def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:

@@ -6,13 +6,11 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from posefit.errors import InputError
 from posefit.sweep.cell import run_cell
-from posefit.sweep.drive import Cells, Tally, drive_cells, keys_of
-from posefit.sweep.driver import Driver
+from posefit.sweep.driver import Cells, Driver, Tally, drive_cells, keys_of
 from posefit.sweep.engines.engine import Engine, Limits, Run
 from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
@@ -22,25 +20,11 @@ DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Where:
-    """Where cells run, and how much each may take: in processes of this machine, or on Dask workers."""
-
-    workers: int | None = None
-    scheduler: str | None = None
-    dask_local: int | None = None
-    dask_dashboard: bool = False
-    limits: Limits = field(default_factory=Limits)
-
-
-def run_plan(plan: str, out: str, *, where: Where, retry_quarantined: bool = False, say: Say) -> tuple[Tally, int, str]:
-    """Return how the sweep of a plan to a folder ended, its exit status, and the command that shows its results."""
+def run_plan(plan: str, out: str, start: Callable[[], Engine], say: Say, retry_quarantined: bool = False) -> Tally:
+    """Return how the sweep of a plan to a folder ended."""
     cells = Plan.read(plan)
-    start = engine(where)
     with closing(start()) as running:  # without an engine there is no folder either
-        tally = swept(cells, out, running, say, retry_quarantined)
-    status = STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
-    return tally, status, f"posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
+        return swept(cells, out, running, say, retry_quarantined)
 
 
 def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
@@ -78,16 +62,14 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
             return drive_cells(cells, driver, running, say_beside_bar, watch)
 
 
-def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Iterator[str]:
+def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bool) -> Iterator[str]:
     """Yield the lines of a preview: the cells of a plan, which are done already, and about how long the others take.
 
     Or those of one JSON object with the same content. A million cells are never in memory together.
     """
-    from posefit.sweep.estimate import TRIAL_SECONDS, Estimate, Workload, estimate_of
+    from posefit.sweep.estimate import Estimate, Workload, estimate_of
 
     cells = Plan.read(plan)
-    limits = replace(where.limits, seconds=min(where.limits.seconds, TRIAL_SECONDS))
-    start = engine(replace(where, limits=limits))
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
     left, workers = Workload(), 0
     if as_json:
@@ -116,31 +98,47 @@ def preview(plan: str, out: str | None, *, where: Where, as_json: bool) -> Itera
     yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
 
 
-def engine(where: Where, run: Run = run_cell) -> Callable[[], Engine]:
-    """Return a function that starts the engine asked for. Raises ValueError where more than one is."""
-    places = (("workers", where.workers), ("scheduler", where.scheduler), ("dask-local", where.dask_local))
-    given = [name for name, value in places if value]
-    if len(given) > 1:
-        raise InputError(f"--{given[0]} must not be given with --{given[1]}: cells run in one place")
-    for name, value in (("workers", where.workers), ("dask-local", where.dask_local)):
+def engine(
+    limits: Limits,
+    run: Run = run_cell,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    dask_local: int | None = None,
+    dask_dashboard: bool = False,
+) -> Callable[[], Engine]:
+    """Return a function that starts the engine asked for: processes of this machine, or Dask workers.
+
+    Raises ValueError where more than one is asked for.
+    """
+    places = {"workers": workers, "scheduler": scheduler, "dask-local": dask_local}
+    chosen = [name for name, value in places.items() if value]
+    if len(chosen) > 1:
+        raise InputError(f"--{chosen[0]} must not be given with --{chosen[1]}: cells run in one place")
+    for name, value in (("workers", workers), ("dask-local", dask_local)):
         if value is not None and value < 1:
             raise InputError(f"--{name} must be at least 1, got {value}")
-    if where.dask_dashboard and where.dask_local is None:
+    if dask_dashboard and dask_local is None:
         raise InputError("--dask-dashboard must be given with --dask-local, whose workers it shows, got it without")
 
     def start() -> Engine:
-        if where.scheduler is not None or where.dask_local is not None:
+        if scheduler is not None or dask_local is not None:
             from posefit.sweep.engines.cluster import Cluster
 
-            return Cluster(where.scheduler, where.dask_local, where.limits, run, dashboard=where.dask_dashboard)
+            return Cluster(scheduler, dask_local, limits, run, dashboard=dask_dashboard)
         from posefit.sweep.engines.processes import Processes
 
-        return Processes(where.workers or cores(), where.limits, run)
+        return Processes(workers or cores(), limits, run)
 
     return start
 
 
-def tally_text(tally: Tally, out: str, report: str) -> str:
+def exit_status(tally: Tally) -> int:
+    """Return the exit status of a sweep."""
+    return STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
+
+
+def tally_text(tally: Tally, out: str) -> str:
     """Return how a sweep ended, and the command that shows its results."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
@@ -148,7 +146,7 @@ def tally_text(tally: Tally, out: str, report: str) -> str:
     if tally.stopped:
         line += "; stopped: the same command goes on from there"
     elif tally.done:
-        line += f"\nresults: {report}"
+        line += f"\nresults: posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
     return line
 
 

@@ -1,4 +1,4 @@
-"""A driver: one process that works on a ledger, beside any number of others.
+"""A driver: one process that works on a ledger, beside any number of others; and its loop, `drive_cells`.
 
 A driver runs a cell only under a lease, a file that only one driver can create. Its leases hold as long as it lives,
 which its locked log shows; a dead driver's cells are tried again by others, as the next attempt. After creating a lease
@@ -11,9 +11,13 @@ done. Only `LOSSES` of them, with no row between the first and the last, put it 
 
 import json
 import os
+import signal
 import socket
-from collections.abc import Callable
-from contextlib import suppress
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from itertools import count
@@ -24,14 +28,20 @@ from posefit.errors import InputError
 from posefit.files import create_once, replaced_file
 from posefit.reading import parsed_json
 from posefit.sweep.cell import Cell, CellResult
-from posefit.sweep.fold import LEFTOVER_SECONDS, fold_logs
+from posefit.sweep.engines.engine import Engine, Outcome
 from posefit.sweep.ledger import LEASES, QUARANTINE, ROWS, Ledger, create
-from posefit.sweep.locks import is_locked, on_one_machine
-from posefit.sweep.log import SUFFIX, Writer
+from posefit.sweep.log import SUFFIX, Writer, is_locked, on_one_machine
+from posefit.sweep.plan import Plan
 
 ATTEMPTS = 3  # that fail by a cell's own fault
 LOSSES = 50  # attempts that end by no fault of the cell, while no other cell gets done
+LEFTOVER_SECONDS = 60.0  # after which a lease without a name was left behind
 SYNC_SECONDS = 1.0  # between two times that rows are brought to the disk
+POLL_SECONDS = 0.2  # between two checks for a wish to stop
+RECHECK_SECONDS = 0.5  # between two checks of cells that other drivers run
+
+Say = Callable[[str], None]
+Cells = Plan | Sequence[Cell]
 
 
 class State(Enum):
@@ -70,8 +80,6 @@ class Driver:
                 f"{self.ledger.path}: expected a folder that can be written to, got {error.strerror}"
             ) from None
         self._tidy()
-        with suppress(OSError):  # there is no room for it: the sweep will say so, if it needs any
-            fold_logs(self.ledger, self._log)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -235,3 +243,166 @@ def read_lease(path: Path) -> dict[str, Any] | None:
     except (ValueError, KeyError, TypeError):
         pass
     return {"failed": "its lease was damaged"}
+
+
+@dataclass
+class Tally:
+    """How a sweep stands."""
+
+    cells: int
+    done: int = 0  # cells with a row, whichever driver wrote it
+    ran: int = 0  # of these, cells that this driver ran
+    failed: int = 0  # attempts of this driver that failed
+    quarantined: int = 0
+    stopped: bool = False  # by the user
+
+
+def drive_cells(
+    cells: Cells, driver: Driver, engine: Engine, say: Say, watch: Callable[[Tally], None] = lambda _: None
+) -> Tally:
+    """Return how a sweep ended: with all cells done or quarantined, or stopped. `watch` is called at every change.
+
+    A cell that fails is tried again after all others, until it is quarantined. Cells that other drivers run are
+    waited for. Raises ValueError where the ledger cannot be written to or the engine is gone; rows that were finished
+    are safe.
+    """
+    sweep = _Sweep(cells, driver, engine, say, watch)
+    try:
+        with sweep.stopping():
+            sweep.run()
+    except OSError as error:
+        reason = f"{driver.ledger.path}: expected room to write to, got {error.strerror or error}"
+        raise InputError(f"{reason}; {sweep.safe}") from error
+    except ValueError as error:
+        raise InputError(f"{error}; {sweep.safe}") from error
+    finally:
+        sweep.leave()
+    return sweep.tally
+
+
+class _Sweep:
+    """One driver's way through the cells of a plan."""
+
+    def __init__(self, cells: Cells, driver: Driver, engine: Engine, say: Say, watch: Callable[[Tally], None]) -> None:
+        self._driver, self._engine, self._say, self._watch = driver, engine, say, watch
+        self._wishes = 0  # to stop: 1 after the cells that run, 2 at once
+        self.tally = Tally(len(cells))
+        # of each cell whether it needs no work: the cells of a plan of a million are not held
+        settled, quarantined = bytearray(), driver.ledger.quarantined_keys()
+        for key in keys_of(cells):
+            state = State.DONE if key in driver.ledger else State.QUARANTINED if key in quarantined else None
+            settled.append(self._count(state))
+        self._new_count = settled.count(False)
+        self._new = (cell for cell, done in zip(cells, settled, strict=True) if not done)
+        self._again: deque[Cell] = deque()  # cells that failed, or that others ran
+        self._elsewhere: list[Cell] = []
+        self._running: dict[str, Lease] = {}
+
+    @property
+    def safe(self) -> str:
+        """The end of a message where a sweep ends too early."""
+        return f"{self.tally.done} of {self.tally.cells} cells are done and safe: the same command goes on from there"
+
+    @contextmanager
+    def stopping(self) -> Iterator[None]:
+        """Stop by Ctrl-C, twice for at once, or by SIGTERM; in the main thread alone."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        signal.signal(signal.SIGINT, lambda *_: self._stop(1))
+        signal.signal(signal.SIGTERM, lambda *_: self._stop(2))
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def run(self) -> None:
+        """Go on until nothing is left, or the user stops it."""
+        self._watch(self.tally)
+        checked, announced = time.monotonic(), False
+        while True:
+            if not self._wishes:
+                self._fill()
+            self._driver.sync()
+            pending = not self._wishes and (self._waiting or self._elsewhere)
+            if self._wishes > 1 or not (self._running or pending):
+                break
+            if not self._running:
+                if self._elsewhere and not announced:
+                    self._say(f"waiting for {len(self._elsewhere)} cells that other drivers run")
+                    announced = True
+                time.sleep(POLL_SECONDS)
+            for outcome in self._engine.wait(POLL_SECONDS):
+                self._take(outcome)
+            if self._elsewhere and time.monotonic() - checked > RECHECK_SECONDS:
+                self._driver.ledger.refresh()
+                self._again.extend(self._elsewhere)
+                self._elsewhere.clear()
+                checked = time.monotonic()
+        self.tally.stopped = bool(self._running or self._waiting or self._elsewhere)
+        self._watch(self.tally)
+
+    def leave(self) -> None:
+        """Stop what runs, and give its leases up."""
+        self._engine.close()
+        for lease in self._running.values():
+            self._driver.release(lease)
+        self._running.clear()
+
+    @property
+    def _waiting(self) -> int:
+        """How many cells are not run by any driver, as far as is known."""
+        return self._new_count + len(self._again)
+
+    def _stop(self, wishes: int) -> None:
+        self._wishes += wishes
+        if self._wishes == 1:
+            self._say("finishing the cells that run; Ctrl-C once more stops at once")
+
+    def _fill(self) -> None:
+        """Start as many cells as the engine takes: new ones first."""
+        while self._waiting and len(self._running) < self._engine.window():
+            if self._new_count:
+                self._new_count -= 1
+                cell = next(self._new)
+            else:
+                cell = self._again.popleft()
+            lease = self._driver.lease(cell)
+            if isinstance(lease, Lease):
+                self._running[cell.key] = lease
+                self._engine.submit(cell)
+            elif lease is State.ELSEWHERE:
+                self._elsewhere.append(cell)
+            else:
+                self._count(lease)
+                self._watch(self.tally)
+
+    def _take(self, outcome: Outcome) -> None:
+        """Write what became of a cell."""
+        lease = self._running[outcome.cell.key]
+        if outcome.result is not None:
+            self._driver.finish(lease, outcome.result)
+            self.tally.ran += 1
+            self._count(State.DONE)
+        else:
+            if outcome.reason is None:
+                self._driver.release(lease)
+            else:
+                self._driver.fail(lease, outcome.reason, outcome.own)
+                self.tally.failed += 1
+            self._again.append(outcome.cell)
+        del self._running[outcome.cell.key]
+        self._watch(self.tally)
+
+    def _count(self, state: State | None) -> bool:
+        """Return whether a cell needs no more work, and count it."""
+        self.tally.done += state is State.DONE
+        self.tally.quarantined += state is State.QUARANTINED
+        return state in (State.DONE, State.QUARANTINED)
+
+
+def keys_of(cells: Cells) -> Iterator[str]:
+    """Return the keys of cells; a plan gives them without making its cells."""
+    return cells.keys() if isinstance(cells, Plan) else (cell.key for cell in cells)

@@ -1,7 +1,7 @@
 """The ledger: a folder in which every finished cell has its row, whatever happens to those who write to it.
 
 ledger.json          the format of the folder
-rows/NAME.jsonl      finished rows, one log a driver; those of drivers that ended are folded together
+rows/NAME.jsonl      finished rows, one log a driver
 rows/NAME.joints     the joints of the rows' frames
 leases/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
@@ -66,17 +66,14 @@ class Ledger:
         self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
         self._versions: dict[str, str] = {}  # of every finished row
         self.refresh()
-        self.refresh()  # a log may have been folded into another while the folder was listed
 
     def refresh(self) -> None:
         """Read what was written since."""
         logs = self._logs()
         if any(logs.get(name, -1) < end for name, end in self._ends.items()):
-            # folded into another one, which was there before this one went, or cut off: everything is read again
-            self._ends.clear()
+            self._ends.clear()  # one was cut off or removed: everything is read again
             self._places.clear()
             self._versions.clear()
-            logs = self._logs()
         for name in sorted(logs):
             if logs[name] == self._ends.get(name, 0):
                 continue
@@ -86,8 +83,7 @@ class Ledger:
                     self.set_aside(Damage(self.path / ROWS / name, offset, line))
                     continue
                 key, row = entry
-                # a row may be there twice: of a log that is folded just now, or of a lock that a file system did
-                # not keep. The first one counts
+                # a row may be there twice, of a lock that a file system did not keep: the first one counts
                 self._places[key] = min((name, offset), self._places.get(key, (name, offset)))
                 version = VERSION.search(row)
                 self._versions[key] = sys.intern(version[1].decode()) if version else ""
@@ -101,10 +97,6 @@ class Ledger:
     def keys(self) -> Iterator[str]:
         """Return the keys of all finished cells."""
         return iter(self._places)
-
-    def place(self, key: str) -> tuple[str, int] | None:
-        """Return the log that a cell's row is in, and where; None where it has none."""
-        return self._places.get(key)
 
     @property
     def version(self) -> str:
@@ -158,30 +150,18 @@ class Ledger:
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it."""
-        yielded: set[str] = set()
-        while True:
-            for name in sorted(self._logs()):
-                for offset, line in lines(self.path / ROWS / name):
-                    if (entry := decoded(line)) is None:
-                        continue
-                    key, row = entry
-                    if self._places.get(key) == (name, offset) and key not in yielded:
-                        yielded.add(key)
-                        yield json.loads(row)
-            if self._ends.keys() <= self._logs().keys():
-                return
-            self.refresh()  # a log was folded into another one meanwhile
+        for name in sorted(self._logs()):
+            for offset, line in lines(self.path / ROWS / name):
+                entry = decoded(line)
+                if entry is not None and self._places.get(entry[0]) == (name, offset):
+                    yield json.loads(entry[1])
 
     def row(self, key: str) -> dict[str, Any]:
         """Return the row of a cell. Raises KeyError where there is none."""
         name, offset = self._places[key]
-        try:
-            with (self.path / ROWS / name).open("rb") as file:
-                file.seek(offset)
-                entry = decoded(file.readline())
-        except FileNotFoundError:  # folded into another one meanwhile
-            self.refresh()
-            return self.row(key)
+        with (self.path / ROWS / name).open("rb") as file:
+            file.seek(offset)
+            entry = decoded(file.readline())
         if entry is None or entry[0] != key:
             raise InputError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
         row: dict[str, Any] = json.loads(entry[1])

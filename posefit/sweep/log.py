@@ -2,6 +2,10 @@
 
 A line is a row with its key and a checksum; `.joints` beside it holds the rows' arrays, one after the other. A line
 that was cut off when its driver died has no end, and counts for nothing.
+
+A driver holds a lock (`flock`) on its log, which the operating system drops when it ends in any way. On a disk that
+machines share such a lock is worth something only where every machine sees it. Linux passes locks on NFS to the server,
+unless the disk is mounted with `nolock` or `local_lock`; then they hold on one machine alone.
 """
 
 import errno
@@ -16,10 +20,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from posefit.sweep.locks import locked
+from posefit.errors import InputError
 
-SUFFIX, JOINTS, UNNAMED = ".jsonl", ".joints", ".new"
+SUFFIX, JOINTS = ".jsonl", ".joints"
 _LINE = re.compile(rb'\{"key": "([0-9a-f]{64})", "crc": "([0-9a-f]{8})", "row": (\{.*\})\}\n', re.DOTALL)
+
+MOUNTS = Path("/proc/self/mountinfo")
+# of kinds of file systems, the options with which their locks stay on one machine; "" for always
+LOCAL = {
+    "nfs": ("nolock", "local_lock=flock", "local_lock=all"),
+    "nfs4": ("nolock", "local_lock=flock", "local_lock=all"),
+    "lustre": ("localflock",),
+    "cifs": ("nobrl",),
+    "smb3": ("nobrl",),
+    "fuse.sshfs": ("",),
+}
 
 
 @dataclass(frozen=True)
@@ -55,29 +70,19 @@ class Writer:
 
     def __init__(self, folder: Path) -> None:
         self.name = f"{time.strftime('%Y%m%dT%H%M%S', time.gmtime())}-{secrets.token_hex(4)}"
-        self._paths = folder / f"{self.name}{SUFFIX}", folder / f"{self.name}{JOINTS}"
-        # a log gets its name once it is locked: before, another driver would take it for that of a dead one
-        unnamed = folder / f"{self.name}{UNNAMED}"
-        # opened for this process alone: no worker inherits the lock
-        self._rows, self._joints = (
-            os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644) for path in (unnamed, self._paths[1])
-        )
-        try:
-            locked(self._rows, unnamed)
-            unnamed.rename(self._paths[0])
-        except (OSError, ValueError):
-            for path, file in zip((unnamed, self._paths[1]), (self._rows, self._joints), strict=True):
-                path.unlink(missing_ok=True)
-                os.close(file)
-            raise
         self._synced = time.monotonic()
+        self._paths = folder / f"{self.name}{SUFFIX}", folder / f"{self.name}{JOINTS}"
+        # opened for this process alone: no worker inherits the lock
+        self._rows, self._joints = (os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644) for path in self._paths)
+        try:
+            locked(self._rows, self._paths[0])
+        except ValueError:
+            self.close()
+            raise
 
-    def append(self, key: str, row: Mapping[str, Any], joints: bytes, checksum: int | None = None) -> None:
-        """Add a row with its arrays, whose checksum is another one only where they are damaged already.
-
-        Raises OSError where there is no room, and leaves the log as it was.
-        """
-        place = [os.fstat(self._joints).st_size, len(joints), zlib.crc32(joints) if checksum is None else checksum]
+    def append(self, key: str, row: Mapping[str, Any], joints: bytes) -> None:
+        """Add a row with its arrays. Raises OSError where there is no room, and leaves the log as it was."""
+        place = [os.fstat(self._joints).st_size, len(joints), zlib.crc32(joints)]
         self._add(self._joints, joints)
         line = encoded(key, {**row, "joints": place})
         end = os.fstat(self._rows).st_size
@@ -146,3 +151,60 @@ def joints_at(path: Path, start: int, length: int) -> bytes:
             return file.read(length)
     except FileNotFoundError:
         return b""
+
+
+def locked(file: int, path: Path) -> None:
+    """Lock an open file of one's own for as long as it is open. Raises ValueError where its disk keeps no locks.
+
+    Others only ever look whether it is locked, which takes a lock for a moment: that moment is waited for.
+    """
+    import fcntl  # which Windows does not have: it can read ledgers
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX)
+    except OSError as error:
+        raise _useless(path, error.strerror or str(error)) from None
+    if not is_locked(path):
+        raise _useless(path, "one that forgets them")
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether a file is locked: whether the driver that writes a log lives."""
+    import fcntl
+
+    try:
+        file = os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
+
+
+def on_one_machine(path: Path, mounts: Path = MOUNTS) -> str | None:
+    """Return why locks in a folder hold on this machine alone; None where others see them, or where it is unknown."""
+    try:
+        lines = mounts.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:  # an operating system that does not say
+        return None
+    reason, longest = None, -1
+    for line in lines:
+        before, _, after = line.partition(" - ")
+        words, (kind, _, options) = before.split(), [*after.split(), "", "", ""][:3]
+        place = Path(re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), words[4]))
+        if path.resolve().is_relative_to(place) and len(place.parts) >= longest:  # a later mount covers an earlier one
+            given = {"", *words[5].split(","), *options.split(",")}
+            reason = next((f"{kind} {option}".strip() for option in LOCAL.get(kind, ()) if option in given), None)
+            longest = len(place.parts)
+    return reason
+
+
+def _useless(path: Path, what: str) -> InputError:
+    return InputError(
+        f"{path.parent.parent}: expected a disk that keeps locks (flock), got {what}; without them it is unknown "
+        "which sweep lives"
+    )

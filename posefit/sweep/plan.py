@@ -30,10 +30,13 @@ A plan that names a suite is one of single searches, of every combination of its
     seeds = 1                                   # 0; or a list
 """
 
+import hashlib
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
+from functools import lru_cache
 from importlib.resources import files
-from itertools import chain, product
+from itertools import chain, combinations, product
 from math import prod
 from pathlib import Path
 from typing import Any, Self
@@ -47,9 +50,8 @@ from posefit.reading import SHOWN, parsed_toml, quoted, read_text
 from posefit.registry import registry
 from posefit.suites.functions import DIMENSIONS, FUNCTIONS, HELD_OUT, SUITES, checked_address, suite_function
 from posefit.suites.problem import EVALUATIONS, INFEASIBLE
-from posefit.sweep.cell import Cell, SearchCell, TrackCell, version_of
-from posefit.sweep.check import FIELDS, cell_of, families, flattened
-from posefit.sweep.product import Entries, Product
+from posefit.sweep.cell import Cell, SearchCell, TrackCell, json_of, version_of
+from posefit.sweep.check import FIELDS, cell_of, checked, families, flattened
 
 LISTS = {
     "methods": "method",
@@ -66,6 +68,92 @@ INPUT = "-"  # the name of a plan that is read from standard input
 MAX_CELLS = 1_000_000  # cells
 MAX_BYTES = 1_000_000  # bytes
 DIGEST_BYTES = 32  # of a key
+NAMES = tuple(sorted(field.name for field in fields(TrackCell)))  # in the order of a key
+CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluations")  # checked together by `cell_of`
+CACHED = 1000  # combinations of these, and entries of a list, that are kept in memory
+
+Entry = Mapping[str, Any]
+
+
+class Entries:
+    """The fields that each value of a list stands for: those of a table, or `field`, which a `whole` one is."""
+
+    def __init__(self, field: str, values: Sequence[Any], whole: bool = False) -> None:
+        self._field, self._values, self._whole = field, values, whole
+        # the checked fields of an entry; and, as JSON, with their places among all fields
+        self.checked = lru_cache(CACHED)(self._checked)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __iter__(self) -> Iterator[Entry]:
+        return (self[k] for k in range(len(self)))
+
+    def __getitem__(self, k: int) -> Entry:
+        """Return the fields of the kth value."""
+        value = self._values[k]
+        return dict(value) if isinstance(value, Mapping) and not self._whole else {self._field: value}
+
+    def _checked(self, k: int) -> tuple[Entry, list[tuple[int, str]]]:
+        fields = checked(self[k])
+        return fields, [(NAMES.index(name), _piece(name, value)) for name, value in fields.items()]
+
+
+class Product:
+    """Cells that some lists of entries stand for, one after the other, in the order of `itertools.product`.
+
+    A million cells are never in memory together, and none is checked twice: fields that are checked with each other are
+    checked once for each of their combinations; every other value once. A cell's key is the SHA-256 of its fields as
+    JSON, and so of pieces that many cells have in common. `make` gives the cell of a spec, checked. Raises ValueError
+    where a field stands in two lists.
+    """
+
+    def __init__(self, lists: Sequence[Entries], make: Callable[[Entry], TrackCell]) -> None:
+        for entries, other in combinations(lists, 2):
+            if twice := {name for entry in entries for name in entry} & {name for entry in other for name in entry}:
+                raise InputError(f"product must say {min(twice)} in one list, got it in two")
+        self._lists, self._make = lists, make
+        separate = set(FIELDS) - set(CROSSED)
+        self._separate = {
+            n: entries for n, entries in enumerate(lists) if all(separate.issuperset(entry) for entry in entries)
+        }
+        self._common = lru_cache(CACHED)(self._made)
+
+    def __iter__(self) -> Iterator[TrackCell]:
+        for chosen, cell, key in self._combined():
+            fields = {name: getattr(cell, name) for name in NAMES}
+            for n, entries in self._separate.items():
+                fields |= entries.checked(chosen[n])[0]
+            whole = TrackCell(**fields)
+            vars(whole)["key"] = key.hex()  # its cached property
+            yield whole
+
+    def digests(self) -> Iterator[bytes]:
+        """Yield the key of each cell, as 32 bytes."""
+        return (key for _, _, key in self._combined())
+
+    def _combined(self) -> Iterator[tuple[tuple[int, ...], TrackCell, bytes]]:
+        """Yield for each cell which entries it is of, a cell with the same crossed fields, and its key."""
+        for chosen in product(*(range(len(entries)) for entries in self._lists)):
+            cell, common = self._common(tuple([0 if n in self._separate else k for n, k in enumerate(chosen)]))
+            pieces = common.copy()
+            for n, entries in self._separate.items():
+                for place, piece in entries.checked(chosen[n])[1]:
+                    pieces[place] = piece
+            yield chosen, cell, hashlib.sha256(f"{{{','.join(pieces)}}}".encode()).digest()
+
+    def _made(self, crossed: tuple[int, ...]) -> tuple[TrackCell, list[str]]:
+        """Return a cell of some entries, of those with separate fields the first, and its fields as JSON."""
+        spec: dict[str, Any] = {}
+        for entries, k in zip(self._lists, crossed, strict=True):
+            spec |= entries[k]
+        cell = self._make(spec)
+        return cell, [_piece(name, getattr(cell, name)) for name in NAMES]
+
+
+def _piece(name: str, value: Any) -> str:
+    """Return a field as JSON holds it in a key."""
+    return f'"{name}":{json_of(value)}'
 
 
 class Plan:
@@ -113,15 +201,22 @@ class Plan:
         listed = tables.get("cells", [])
         if not isinstance(listed, list | tuple):
             raise InputError(f"cells must be a list of tables, got {quoted(listed)}")
-        fitting = _Shared(defaults)
+        shared = flattened("defaults.settings", defaults.get("settings", {}))
+        used: set[str] = set()
 
         def make(spec: Mapping[str, Any]) -> TrackCell:
-            return cell_of({**defaults, **spec, "settings": fitting.settings(spec)})
+            """Return a cell: of the shared settings it has those of what its method uses."""
+            method = spec.get("method", defaults.get("method"))
+            names = families(method) if isinstance(method, str) else ()
+            fitting = {name: value for name, value in shared.items() if name.partition(".")[0] in names}
+            used.update(fitting)
+            return cell_of({**defaults, **spec, "settings": fitting | flattened("settings", spec.get("settings", {}))})
 
         lists = _lists(tables.get("product"))
-        cells = [make(_mapping("cells", one)) for one in listed]
+        cells = [make(_mapping("cells", spec)) for spec in listed]
         plan = cls(cells) if lists is None else cls(Product(lists, make), cells)
-        fitting.check()
+        if unused := [name for name in shared if name not in used]:
+            raise InputError(f"defaults.settings must be of the plan's methods, got {unused[0]!r}, which none uses")
         return plan
 
     def __len__(self) -> int:
@@ -150,31 +245,6 @@ def plan_text(path: str | Path) -> str:
     return read_text(path, MAX_BYTES, "a plan in TOML")
 
 
-class _Shared:
-    """The settings of the defaults, of which each cell has those that its method uses."""
-
-    def __init__(self, defaults: Mapping[str, Any]) -> None:
-        self._method = defaults.get("method")
-        self._flat = flattened("defaults.settings", defaults.get("settings", {}))
-        self._unused = dict(self._flat)
-
-    def settings(self, spec: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the settings of a cell: its own, and of the shared ones those of what its method uses."""
-        method = spec.get("method", self._method)
-        names = families(method) if isinstance(method, str) else ()
-        fitting = {name: value for name, value in self._flat.items() if name.partition(".")[0] in names}
-        for name in fitting:
-            self._unused.pop(name, None)
-        return fitting | flattened("settings", spec.get("settings", {}))
-
-    def check(self) -> None:
-        """Raise ValueError where no cell used one of them."""
-        if self._unused:
-            raise InputError(
-                f"defaults.settings must be of the plan's methods, got {next(iter(self._unused))!r}, which none uses"
-            )
-
-
 def _lists(tables: Any) -> list[Entries] | None:
     """Return the entries of each list of a product; None where there is no product.
 
@@ -198,15 +268,9 @@ def _digests(part: Product | Sequence[Cell]) -> Iterator[bytes]:
 
 def _repeated(digests: bytes) -> str | None:
     """Return a key that occurs twice; None where all differ."""
-    starts = np.frombuffer(digests, dtype=np.uint64)[:: DIGEST_BYTES // 8]  # equal ones have equal starts
-    values, counts = np.unique(starts, return_counts=True)
-    earlier: set[bytes] = set()
-    for k in np.flatnonzero(np.isin(starts, values[counts > 1])):
-        digest = digests[DIGEST_BYTES * k : DIGEST_BYTES * (k + 1)]
-        if digest in earlier:
-            return digest.hex()
-        earlier.add(digest)
-    return None
+    values, counts = np.unique(np.frombuffer(digests, dtype=f"S{DIGEST_BYTES}"), return_counts=True)
+    repeated = values[counts > 1]
+    return bytes(repeated[0]).ljust(DIGEST_BYTES, b"\0").hex() if len(repeated) else None
 
 
 def _entries(name: str, values: Any) -> Entries:

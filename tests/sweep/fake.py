@@ -19,7 +19,7 @@ from posefit.sweep.cell import CellResult, TrackCell, packed_joints
 from posefit.sweep.engines.engine import Limits
 
 if TYPE_CHECKING:
-    from posefit.sweep.drive import Tally
+    from posefit.sweep.driver import Tally
     from posefit.sweep.engines.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
@@ -100,8 +100,7 @@ def result(cell: TrackCell) -> CellResult:
 
 def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
     """Return how a sweep ended."""
-    from posefit.sweep.drive import drive_cells
-    from posefit.sweep.driver import Driver
+    from posefit.sweep.driver import Driver, drive_cells
 
     with Driver(out) as driver:
         return drive_cells(chosen, driver, engine, print)

@@ -15,8 +15,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from posefit.sweep.cell import TIMES, run_cell
-from posefit.sweep.drive import Tally, drive_cells
-from posefit.sweep.driver import ATTEMPTS, Driver
+from posefit.sweep.driver import ATTEMPTS, Driver, Tally, drive_cells
 from posefit.sweep.engines.engine import Engine, EngineError, Limits
 from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
@@ -146,7 +145,7 @@ os.environ["NUMBA_NUM_THREADS"] = "2"
 import numba
 from tests.sweep.fake import compiled
 compiled()
-from posefit.sweep.engines.child import become_worker
+from posefit.sweep.engines.processes import become_worker
 become_worker()
 assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
 assert compiled() == 1

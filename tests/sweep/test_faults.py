@@ -12,11 +12,9 @@ from typing import Any
 import pytest
 
 from posefit.report.live import progress_of
-from posefit.sweep import fold, locks
-from posefit.sweep.drive import drive_cells
-from posefit.sweep.driver import Driver, Lease
+from posefit.sweep.driver import Driver, Lease, drive_cells
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.locks import on_one_machine
+from posefit.sweep.log import on_one_machine
 from tests.cases import each
 from tests.sweep.fake import cells, result
 from tests.sweep.test_ledger import Here, filled
@@ -31,7 +29,7 @@ import os, sys
 from pathlib import Path
 from tests.sweep.fake import cells
 from tests.sweep.test_ledger import Here
-from posefit.sweep.drive import drive_cells
+from posefit.sweep.driver import drive_cells
 from posefit.sweep.driver import Driver
 
 folder, kills = Path(sys.argv[1]), int(sys.argv[2])
@@ -78,49 +76,6 @@ def test_a_driver_may_be_killed_before_any_call_that_changes_the_disk(tmp_path: 
     for key in keys:
         assert ledger.joints(key)["truth"].shape == (1, 27, 3)
     assert not ledger.quarantined()
-
-
-def test_logs_of_drivers_that_ended_are_folded_into_one(tmp_path: Path) -> None:
-    folder = tmp_path / "ledger"
-    for count in range(1, 6):
-        filled(folder, count)
-    rows = {row["key"]: {**row, "joints": None} for row in Ledger(folder).rows()}
-    reader = Ledger(folder)
-    filled(folder, 6)
-    assert len(list((folder / "rows").iterdir())) <= 4
-    filled(folder, 7)
-    ledger = Ledger(folder)
-    for key, row in rows.items():
-        assert {**ledger.row(key), "joints": None} == row
-        assert reader.joints(key)["truth"].tobytes() == ledger.joints(key)["truth"].tobytes()
-    assert len(list(reader.rows())) == 7  # a reader from before the folding sees what everybody sees
-
-
-def test_a_log_that_is_folded_while_somebody_reads_gives_every_row_once(tmp_path: Path) -> None:
-    folder = tmp_path / "ledger"
-    with Driver(folder) as one, Driver(folder) as other:  # so many logs that nobody could fold before
-        for driver, cell in zip((one, other, one, other), cells(4), strict=True):
-            lease = driver.lease(cell)
-            assert isinstance(lease, Lease)
-            driver.finish(lease, result(cell))
-    reading = Ledger(folder).rows()
-    keys = [next(reading)["key"]]
-    filled(folder, 5)
-    keys += [row["key"] for row in reading]
-    assert len(keys) == len(set(keys)) >= 4
-
-
-def test_a_log_that_lives_and_one_that_is_large_are_not_folded(tmp_path: Path, monkeypatch: Any) -> None:
-    folder = tmp_path / "ledger"
-    with Driver(folder) as living:
-        lease = living.lease(cells(1)[0])
-        assert isinstance(lease, Lease)
-        living.finish(lease, result(cells(1)[0]))
-        filled(folder, 3)
-        assert len(list((folder / "rows").glob("*.jsonl"))) == 2
-    monkeypatch.setattr(fold, "MAX_FOLDED_BYTES", 1)
-    filled(folder, 4)
-    assert len(list((folder / "rows").glob("*.jsonl"))) == 3
 
 
 def test_a_log_that_is_cut_off_behind_its_driver_takes_no_later_row_with_it(tmp_path: Path) -> None:
@@ -251,26 +206,4 @@ def test_where_locks_stay_on_one_machine_another_ones_cells_are_not_judged(tmp_p
         ):
             here.lease(cells(1)[0])
     monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: None)
-    assert locks.MOUNTS.name == "mountinfo"
     filled(folder, 1)
-
-
-def test_a_log_has_its_name_only_when_it_is_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = filled(tmp_path / "ledger", 2)
-    lock, met = fcntl.flock, []
-
-    def late(file: int, how: int) -> None:
-        if how == fcntl.LOCK_EX and not met:  # another driver comes between the making of a log and its lock
-            met.append(file)
-            with Driver(folder) as other:
-                fold.fold_logs(other.ledger, other._log)
-        lock(file, how)
-
-    monkeypatch.setattr(fcntl, "flock", late)
-    with Driver(folder) as driver:
-        lease = driver.lease(cells(3)[2])
-        assert isinstance(lease, Lease)
-        driver.finish(lease, result(lease.cell))
-    assert met
-    assert len(list(Ledger(folder).rows())) == 3
-    assert not list((folder / "rows").glob("*.new"))

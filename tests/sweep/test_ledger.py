@@ -16,8 +16,7 @@ import pytest
 from posefit.sweep import log
 from posefit.sweep.cell import TrackCell
 from posefit.sweep.command import swept
-from posefit.sweep.drive import drive_cells
-from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State
+from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State, drive_cells
 from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.version import posefit_build

@@ -9,10 +9,9 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from posefit.errors import InputError
 from posefit.sweep.cell import Cell, run_cell
-from posefit.sweep.engines.child import called
 from posefit.sweep.engines.engine import EngineError, Limits, Outcome, Run, text_of
+from posefit.sweep.engines.processes import called
 
 PATIENCE = 30.0  # seconds to wait for a scheduler, or for workers, that are not there
 CONNECT_SECONDS = 5.0  # for one try
@@ -34,10 +33,10 @@ class Cluster:
     """An engine of Dask workers: of a scheduler at an address, or, with `workers` instead, so many on this machine.
 
     Each cell is sent to one worker that has no other. So it starts at once, no other cell dies with it, and Dask does
-    not run it again by itself. The worker runs it in a process of its own, see `posefit.sweep.engines.child`: limits,
-    threads and a cell's end touch nothing else on it. With `dashboard` the workers of this machine have Dask's page,
-    on the loopback. A scheduler that is not there, or has no workers, is waited for `patience` seconds;
-    after that EngineError is raised.
+    not run it again by itself. The worker runs it in a process of its own, see `posefit.sweep.engines.processes`:
+    limits, threads and a cell's end touch nothing else on it. With `dashboard` the workers of this machine have Dask's
+    page, on the loopback. A scheduler that is not there, or has no workers, is waited for `patience` seconds; after
+    that EngineError is raised.
     """
 
     def __init__(
@@ -177,8 +176,6 @@ class Cluster:
 
 def _local(distributed: Any, workers: int, dashboard: bool) -> Any:
     """Return a cluster of worker processes on this machine, one thread each, unreachable from elsewhere."""
-    if workers < 1:
-        raise InputError(f"workers must be at least 1, got {workers}")
     import dask
 
     settings: dict[str, Any] = {"distributed.scheduler.allowed-failures": 0}  # attempts are counted by the ledger

@@ -1,6 +1,5 @@
 """What runs cells in other processes: an engine. It keeps no order and no state; the ledger does."""
 
-import signal
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
@@ -9,11 +8,8 @@ from posefit.errors import InputError
 from posefit.sweep.cell import Cell, CellResult
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
-R = TypeVar("R")
+R = TypeVar("R")  # its result
 Run = Callable[[Any], CellResult]
-# Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
-# out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
-OUTSIDE = ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGPWR")
 
 
 @dataclass(frozen=True)
@@ -67,43 +63,6 @@ class Engine(Protocol):
 
 class EngineError(InputError):
     """An engine cannot go on."""
-
-
-class FailedError(Exception):
-    """A cell raised something, as one line: what a plugin raises may not survive the way to another process."""
-
-
-class NotStartedError(Exception):
-    """A process ended, or did not answer, before its cell began."""
-
-
-class DiedError(Exception):
-    """A process ended before its cell did, with this status; a negative one is the signal that ended it."""
-
-    def __init__(self, exitcode: int) -> None:
-        super().__init__(exitcode)
-        self.exitcode = exitcode
-
-
-def reason_of(error: Exception, limits: Limits) -> tuple[str, bool]:
-    """Return in one line why a cell failed, and whether that is its own fault."""
-    if isinstance(error, DiedError) and error.exitcode < 0:
-        try:
-            name = signal.Signals(-error.exitcode).name
-        except ValueError:
-            name = f"signal {-error.exitcode}"
-        if name != "SIGALRM":  # the timer of `limited`
-            return f"its process died of {name}", name not in OUTSIDE
-        error = TimeoutError()
-    if isinstance(error, TimeoutError):
-        return f"it ran past its limit of {limits.seconds:g} s", True
-    if isinstance(error, MemoryError):
-        return f"it wanted more memory than its limit of {limits.gigabytes:g} GB", True
-    if isinstance(error, DiedError):
-        return f"its process ended itself with status {error.exitcode}", True
-    if isinstance(error, NotStartedError | FailedError):
-        return str(error), isinstance(error, FailedError)
-    return text_of(error), True
 
 
 def text_of(error: BaseException) -> str:
