@@ -22,7 +22,7 @@ from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs.configure import EVERY, ITERATIONS, POPULATION_SIZE
 from posefit_envs.fit_image import MAX_EVALUATIONS
-from posefit_envs.instance import instance, select
+from posefit_envs.instance import first_episode, world_of
 from posefit_envs.policies import (
     Policy,
     constant_policy,
@@ -331,15 +331,13 @@ def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
 
 def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> list[float]:
     """Return the costs that an optimiser of the library reaches on the same instances, by itself."""
-    world, factory = select().world, registry().optimiser(optimiser)
-    found = []
+    world, factory = world_of(), registry().optimiser(optimiser)
+    costs = []
     for number in numbers:
-        made = instance(world, number, 1, evaluations)
-        space = made.space(world.learned)
-        searching = factory(space, np.random.default_rng([seed, number]), **planned(factory, {}, evaluations))
-        problem = made.scenery(0).problem(space)
-        found.append(minimise(problem.evaluate, searching, evaluations, budget_known=True).cost)
-    return found
+        problem = first_episode(world, number, evaluations).problem
+        searching = factory(problem.space, np.random.default_rng([seed, number]), **planned(factory, {}, evaluations))
+        costs.append(minimise(problem.evaluate, searching, evaluations, budget_known=True).cost)
+    return costs
 
 
 def turn_of(row: Mapping[str, Any]) -> Training:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Unpack
+from typing import Any, ClassVar, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -16,34 +16,18 @@ from numpy.typing import NDArray
 from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import finite_number, whole
-from posefit.fitting.metrics import pose_error_degrees
+from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
-from posefit_envs.instance import (
-    ArgumentError,
-    Arguments,
-    Episode,
-    Instance,
-    World,
-    checked,
-    instance_number,
-    select,
-)
+from posefit_envs.instance import ArgumentError, Episode, Instance, World, checked, instance_number, world_of
 from posefit_envs.rendering import MODES, Picture, Window, check_mode
 from posefit_envs.stage import Rows, Stage
 
 Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
 
-_ONE, _FIRST = np.ones(1, dtype=bool), np.zeros(1, dtype=np.int64)
-
-
-class VectorArguments(Arguments, total=False):
-    """The arguments of every vector environment: those of single ones, and how they run side by side."""
-
-    threads: int
-    max_episode_steps: int | None
-    render_mode: str | None
+NOT_BEGUN = "reset must come before anything else"
+_ONE, _NONE, _FIRST = np.ones(1, dtype=bool), np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int64)
 
 
 class Outcome(NamedTuple):
@@ -52,9 +36,9 @@ class Outcome(NamedTuple):
     observations: Any  # (n, ...), or a dict of them
     rewards: Array  # (n,)
     terminated: Flags
-    truncated: Flags  # by a budget of the environment's own
     infos: Infos  # (n, ...) by name
     reset_infos: Infos  # those that a reset gives too
+    truncated: Flags = _NONE  # (n,) or (1,), by a budget of the environment's own
     row_infos: Mapping[int, Infos] = {}  # further ones of some rows
 
 
@@ -76,9 +60,9 @@ class ActionValidator:
         if values.shape != shape:
             raise error.InvalidAction(f"actions must have shape {shape}, got {values.shape}")
         largest = np.abs(values).max(initial=0.0)
-        if not np.isfinite(largest):
-            raise error.InvalidAction("actions must be finite, got nan or infinity")
-        if largest > 1.0:
+        if not largest <= 1.0:
+            if not np.isfinite(largest):
+                raise error.InvalidAction("actions must be finite, got nan or infinity")
             if not self._warned:
                 logger.warn(
                     f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be"
@@ -140,11 +124,11 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         threads: int = 1,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
-        **arguments: Unpack[Arguments],
+        **arguments: Any,
     ) -> None:
         checked(whole, "num_envs", num_envs, 1)
-        self._selection = select(**arguments)
-        self.world = self._selection.world
+        self.world = world_of(**arguments)
+        checked(lambda: self.world.learned)  # names motions and priors that are unknown
         check_mode(render_mode)
         if render_mode == "human":
             raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
@@ -168,13 +152,13 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """What each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
         episodes = [episode for episode in self._episodes if episode is not None]
         if len(episodes) < self.num_envs:
-            raise error.ResetNeeded("reset must come before anything else")
+            raise error.ResetNeeded(NOT_BEGUN)
         return episodes
 
     @property
     def search_spaces(self) -> list[SearchSpace]:
         """The space that each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [episode.space for episode in self.episodes]
+        return [episode.problem.space for episode in self.episodes]
 
     def render(self) -> Any:
         """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
@@ -219,7 +203,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def _begin(self, i: int, chosen: int | None) -> None:
         """Begin the next episode of environment i, with a chosen instance or another."""
-        number = self._selection.number({"instance": chosen}, lambda: self._generator(i))
+        number = self.world.next_instance(self._generator(i)) if chosen is None else chosen
         self._numbers[i], self._steps[i], self._ended[i] = number, 0, False
         self._begin_search(i, number)
 
@@ -232,14 +216,14 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     def _enter(self, i: int, episode: Episode) -> None:
         """Make this what environment i searches."""
         self._episodes[i] = episode
-        self._stage.set_scene(i, episode.scenery, episode.space)
+        self._stage.set_problem(i, episode.problem)
         self._truths[i] = episode.instance.truth.poses[episode.frame]
 
-    def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Callable[[], Array]) -> Infos:
-        """Return the infos that all searches have; `poses` returns the poses (n, 66) to compare with the truth."""
-        infos: Infos = {"best_cost": best, "evaluations": evaluations, "instance": self._numbers.copy()}
-        if self._selection.errors:
-            infos["error_degrees"] = pose_error_degrees(self._truths, poses())
+    def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Array, **own: NDArray[Any]) -> Infos:
+        """Return the infos that all searches have, beside an environment's own; poses (n, 66) are compared."""
+        infos = own | {"best_cost": best.copy(), "evaluations": evaluations.copy(), "instance": self._numbers.copy()}
+        if self.world.errors:
+            infos["error_degrees"] = np.degrees(np.abs(wrapped(self._truths - poses))).mean(axis=1)
         return infos
 
     @abstractmethod
@@ -283,13 +267,14 @@ class SearchEnv(RenderedEnv):
     @property
     def search_space(self) -> SearchSpace:
         """The space that is searched. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return self._vector.episodes[0].space
+        return self._vector.episodes[0].problem.space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Infos]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         self._vector._generators[0] = self.np_random
-        self._vector._begin(0, options.get("instance") if options else None)
+        chosen = options.get("instance") if options else None
+        self._vector._begin(0, None if chosen is None else instance_number(chosen))
         observations, infos = self._vector._opened(_ONE)
         self._update_window()
         return row_of(observations, 0), _single_infos(infos)
@@ -297,7 +282,8 @@ class SearchEnv(RenderedEnv):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
         """Make one step. Raises gymnasium.error.ResetNeeded where the episode has ended."""
         vector = self._vector
-        assert vector.episodes
+        if vector._episodes[0] is None:
+            raise error.ResetNeeded(NOT_BEGUN)
         if vector._ended[0]:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
         action = vector._validator.check(action, self._shape)
@@ -324,16 +310,11 @@ def check_budget(target_cost: float, name: str, evaluations: int) -> None:
     checked(whole, name, evaluations, 2)
 
 
-def proposal_dimensions(world: World) -> int:
-    """Return how many numbers a world's proposals have."""
-    return len(world.learned.low) + (6 if world.translation == "searched" else 3)
-
-
 def image_spaces(world: World) -> tuple[Box, Box]:
     """Return the space of a world's proposals, and that of its pictures."""
     width, height = world.size
     return (
-        Box(-1.0, 1.0, (proposal_dimensions(world),), np.float32),
+        Box(-1.0, 1.0, (world.dimensions,), np.float32),
         Box(0, 255, (height, width, 2 * len(world.view_degrees)), np.uint8),
     )
 

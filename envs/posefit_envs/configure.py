@@ -1,13 +1,13 @@
 """Configure-v0: dynamic algorithm configuration, with a choice of optimisers, populations, restarts and diffusions."""
 
-from typing import Unpack
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, VectorArguments
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv
 from posefit_envs.instance import ArgumentError, Episode, World, checked
 from posefit_envs.population import (
     ACTION_NUMBERS,
@@ -38,7 +38,7 @@ class ConfigureVectorEnv(SearchVectorEnv):
         population_size: int = POPULATION_SIZE,
         iterations: int = ITERATIONS,
         every: int = EVERY,
-        **arguments: Unpack[VectorArguments],
+        **arguments: Any,
     ) -> None:
         checked(whole, "population_size", population_size, MIN_PARTICLES)
         checked(whole, "iterations", iterations, 2)
@@ -78,10 +78,10 @@ class ConfigureVectorEnv(SearchVectorEnv):
             costs = self._stage.costs(proposals, np.array(open_rows))
             for i, own in asked.items():
                 populations[i].tell(costs[i, : len(own)])
-        rewards = [log_improvement(cost, population.best) for cost, population in zip(before, populations, strict=True)]
+        rewards = log_improvement(np.array(before), np.array([population.best for population in populations]))
         terminated = stepping & np.array([population.left == 0 for population in populations])
         infos = self._infos()
-        return Outcome(self._states(), np.array(rewards), terminated, np.zeros_like(terminated), infos, infos)
+        return Outcome(self._states(), rewards, terminated, infos, infos)
 
     def _evaluate_first(self, rows: list[int]) -> None:
         """Evaluate the first populations of some environments."""
@@ -99,13 +99,13 @@ class ConfigureVectorEnv(SearchVectorEnv):
         best = np.array([population.best for population in self._populations.values()])
         used = np.array([population.used for population in self._populations.values()])
         leaders = np.stack([population.leader for population in self._populations.values()])
-        return self._progress(best, used, lambda: self._stage.poses(leaders))
+        return self._progress(best, used, self._stage.poses(leaders))
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
         population = self._populations[i]
-        poses, places = episode.scenery.problem(episode.space).decode(population.leader[None])
+        poses, places = episode.problem.decode(population.leader[None])
         label = f"best {population.best:.1f}, {population.used} evaluations"
-        return render_frame(episode.scenery, poses[0], places[0], label)
+        return render_frame(episode.problem, poses[0], places[0], label)
 
 
 class ConfigureEnv(SearchEnv):

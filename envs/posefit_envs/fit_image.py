@@ -1,6 +1,6 @@
 """FitImage-v0: one silhouette, an episode of proposals, and pictures as observations."""
 
-from typing import Unpack
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from posefit_envs.base import (
     Outcome,
     SearchEnv,
     SearchVectorEnv,
-    VectorArguments,
     check_budget,
     image_spaces,
 )
@@ -33,7 +32,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         *,
         target_cost: float = TARGET_COST,
         max_evaluations: int = MAX_EVALUATIONS,
-        **arguments: Unpack[VectorArguments],
+        **arguments: Any,
     ) -> None:
         check_budget(target_cost, "max_evaluations", max_evaluations)
         super().__init__(num_envs, image_spaces, **arguments)
@@ -44,7 +43,7 @@ class FitImageVectorEnv(SearchVectorEnv):
     @property
     def problems(self) -> list[PoseProblem]:
         """The problem that each environment's proposals are evaluated on."""
-        return [episode.scenery.problem(episode.space) for episode in self.episodes]
+        return [episode.problem for episode in self.episodes]
 
     def _begin_search(self, i: int, number: int) -> None:
         self._enter(i, first_episode(self.world, number, self._budget))
@@ -58,16 +57,15 @@ class FitImageVectorEnv(SearchVectorEnv):
         np.minimum(self._best, last.costs, out=self._best, where=stepping)
         terminated = stepping & (self._best <= self._target)
         truncated = ~terminated & (self._steps >= self._budget)
-        infos = {"cost": last.costs, "areas": last.areas}
-        infos |= self._progress(self._best.copy(), self._steps.copy(), lambda: last.poses)
-        return Outcome(last.pictures, -last.costs, terminated, truncated, infos, {"instance": self._numbers})
+        infos = self._progress(self._best, self._steps, last.poses, cost=last.costs, areas=last.areas)
+        return Outcome(last.pictures, -last.costs, terminated, infos, {"instance": self._numbers}, truncated)
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
         last = self._last
         if not self._steps[i] or last is None:
-            return render_frame(episode.scenery, None, None, f"instance {episode.instance.number}")
+            return render_frame(episode.problem, None, None, f"instance {episode.instance.number}")
         label = f"cost {last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._steps[i]} evaluations"
-        return render_frame(episode.scenery, last.poses[i], last.translations[i], label)
+        return render_frame(episode.problem, last.poses[i], last.translations[i], label)
 
 
 class FitImageEnv(SearchEnv):

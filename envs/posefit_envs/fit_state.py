@@ -1,6 +1,6 @@
 """FitState-v0: one silhouette, an episode of proposals, and the state of the search as observation."""
 
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 from gymnasium import Space, spaces
@@ -8,16 +8,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit_envs.base import (
-    Flags,
-    Infos,
-    Outcome,
-    SearchEnv,
-    SearchVectorEnv,
-    VectorArguments,
-    image_spaces,
-    proposal_dimensions,
-)
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
 from posefit_envs.fit_image import MAX_EVALUATIONS
 from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
@@ -32,49 +23,61 @@ MAX_STALE = 50.0  # proposals without an improvement that show as 1
 
 
 class ProposalMemory:
-    """The proposals of one search and their costs, the middle of the box being the first.
+    """The proposals of n searches and their costs, the middle of the box being the first of each.
 
-    `best` and `last` hold four proposals each and begin as four copies of the middle. A copy among the best is replaced
-    only by a proposal that costs less than the middle; one among the last by any proposal.
+    `records` (n, 8, d + 1), proposals and their costs, hold the four best, the best first, and the last four, the last
+    first. Both begin as four copies of the middle. A copy among the best is replaced only by a proposal that costs less
+    than the middle; one among the last by any proposal.
     """
 
-    def __init__(self, dimensions: int, cost: float, evaluations: int) -> None:
-        self.best = np.zeros((SHOWN, dimensions))
-        self.best_costs = np.full(SHOWN, cost)
-        self.last, self.last_costs = self.best.copy(), self.best_costs.copy()
-        self.used, self.stale, self.budget = 1, 0, evaluations
+    def __init__(self, searches: int, dimensions: int, evaluations: int) -> None:
+        self.records = np.zeros((searches, 2 * SHOWN, dimensions + 1))
+        self.used, self.stale = np.zeros((2, searches), dtype=np.int64)
+        self.budget = evaluations
 
-    def proposal(self, action: Array) -> Array:
-        """Return the proposal (d,) of an action (d + 1,): a part of the way from the best so far to its first numbers.
+    @property
+    def best_costs(self) -> Array:
+        """The best cost of each search (n,)."""
+        return self.records[:, 0, -1]
+
+    @property
+    def last(self) -> Array:
+        """The last proposal of each search (n, d)."""
+        return self.records[:, SHOWN, :-1]
+
+    def begin(self, rows: Flags, costs: Array) -> None:
+        """Begin some searches with the costs (n,) of the middle of the box."""
+        self.records[rows, :, :-1], self.records[rows, :, -1] = 0.0, costs[rows, None]
+        self.used[rows], self.stale[rows] = 1, 0
+
+    def proposals(self, actions: Array) -> Array:
+        """Return the proposals (n, d) of actions (n, d + 1): a part of the way from the best to their first numbers.
 
         Where the last number is 1 the proposal is the first numbers, bit for bit.
         """
-        target, power = action[:-1], float(action[-1])
-        if power >= 1.0:
-            return np.array(target)
-        proposed: Array = self.best[0] + 10.0 ** scaled(LOG_STEP, power) * (target - self.best[0])
-        return proposed
+        targets, powers, best = actions[:, :-1], actions[:, -1:], self.records[:, 0, :-1]
+        parts = np.array([[10.0 ** scaled(LOG_STEP, power)] for power in actions[:, -1].tolist()])
+        return np.where(powers >= 1.0, targets, best + parts * (targets - best))
 
-    def add(self, proposal: Array, cost: float) -> float:
-        """Remember a proposal (d,) and its cost, and return the logarithmic improvement of the best cost."""
-        before = float(self.best_costs[0])
+    def add(self, proposals: Array, costs: Array) -> None:
+        """Remember a proposal of each search (n, d) and its cost (n,)."""
+        records = self.records
         self.used += 1
-        self.stale = 0 if cost < before else self.stale + 1
-        self.last = np.concatenate([proposal[None], self.last[:-1]])
-        self.last_costs = np.concatenate([[cost], self.last_costs[:-1]])
-        place = int(np.searchsorted(self.best_costs, cost, side="right"))
-        if place < SHOWN:
-            self.best = np.insert(self.best, place, proposal, axis=0)[:SHOWN]
-            self.best_costs = np.insert(self.best_costs, place, cost)[:SHOWN]
-        return log_improvement(before, float(self.best_costs[0]))
+        self.stale = np.where(costs < self.best_costs, 0, self.stale + 1)
+        records[:, SHOWN + 1 :] = records[:, SHOWN:-1]
+        records[:, SHOWN, :-1], records[:, SHOWN, -1] = proposals, costs
+        for i in (costs < records[:, SHOWN - 1, -1]).nonzero()[0].tolist():
+            place = int(records[i, :SHOWN, -1].searchsorted(costs[i], side="right"))
+            records[i, place + 1 : SHOWN] = records[i, place : SHOWN - 1]
+            records[i, place] = records[i, SHOWN]
 
-    def state(self) -> State:
-        """Return the observation (8 d + 10,): the best proposals, the last ones, their costs, and the budget left."""
-        costs = 2.0 * log_cost(np.concatenate([self.best_costs, self.last_costs])) - 1.0
-        ends = [2.0 * (1.0 - self.used / self.budget) - 1.0, 2.0 * min(self.stale / MAX_STALE, 1.0) - 1.0]
-        shown = np.concatenate([self.best.ravel(), self.last.ravel(), costs, ends])
-        state: State = np.clip(shown, -1.0, 1.0).astype(np.float32)
-        return state
+    def states(self) -> State:
+        """Return the observations (n, 8 d + 10): the best proposals, the last ones, their costs, the budget left."""
+        points, costs = self.records[:, :, :-1], self.records[:, :, -1]
+        left = 2.0 * (1.0 - self.used / self.budget) - 1.0
+        stale = 2.0 * np.minimum(self.stale / MAX_STALE, 1.0) - 1.0
+        rows = points.reshape(len(left), -1), 2.0 * log_cost(costs) - 1.0, left[:, None], stale[:, None]
+        return np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")
 
 
 class FitStateVectorEnv(SearchVectorEnv):
@@ -86,22 +89,21 @@ class FitStateVectorEnv(SearchVectorEnv):
         *,
         max_evaluations: int = MAX_EVALUATIONS,
         image: bool = False,
-        **arguments: Unpack[VectorArguments],
+        **arguments: Any,
     ) -> None:
         checked(whole, "max_evaluations", max_evaluations, 2)
         if not isinstance(image, bool):
             raise ArgumentError(f"image must be true or false, got {image!r}")
 
         def search_spaces(world: World) -> tuple[spaces.Box, Space[Any]]:
-            d = proposal_dimensions(world)
+            d = world.dimensions
             state = spaces.Box(-1.0, 1.0, (2 * SHOWN * (d + 1) + 2,), np.float32)
             both = spaces.Dict({"search": state, "image": image_spaces(world)[1]}) if image else state
             return spaces.Box(-1.0, 1.0, (d + 1,), np.float32), both
 
         super().__init__(num_envs, search_spaces, **arguments)
-        self._budget, self._image, self._dimensions = int(max_evaluations), image, self._shape[1] - 1
-        self._memories = [ProposalMemory(self._dimensions, np.inf, self._budget) for _ in range(num_envs)]
-        self._best, self._used = np.empty(num_envs), np.zeros(num_envs, dtype=np.int64)
+        self._budget, self._image = int(max_evaluations), image
+        self._memory = ProposalMemory(num_envs, self.world.dimensions, self._budget)
         self._last: Evaluation | None = None
 
     def _begin_search(self, i: int, number: int) -> None:
@@ -109,46 +111,42 @@ class FitStateVectorEnv(SearchVectorEnv):
 
     def _opened(self, begun: Flags) -> tuple[Any, Infos]:
         # environments that go on show their last proposal once more, without counting it
-        last = np.stack([memory.last[0] for memory in self._memories])
-        evaluation = self._evaluate(np.where(begun[:, None], 0.0, last), begun)
+        evaluation = self._evaluate(np.where(begun[:, None], 0.0, self._memory.last))
+        self._memory.begin(begun, evaluation.costs)
         return self._observations(evaluation), self._infos(evaluation)
 
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
-        proposals = np.zeros((self.num_envs, self._dimensions))  # the middle of the box where an episode begins
-        for i in rows.tolist():
-            proposals[i] = self._memories[i].proposal(actions[i])
-        evaluation = self._evaluate(proposals, ~stepping)
-        rewards = np.zeros(self.num_envs)
-        for i in rows.tolist():
-            memory = self._memories[i]
-            rewards[i] = memory.add(proposals[i], float(evaluation.costs[i]))
-            self._best[i], self._used[i] = memory.best_costs[0], memory.used
-        terminated = stepping & (self._used >= self._budget)
+        memory, some_begin = self._memory, len(rows) < self.num_envs
+        proposals = memory.proposals(actions)
+        if some_begin:
+            proposals[~stepping] = 0.0  # the middle of the box
+        evaluation = self._evaluate(proposals)
+        before = memory.best_costs.copy()
+        memory.add(proposals, evaluation.costs)
+        if some_begin:
+            memory.begin(~stepping, evaluation.costs)
+        terminated = stepping & (memory.used >= self._budget)
         infos = self._infos(evaluation)
-        never = np.zeros_like(terminated)
-        return Outcome(self._observations(evaluation), rewards, terminated, never, infos, infos)
+        rewards = log_improvement(before, memory.best_costs)
+        return Outcome(self._observations(evaluation), rewards, terminated, infos, infos)
 
-    def _evaluate(self, proposals: Array, begun: Flags) -> Evaluation:
-        """Evaluate proposals (n, d); in environments that have begun they are the first ones."""
-        evaluation = self._last = self._stage.evaluate(proposals, self._stage.all_rows)
-        for i in np.flatnonzero(begun).tolist():
-            self._memories[i] = ProposalMemory(self._dimensions, float(evaluation.costs[i]), self._budget)
-            self._best[i], self._used[i] = evaluation.costs[i], 1
-        return evaluation
+    def _evaluate(self, proposals: Array) -> Evaluation:
+        self._last = self._stage.evaluate(proposals, self._stage.all_rows)
+        return self._last
 
     def _observations(self, evaluation: Evaluation) -> Any:
-        states = np.array([memory.state() for memory in self._memories])
+        states = self._memory.states()
         return {"search": states, "image": evaluation.pictures} if self._image else states
 
-    def _infos(self, evaluation: Evaluation) -> Infos:
-        infos = {"cost": evaluation.costs, "areas": evaluation.areas}
-        return infos | self._progress(self._best.copy(), self._used.copy(), lambda: evaluation.poses)
+    def _infos(self, last: Evaluation) -> Infos:
+        memory = self._memory
+        return self._progress(memory.best_costs, memory.used, last.poses, cost=last.costs, areas=last.areas)
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
-        memory, last = self._memories[i], self._last
+        memory, last = self._memory, self._last
         assert last is not None
-        label = f"cost {last.costs[i]:.1f}, best {memory.best_costs[0]:.1f}, {memory.used} evaluations"
-        return render_frame(episode.scenery, last.poses[i], last.translations[i], label)
+        label = f"cost {last.costs[i]:.1f}, best {memory.best_costs[i]:.1f}, {memory.used[i]} evaluations"
+        return render_frame(episode.problem, last.poses[i], last.translations[i], label)
 
 
 class FitStateEnv(SearchEnv):

@@ -5,23 +5,14 @@ from typing import Any
 import numpy as np
 from gymnasium import error, spaces
 
-from posefit import Observation, SearchSpace, Task
+from posefit import SearchSpace
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit.niching import LEVELS_MM, MIN_PROBABILITY, SIZE, niche_instance, niche_space, scored
+from posefit.niching import LEVELS_MM, MIN_PROBABILITY, SIZE, NicheInstance, niche_instance, niche_space, scored
 from posefit.silhouette.cost import project
 from posefit.uncertainty.modes import Posterior
-from posefit_envs.base import ActionValidator, RenderedEnv
-from posefit_envs.instance import (
-    SPLITS,
-    ArgumentError,
-    Image,
-    Scenery,
-    Selection,
-    World,
-    checked,
-    instance_number,
-)
+from posefit_envs.base import NOT_BEGUN, ActionValidator, Infos, RenderedEnv
+from posefit_envs.instance import ArgumentError, Image, backdrop, checked, instance_number, world_of
 from posefit_envs.rendering import Picture, render_frame
 
 MAX_EVALUATIONS = 2000
@@ -87,114 +78,91 @@ class ModesEnv(RenderedEnv):
         max_evaluations: int = MAX_EVALUATIONS,
         render_mode: str | None = None,
     ) -> None:
-        if split not in SPLITS:
-            raise ArgumentError(f"split must be one of {', '.join(SPLITS)}, got {split!r}")
+        self._world = world_of(instance=instance, split=split)
         if checked(whole, "max_reports", max_reports, 1) > MAX_REPORTS:
             raise ArgumentError(f"max_reports must be at most {MAX_REPORTS}, got {max_reports}")
         checked(whole, "max_evaluations", max_evaluations, 2)
-        number = None if instance is None else instance_number(instance)
-        actions = spaces.Box(-1.0, 1.0, (niche_space().dimensions + 1,), np.float32)
-        pictures = spaces.Box(0, 255, (SIZE[1], SIZE[0], 2), np.uint8)
         super().__init__(render_mode)
-        self.action_space, self.observation_space = actions, pictures
-        self._selection = Selection(World(), number, split, errors=True)
-        self._validator = ActionValidator(niche_space().dimensions + 1)
-        self._episode: ModesEpisode | None = None
-        self._reports, self._budget = int(max_reports), int(max_evaluations)
+        numbers = niche_space().dimensions + 1
+        self.action_space = spaces.Box(-1.0, 1.0, (numbers,), np.float32)
+        self.observation_space = spaces.Box(0, 255, (SIZE[1], SIZE[0], 2), np.uint8)
+        self._validator = ActionValidator(numbers)
+        self._max_reports, self._budget = int(max_reports), int(max_evaluations)
+        self._posed: NicheInstance | None = None
 
     @property
     def search_space(self) -> SearchSpace:
         """The space of proposals, an action without its last number."""
         return niche_space()
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Image, Infos]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
-        number = self._selection.number(options, lambda: self.np_random)
-        episode = self._episode = ModesEpisode(number)
+        chosen = options.get("instance") if options else None
+        number = self._world.next_instance(self.np_random) if chosen is None else instance_number(chosen)
+        self._posed, self._ended = niche_instance(number), False
+        self._cost, self._evaluations = np.inf, 0
+        self._pose: Array | None = None
+        self._reported: list[Array] = []  # poses
+        self._weights: list[float] = []
+        self._peak_ratio = np.zeros(len(LEVELS_MM))
+        self._brier, self._log_score = BRIER_OF_NO_REPORT, -float(np.log(MIN_PROBABILITY))
         self._update_window()
-        return episode.scenery.picture, {"instance": number}
+        return self._picture(self._posed), {"instance": number}
 
-    def step(self, action: Any) -> tuple[Image, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Image, float, bool, bool, Infos]:
         """Propose a pose, and report it where the last number is above 0."""
-        episode = self._current()
-        if episode.ended:
+        posed = self._current()
+        if self._ended:
             raise error.ResetNeeded("the episode has ended: reset before the next step")
-        proposal = self._validator.check(action, self.action_space.shape or ())
-        before = episode.peak_ratio
-        episode.propose(proposal[:-1], float(proposal[-1]))
-        reward = float(np.mean(episode.peak_ratio) - np.mean(before))
-        terminated = len(episode.weights) >= self._reports
-        truncated = not terminated and episode.evaluations >= self._budget
-        episode.ended = terminated or truncated
-        info: dict[str, Any] = {
-            "cost": episode.cost,
-            "evaluations": episode.evaluations,
-            "reports": len(episode.weights),
-            "instance": episode.posed.number,
+        action = self._validator.check(action, self.action_space.shape or ())
+        before = np.mean(self._peak_ratio)
+        self._propose(posed, action[:-1], float(action[-1]))
+        reward = float(np.mean(self._peak_ratio) - before)
+        terminated = len(self._weights) >= self._max_reports
+        truncated = not terminated and self._evaluations >= self._budget
+        self._ended = terminated or truncated
+        info: Infos = {
+            "cost": self._cost,
+            "evaluations": self._evaluations,
+            "reports": len(self._weights),
+            "instance": posed.number,
         }
-        if episode.ended:
-            reward -= episode.brier
-            info |= {"peak_ratio": episode.peak_ratio, "brier": episode.brier, "log_score": episode.log_score}
+        if self._ended:
+            reward -= self._brier
+            info |= {"peak_ratio": self._peak_ratio, "brier": self._brier, "log_score": self._log_score}
         self._update_window()
-        return episode.picture, reward, terminated, truncated, info
+        return self._picture(posed), reward, terminated, truncated, info
 
-    def _current(self) -> "ModesEpisode":
-        if self._episode is None:
-            raise error.ResetNeeded("reset must come before anything else")
-        return self._episode
-
-    def _render_frame(self) -> Picture:
-        episode = self._current()
-        return render_frame(episode.scenery, episode.pose, episode.posed.problem.space.anchor, episode.label)
-
-
-class ModesEpisode:
-    """The state of one search for several poses."""
-
-    def __init__(self, number: int) -> None:
-        self.posed = niche_instance(number)
-        problem = self.posed.problem
-        self.scenery = Scenery(
-            Task(problem.body, problem.cameras, MAX_EVALUATIONS, None, problem.space.anchor.copy()),
-            Observation(problem.silhouettes, problem.space.anchor.copy()),
-        )
-        self.cost, self.evaluations, self.ended = np.inf, 0, False
-        self.pose: Array | None = None
-        self.weights: list[float] = []
-        self._poses: list[Array] = []
-        self.peak_ratio, self.brier, self.log_score = (
-            np.zeros(len(LEVELS_MM)),
-            BRIER_OF_NO_REPORT,
-            -float(np.log(MIN_PROBABILITY)),
-        )
-
-    def propose(self, proposal: Array, weight: float) -> None:
+    def _propose(self, posed: NicheInstance, proposal: Array, weight: float) -> None:
         """Evaluate a proposal (d,), and report it where its weight is above 0."""
-        problem = self.posed.problem
-        poses, translations = problem.decode(proposal[None])
-        self.cost, self.pose = float(problem.cost(poses, translations)[0]), poses[0]
-        self.evaluations += 1
+        poses, translations = posed.problem.decode(proposal[None])
+        self._cost, self._pose = float(posed.problem.cost(poses, translations)[0]), poses[0]
+        self._evaluations += 1
         if weight > 0.0:
-            self._poses.append(poses[0])
-            self.weights.append(weight)
-            places = np.tile(problem.space.anchor, (len(self._poses), 1))
-            scores = scored(self.posed, Posterior(np.array(self._poses), places, np.array(self.weights)))
-            self.peak_ratio = np.array([scores.peak_ratio[level] for level in LEVELS_MM])
-            self.brier, self.log_score = scores.brier, scores.log_score
+            self._reported.append(poses[0])
+            self._weights.append(weight)
+            places = np.tile(posed.problem.space.anchor, (len(self._reported), 1))
+            scores = scored(posed, Posterior(np.array(self._reported), places, np.array(self._weights)))
+            self._peak_ratio = np.array([scores.peak_ratio[level] for level in LEVELS_MM])
+            self._brier, self._log_score = scores.brier, scores.log_score
 
-    @property
-    def picture(self) -> Image:
-        """The picture (height, width, 2): the observed silhouette, and the last proposal."""
-        picture = self.scenery.picture
-        if self.pose is not None:
-            problem = self.posed.problem
-            picture[..., 1] = 255 * project(problem.body, problem.cameras[0], self.pose, problem.space.anchor)
+    def _current(self) -> NicheInstance:
+        if self._posed is None:
+            raise error.ResetNeeded(NOT_BEGUN)
+        return self._posed
+
+    def _picture(self, posed: NicheInstance) -> Image:
+        """Return the picture (height, width, 2): the observed silhouette, and the last proposal."""
+        problem = posed.problem
+        picture = backdrop(problem.silhouettes).view(np.uint8)
+        if self._pose is not None:
+            picture[..., 1] = 255 * project(problem.body, problem.cameras[0], self._pose, problem.space.anchor)
         return picture
 
-    @property
-    def label(self) -> str:
-        """What is written into the picture."""
-        if self.pose is None:
-            return f"instance {self.posed.number}, {self.posed.kind}"
-        return f"cost {self.cost:.1f}, {len(self.weights)} reported, {self.evaluations} evaluations"
+    def _render_frame(self) -> Picture:
+        posed = self._current()
+        label = f"instance {posed.number}, {posed.kind}"
+        if self._pose is not None:
+            label = f"cost {self._cost:.1f}, {len(self._weights)} reported, {self._evaluations} evaluations"
+        return render_frame(posed.problem, self._pose, posed.problem.space.anchor, label)

@@ -98,7 +98,7 @@ class Population:
     ) -> None:
         self.episode = first_episode(world, number, size * (steps * every + 1))
         self.rng = np.random.default_rng(int(generator.integers(2**63)))
-        self.space = self.episode.space
+        self.space = self.episode.problem.space
         self.limits = speed_limits(self.space, ALPHA, "symmetric")
         self.swarm = SwarmState(self.space, self.rng, size, self.limits, REDRAWS, "dimension")
         self.size, self.steps, self.every = size, steps, every
@@ -247,7 +247,7 @@ def instance_features(population: Population) -> Array:
     it, and of its pixels at an edge; the dimensions / 66; the median and the deviation of the first costs / 100; and
     the correlation of the first costs with the distance to the cheapest, -1 to 1 mapped to 0 to 1.
     """
-    silhouettes = population.episode.scenery.observation.silhouettes
+    silhouettes = population.episode.problem.silhouettes
     shapes = np.array([_shape(silhouette.mask) for silhouette in silhouettes]).mean(axis=0)
     first, costs = population.swarm.best, population.swarm.best_cost
     distances = np.sqrt((displacement(population.space, first[costs.argmin()], first) ** 2).sum(axis=1))

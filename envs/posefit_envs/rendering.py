@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium import error
 from numpy.typing import NDArray
 
+from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.silhouette.cost import project
 from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
-from posefit_envs.instance import Scenery
 
 MODES = ("rgb_array", "human")
 HEIGHT = 240  # pixels
@@ -25,20 +25,20 @@ def check_mode(mode: str | None) -> None:
         raise error.UnsupportedMode(f"render_mode must be one of {', '.join(MODES)}, got {mode!r}")
 
 
-def render_frame(scenery: Scenery, pose: Array | None, translation: Array | None, label: str) -> Picture:
+def render_frame(problem: PoseProblem, pose: Array | None, translation: Array | None, label: str) -> Picture:
     """Return the picture: each view with both, missed and spilled pixels in three colours, and the body's side."""
     panels = []
-    for camera, silhouette in zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True):
+    for camera, silhouette in zip(problem.cameras, problem.silhouettes, strict=True):
         mask = silhouette.mask
         body = np.zeros_like(mask)
         if pose is not None and translation is not None:
-            body = project(scenery.task.body, camera, pose, translation)
+            body = project(problem.body, camera, pose, translation)
         image = np.full((*mask.shape, 3), BACKGROUND, dtype=np.uint8)
         image[mask & ~body], image[body & ~mask], image[mask & body] = MISSED, SPILLED, BOTH
         width = 2 * round(mask.shape[1] * HEIGHT / mask.shape[0] / 2)
         panels.append(cv2.resize(image, (width, HEIGHT), interpolation=cv2.INTER_NEAREST))
     if pose is not None and translation is not None:
-        panels.append(side_view(scenery.task.body, scenery.task.cameras[0], pose, translation, HEIGHT))
+        panels.append(side_view(problem.body, problem.cameras[0], pose, translation, HEIGHT))
     else:
         panels.append(np.full((HEIGHT, HEIGHT, 3), BACKGROUND, dtype=np.uint8))
     image = np.hstack(panels)

@@ -6,7 +6,7 @@ import numpy as np
 
 from posefit.arrays import Array
 
-HIGHEST_COST = 100.0
+LOG_HIGHEST_COST = np.log1p(100.0)
 
 Number = TypeVar("Number", float, Array)
 
@@ -23,10 +23,10 @@ def unscaled(bounds: tuple[float, float], value: float) -> float:
 
 def log_cost(cost: Number) -> Number:
     """Return a cost of 0 to 100 on a logarithmic scale of 0 to 1: ln(1 + cost) / ln 101."""
-    shown: Number = np.log1p(cost) / np.log1p(HIGHEST_COST)
+    shown: Number = np.log1p(cost) / LOG_HIGHEST_COST
     return shown
 
 
-def log_improvement(before: float, after: float) -> float:
-    """Return the reward of a best cost that falls: ln((1 + before) / (1 + after))."""
-    return float(np.log1p(before) - np.log1p(after))
+def log_improvement(before: Array, after: Array) -> Array:
+    """Return the rewards of best costs that fall: ln((1 + before) / (1 + after))."""
+    return np.log1p(before) - np.log1p(after)

@@ -1,21 +1,20 @@
 """Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit import SearchSpace, Silhouette
+from posefit import PoseProblem, Silhouette
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.cost import mean_cost
+from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import pack
 from posefit.silhouette.sharing import LEAST_SHARE, work_through
-from posefit_envs.instance import BODY, Image, Scenery, World
+from posefit_envs.instance import BODY, Image, World, backdrop, body_of
 from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
 
 Rows = NDArray[np.int64]
@@ -23,8 +22,7 @@ _BODY = np.uint16(BODY)
 _READ_ONLY = ("radii", "rotations", "places", "focals", "centres")
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
+class Evaluation(NamedTuple):
     """Poses, costs and pictures of proposals, a row a scene; rows of scenes that were left out mean nothing."""
 
     poses: Array  # (n, 66)
@@ -46,9 +44,8 @@ class Stage:
         bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
         self._width, self._height, self._threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
-        self._chain = world.body.skeleton.chain
-        self._sceneries: list[Scenery | None] = [None] * rows
-        self._silhouettes: Sequence[Silhouette] = ()
+        self._chain = body_of(world.motion).skeleton.chain
+        self._silhouettes: list[Sequence[Silhouette]] = [()] * rows
         self._scenes = Scenes(
             np.empty((rows, bones, 3)),
             np.empty((rows, bones, 2)),
@@ -68,25 +65,24 @@ class Stage:
         self._centres, self._halves, self._anchors = np.empty((rows, d)), np.empty((rows, d)), np.empty((rows, 3))
         self.all_rows: Rows = np.arange(rows)
 
-    def set_scene(self, row: int, scenery: Scenery, space: SearchSpace) -> None:
-        """Make a row this scene, whose pose is searched in this space."""
+    def set_problem(self, row: int, problem: PoseProblem) -> None:
+        """Make a row this problem, one of the world's."""
+        space, silhouettes = problem.space, problem.silhouettes
         self._centres[row], self._halves[row], self._anchors[row] = space.centre, space.half, space.anchor
-        if self._sceneries[row] is scenery:
+        if self._silhouettes[row] is silhouettes:
             return
-        self._sceneries[row], self._silhouettes = scenery, scenery.observation.silhouettes
-        body, scenes = scenery.task.body, self._scenes
+        self._silhouettes[row] = silhouettes
+        body, scenes = problem.body, self._scenes
         scenes.offsets[row], scenes.radii[row] = body.skeleton.chain.offsets, body.radii
-        scenes.backdrops[row] = scenery.backdrop
-        for view, (camera, silhouette) in enumerate(
-            zip(scenery.task.cameras, scenery.observation.silhouettes, strict=True)
-        ):
+        scenes.backdrops[row] = backdrop(silhouettes)
+        for view, (camera, silhouette) in enumerate(zip(problem.cameras, silhouettes, strict=True)):
             scenes.rotations[row, view], scenes.places[row, view] = camera.rotation, camera.translation
             scenes.focals[row, view], scenes.centres[row, view] = camera.focal, camera.centre
             scenes.observed[row, view], scenes.valid[row, view] = silhouette.bits
             scenes.totals[row, view] = np.count_nonzero(silhouette.mask)
         if self._aligned:
             self._joint_radii[row] = body.joint_radii()
-            self._borders[row] = [silhouette.extent for silhouette in scenery.observation.silhouettes]
+            self._borders[row] = [silhouette.extent for silhouette in silhouettes]
 
     def pictures(self) -> Image:
         """Return the pictures (n, height, width, 2 views) before the first proposals."""
@@ -149,8 +145,7 @@ class Stage:
             cuts = [len(rows) * share // shares for share in range(shares + 1)]
             parts = [slice(a, b) for a, b in pairwise(cuts)]
             work_through(parts, self._threads, lambda _: (), lambda part: draw_scenes(*at, rows[part], *values))
-        # every pixel of a scene is known, so that the silhouettes of one row do for all
-        costs = mean_cost(areas.reshape(views, n * k, 3), self._silhouettes)
+        costs = mean_over_views([mismatch(view) for view in areas.reshape(views, n * k, 3)])  # every pixel is known
         return costs.reshape(n, k), areas
 
     def _read_only(self) -> Scenes:

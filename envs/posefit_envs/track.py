@@ -1,28 +1,17 @@
 """Track-v0: a sequence of silhouettes, several proposals for each."""
 
-from dataclasses import replace
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting import metrics
 from posefit.fitting.check import whole
+from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
 from posefit.fitting.tracker import Follower, Prediction
-from posefit.geometry.skeleton import ANGLES
-from posefit_envs.base import (
-    Flags,
-    Infos,
-    Outcome,
-    SearchEnv,
-    SearchVectorEnv,
-    VectorArguments,
-    check_budget,
-    image_spaces,
-)
-from posefit_envs.instance import Episode, Image, Instance, checked, first_episode
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, check_budget, image_spaces
+from posefit_envs.instance import Episode, Image, Instance, checked, instance
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Rows
+from posefit_envs.stage import Evaluation, Rows
 
 FRAMES = 20
 EVALUATIONS = 100  # a frame
@@ -39,84 +28,68 @@ class TrackVectorEnv(SearchVectorEnv):
         *,
         frames: int = FRAMES,
         evaluations_per_frame: int = EVALUATIONS,
-        **arguments: Unpack[VectorArguments],
+        **arguments: Any,
     ) -> None:
         check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
         checked(whole, "frames", frames, 1)
         super().__init__(num_envs, image_spaces, **arguments)
-        self._frames, self._budget = int(frames), int(evaluations_per_frame)
-        self._followers: list[Follower | None] = [None] * num_envs
-        # of the current frame: the count of proposals, the last one, and the best one
-        n, d = self._shape
-        self._used, self._frame_numbers = np.zeros(num_envs, dtype=np.int64), np.zeros(num_envs, dtype=np.int64)
-        self._costs, self._poses, self._places = np.empty(n), np.empty((n, ANGLES)), np.empty((n, 3))
-        self._best, self._best_proposals = np.empty(n), np.empty((n, d))
-        self._best_poses, self._best_places = np.empty((n, ANGLES)), np.empty((n, 3))
+        self._frame_count, self._budget = int(frames), int(evaluations_per_frame)
+        self._followers: dict[int, Follower] = {}
+        self._frames, self._used = np.zeros((2, num_envs), dtype=np.int64)  # used: of the current frame
+        self._best, self._best_proposals = np.empty(num_envs), np.empty(self._shape)
+        self._last: Evaluation | None = None
 
     def _begin_search(self, i: int, number: int) -> None:
-        episode = first_episode(self.world, number, self._budget, self._frames)
-        follower = self._followers[i] = Follower(episode.instance.task, self.world.learned, Prediction(tilt="box"))
-        self._enter(i, replace(episode, space=follower.space(episode.instance.observations[0])))
+        made = instance(self.world, number, self._frame_count, self._budget)
+        self._followers[i] = Follower(made.task, self.world.learned, Prediction(tilt="box"))
+        self._begin_frame(i, made, 0)
 
-    def _enter(self, i: int, episode: Episode) -> None:
-        super()._enter(i, episode)
-        self._frame_numbers[i], self._used[i], self._best[i] = episode.frame, 0, np.inf
+    def _begin_frame(self, i: int, made: Instance, frame: int) -> None:
+        self._enter(i, made.episode(frame, self._followers[i].space(made.observations[frame])))
+        self._frames[i], self._used[i], self._best[i] = frame, 0, np.inf
 
     def _opened(self, begun: Flags) -> tuple[Image, Infos]:
-        frames = np.zeros(self.num_envs, dtype=np.int64)
-        return self._stage.pictures(), {"instance": self._numbers.copy(), "frame": frames}
+        return self._stage.pictures(), {"instance": self._numbers.copy(), "frame": np.zeros_like(self._frames)}
 
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
-        last = self._stage.evaluate(actions, rows)
+        last = self._last = self._stage.evaluate(actions, rows)
         self._used += stepping
-        self._costs, self._poses, self._places = last.costs, last.poses, last.translations
-        better = np.flatnonzero(stepping & (last.costs < self._best))
+        better = (stepping & (last.costs < self._best)).nonzero()[0]
         if better.size:
             self._best[better], self._best_proposals[better] = last.costs[better], actions[better]
-            self._best_poses[better], self._best_places[better] = last.poses[better], last.translations[better]
-        infos = {"cost": last.costs, "areas": last.areas}
-        infos |= self._progress(self._best.copy(), self._used.copy(), lambda: last.poses)
-        committed, terminated = {}, np.zeros(self.num_envs, dtype=bool)
-        for i in np.flatnonzero(stepping & (self._used >= self._budget)).tolist():
-            committed[i] = self._commit(i)
-            terminated[i] = self.episodes[i].frame + 1 >= self._frames
-            if not terminated[i]:
-                self._enter_next(i)
-        if committed:
-            entered = np.array([i for i in committed if not terminated[i]], dtype=np.int64)
-            self._stage.redraw(self._poses, self._places, entered, last.pictures)
-        frames = self._frame_numbers.copy()
-        common = {"instance": self._numbers, "frame": frames}
-        never = np.zeros_like(terminated)
-        return Outcome(last.pictures, -last.costs, terminated, never, infos | {"frame": frames}, common, committed)
+        infos = self._progress(self._best, self._used, last.poses, cost=last.costs, areas=last.areas)
+        terminated = full = stepping & (self._used >= self._budget)
+        committed: dict[int, Infos] = {}
+        if full.any():
+            terminated = full & (self._frames + 1 == self._frame_count)
+            committed = self._commit(full.nonzero()[0], last)
+        infos["frame"] = self._frames.copy()
+        common = {"instance": self._numbers, "frame": infos["frame"]}
+        return Outcome(last.pictures, -last.costs, terminated, infos, common, row_infos=committed)
 
-    def _commit(self, i: int) -> Infos:
-        """Commit the best proposal of environment i, and return its infos."""
-        episode, follower = self.episodes[i], self._followers[i]
-        assert follower is not None
-        self._poses[i], self._places[i] = self._best_poses[i], self._best_places[i]
-        follower.commit(self._best_proposals[i])
-        return committed_infos(
-            episode.instance,
-            episode.frame,
-            self._poses[i],
-            self._places[i],
-            float(self._best[i]),
-            self._selection.errors,
-        )
-
-    def _enter_next(self, i: int) -> None:
-        instance, frame, follower = self.episodes[i].instance, self.episodes[i].frame + 1, self._followers[i]
-        assert follower is not None
-        self._enter(i, Episode(instance, frame, follower.space(instance.observations[frame])))
+    def _commit(self, rows: Rows, last: Evaluation) -> dict[int, Infos]:
+        """Commit the best proposals of some environments, begin their next frames, and return their infos by row."""
+        poses, places = self._stage.decode(self._best_proposals[:, None], rows)
+        last.poses[rows], last.translations[rows] = poses[rows, 0], places[rows, 0]
+        infos, entered = {}, []
+        for i in rows.tolist():
+            made, frame, best = self.episodes[i].instance, int(self._frames[i]), float(self._best[i])
+            infos[i] = committed_infos(made, frame, poses[i, 0], places[i, 0], best, self.world.errors)
+            self._followers[i].commit(self._best_proposals[i])
+            if frame + 1 < self._frame_count:
+                self._begin_frame(i, made, frame + 1)
+                entered.append(i)
+        self._stage.redraw(last.poses, last.translations, np.array(entered, dtype=np.int64), last.pictures)
+        return infos
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
-        if not self._steps[i]:
+        last = self._last
+        if not self._steps[i] or last is None:
             label = f"instance {episode.instance.number}, frame {episode.frame}"
-            return render_frame(episode.scenery, None, None, label)
+            return render_frame(episode.problem, None, None, label)
         best = "" if np.isinf(self._best[i]) else f", best {self._best[i]:.1f}"
-        label = f"frame {episode.frame}, cost {self._costs[i]:.1f}{best}"
-        return render_frame(episode.scenery, self._poses[i], self._places[i], label)
+        label = f"frame {episode.frame}, cost {last.costs[i]:.1f}{best}"
+        return render_frame(episode.problem, last.poses[i], last.translations[i], label)
 
 
 class TrackEnv(SearchEnv):
@@ -163,7 +136,7 @@ def committed_infos(
     """Return the infos of the pose that is committed in a frame of an instance."""
     infos = {"committed_frame": frame, "committed_cost": cost, "committed_pose": pose.copy()}
     if errors:
-        ours = instance.task.body.skeleton.joints(pose[None], place[None])
-        infos |= {f"committed_{name}": error for name, error in instance.errors(frame, pose).items()}
-        infos["committed_mpjpe_mm"] = float(metrics.mpjpe_mm(instance.joints[frame][None], ours)[0])
+        joints = instance.task.body.skeleton.joints(pose[None], place[None])
+        infos["committed_error_degrees"] = float(pose_error_degrees(instance.truth.poses[frame][None], pose[None])[0])
+        infos["committed_mpjpe_mm"] = float(mpjpe_mm(instance.joints[frame][None], joints)[0])
     return infos

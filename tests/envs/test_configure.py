@@ -28,28 +28,34 @@ def population_of(env: Any) -> Any:
     return env._vector._populations[0]
 
 
+def recorded(env: Any) -> list[Any]:
+    """Return the list to which every population that an environment asks for is added."""
+    asked: list[Any] = []
+    ask = population_of(env).ask
+    population_of(env).ask = lambda: asked.append(ask().copy()) or asked[-1]
+    return asked
+
+
 def test_with_sapsos_own_schedule_it_costs_what_sapso_does_and_proposes_it_but_for_rounding() -> None:
     for number, every in ((0, 1), (1, 5)):
         env = made(instance=number, every=every)
         env.reset(seed=number)
-        ended, step, asked, found = False, 0, [], []
-        ask = population_of(env).ask
-        population_of(env).ask = lambda ask=ask, asked=asked: asked.append(ask().copy()) or asked[-1]
+        ended, step, asked, costs_asked = False, 0, recorded(env), []
         while not ended:
             _, _, ended, _, info = env.step(sapso_action(step, every=every))
-            found.append(population_of(env).costs)
+            costs_asked.append(population_of(env).costs)
             step += 1
         # the same draws: an environment's generator begins with the seed, and hands one number on to its search
         rng, _ = np_random(number)
         sapso = SAPSO(population_of(env).space, np.random.default_rng(int(rng.integers(2**63))))
-        problem = population_of(env).episode.scenery.problem(population_of(env).space)
+        problem = population_of(env).episode.problem
         proposed, costs = [], []
         while len(proposals := sapso.ask()):
             proposed.append(proposals.copy())
             costs.append(problem.evaluate(proposals))
             sapso.tell(proposals, costs[-1])
         np.testing.assert_allclose(np.concatenate(asked), np.concatenate(proposed[1:]), rtol=0.0, atol=1e-12)
-        np.testing.assert_array_equal(np.concatenate(found), np.concatenate(costs[1:]))
+        np.testing.assert_array_equal(np.concatenate(costs_asked), np.concatenate(costs[1:]))
         assert info["best_cost"] == np.min(costs)
         assert info["evaluations"] == 2440
 
@@ -91,11 +97,9 @@ def test_of_a_quarter_only_the_best_particles_move_and_more_often() -> None:
     env = made(population_size=40, every=1)
     env.reset(seed=0)
     before = population_of(env).swarm.best_cost.copy()
-    asked = []
-    ask = population_of(env).ask
-    population_of(env).ask = lambda: asked.append(ask()) or asked[-1]
+    asked = recorded(env)
     env.step(action_of(ControlAction(population=0.25)))
-    assert [len(one) for one in asked] == [10, 10, 10, 10]
+    assert [len(proposals) for proposals in asked] == [10, 10, 10, 10]
     changed = np.flatnonzero(population_of(env).swarm.best_cost != before)
     # the best ten of the first turn are among the best ten of every other, as bests only get better
     assert set(changed) <= set(before.argsort()[:10])

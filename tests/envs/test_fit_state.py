@@ -12,30 +12,32 @@ from posefit_envs.policies import constant_policy, gaussian_policy, random_searc
 NAME = "posefit/FitState-v0"
 
 
+def remembered(dimensions: int, *proposals: tuple[float, float]) -> ProposalMemory:
+    """Return the memory of a search whose middle costs 50, of proposals along the first axis with their costs."""
+    memory = ProposalMemory(1, dimensions, 11)
+    memory.begin(np.array([True]), np.array([50.0]))
+    for place, cost in proposals:
+        memory.add(place * np.eye(1, dimensions), np.array([cost]))
+    return memory
+
+
 def test_its_first_numbers_are_proposed_where_the_last_is_one_bit_for_bit() -> None:
-    new, old = gym.make(NAME, instance=3).unwrapped, gym.make("posefit/FitImage-v0", instance=3).unwrapped
-    new.reset(seed=0)
-    old.reset(seed=0)
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        proposal = rng.uniform(-1.0, 1.0, 9)
-        assert new.step(np.append(proposal, 1.0))[4]["cost"] == old.step(proposal)[4]["cost"]
+    env, image = gym.make(NAME, instance=3).unwrapped, gym.make("posefit/FitImage-v0", instance=3).unwrapped
+    env.reset(seed=0)
+    image.reset(seed=0)
+    for proposal in np.random.default_rng(0).uniform(-1.0, 1.0, (5, 9)):
+        assert env.step(np.append(proposal, 1.0))[4]["cost"] == image.step(proposal)[4]["cost"]
 
 
-def test_the_last_number_says_how_much_of_the_way_by_powers_of_ten() -> None:
-    memory = ProposalMemory(2, 50.0, 10)
-    memory.add(np.array([0.5, 0.0]), 20.0)
+def test_the_last_number_is_how_much_of_the_way_by_powers_of_ten() -> None:
+    memory = remembered(2, (0.5, 20.0))
     for power, reach in ((-1.0, 0.01), (0.0, 0.1), (0.5, 10.0**-0.5)):
         # from the best, (0.5, 0), to (0, 1)
-        np.testing.assert_allclose(memory.proposal(np.array([0.0, 1.0, power])), [0.5 - 0.5 * reach, reach])
+        np.testing.assert_allclose(memory.proposals(np.array([[0.0, 1.0, power]])), [[0.5 - 0.5 * reach, reach]])
 
 
 def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> None:
-    memory = ProposalMemory(1, 50.0, 11)
-    rewards = [memory.add(np.array([place]), cost) for place, cost in ((0.1, 60.0), (0.2, 30.0), (0.3, 40.0))]
-    # by hand: ln(51 / 31) when 30 comes, else nothing
-    assert rewards == pytest.approx([0.0, np.log(51.0 / 31.0), 0.0])
-    state = memory.state()
+    (state,) = remembered(1, (0.1, 60.0), (0.2, 30.0), (0.3, 40.0)).states()
     np.testing.assert_allclose(state[:4], [0.2, 0.3, 0.0, 0.0], atol=1e-7)  # 30, 40, and the middle's 50
     np.testing.assert_allclose(state[4:8], [0.3, 0.2, 0.1, 0.0], atol=1e-7)
     costs = 2.0 * np.log([31.0, 41.0, 51.0, 51.0, 41.0, 31.0, 61.0, 51.0]) / np.log(101.0) - 1.0
@@ -45,15 +47,13 @@ def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> Non
 
 
 def test_what_costs_no_less_than_the_middle_is_never_among_the_best() -> None:
-    memory = ProposalMemory(1, 50.0, 11)
-    for place, cost in ((0.1, 50.0), (0.2, 70.0), (0.3, 30.0), (0.4, 30.0)):
-        memory.add(np.array([place]), cost)
-    np.testing.assert_array_equal(memory.best[:, 0], [0.3, 0.4, 0.0, 0.0])  # of equal ones the earlier first
-    np.testing.assert_array_equal(memory.best_costs, [30.0, 30.0, 50.0, 50.0])
-    np.testing.assert_array_equal(memory.last[:, 0], [0.4, 0.3, 0.2, 0.1])
+    records = remembered(1, (0.1, 50.0), (0.2, 70.0), (0.3, 30.0), (0.4, 30.0)).records[0]
+    np.testing.assert_array_equal(records[:4, 0], [0.3, 0.4, 0.0, 0.0])  # of equal ones the earlier first
+    np.testing.assert_array_equal(records[:4, 1], [30.0, 30.0, 50.0, 50.0])
+    np.testing.assert_array_equal(records[4:, 0], [0.4, 0.3, 0.2, 0.1])
 
 
-def test_the_budget_counts_the_middle_and_no_target_ends_it() -> None:
+def test_the_budget_counts_the_middle_and_rewards_add_up_to_the_fall_of_the_logarithm() -> None:
     env = gym.make(NAME, instance=3, max_evaluations=4).unwrapped
     _, info = env.reset(seed=0)
     assert info["evaluations"] == 1
@@ -64,13 +64,10 @@ def test_the_budget_counts_the_middle_and_no_target_ends_it() -> None:
         ends.append((ended, cut))
     assert ends == [(False, False), (False, False), (True, False)]
     assert total == pytest.approx(np.log((1.0 + first) / (1.0 + info["best_cost"])))
-    with pytest.raises(error.ResetNeeded, match="the episode has ended"):
-        env.step(env.action_space.sample())
 
 
 def test_the_picture_comes_beside_the_search_if_asked_for() -> None:
-    env = gym.make(NAME, instance=3, image=True)
-    observation, _ = env.reset(seed=0)
+    observation, _ = gym.make(NAME, instance=3, image=True).reset(seed=0)
     assert sorted(observation) == ["image", "search"]
     assert observation["image"].shape == (48, 64, 2)
     assert observation["image"][..., 1].any()  # the middle of the box, which was proposed
@@ -88,10 +85,6 @@ def test_a_step_from_the_best_so_far_beats_random_search() -> None:
         costs[name] = np.mean([rollout(env, policy, 10_000 + k, k)["best_cost"] for k in range(6)])
     assert costs["gaussian"] < costs["random"]
     assert costs["uniform"] < costs["random"]
+    assert rollout(env, constant_policy(np.zeros(10)), 17, 0)["gain"] == 0.0
     with pytest.raises(ValueError, match="spread must be"):
         gaussian_policy(env, np.random.default_rng(0), spread=0.0)
-
-
-def test_a_constant_that_stays_earns_nothing_more() -> None:
-    env = gym.make(NAME, max_evaluations=10).unwrapped
-    assert rollout(env, constant_policy(np.zeros(10)), 17, 0)["gain"] == 0.0

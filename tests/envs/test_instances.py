@@ -5,9 +5,11 @@ import pytest
 
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
+from posefit.silhouette.corruption import CORRUPTIONS
+from posefit.silhouette.cost import areas, mismatch
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
-from posefit_envs.instance import SPLITS, instance, select
+from posefit_envs.instance import SPLITS, first_episode, instance, world_of
 from tests.cases import each
 
 
@@ -21,19 +23,18 @@ def both(motion: str, number: int, frames: int, **arguments):
     """Return the scene of a cell, and an environment's instance of the same number."""
     spec = {"method": "random@pca", "motion": motion, "instance": number, "frames": frames, "view_degrees": [45, 90]}
     (cell,) = Plan.of({"cells": [spec]})
-    return cell_scene(cell), instance(
-        select(motion=motion, view_degrees=(45.0, 90.0), **arguments).world, number, frames, 10
-    )
+    world = world_of(motion=motion, view_degrees=(45.0, 90.0), **arguments)
+    return cell_scene(cell), instance(world, number, frames, 10)
 
 
 @each("number", [0, 17, 10_017])
-def test_a_built_in_motion_is_the_same_and_is_seen_from_the_same_side(number):
+def test_a_built_in_motion_and_its_views_are_the_same(number):
     cell, made = both("walk", number, 6)
     assert cell.truth is not None
     assert made.truth.poses.tobytes() == cell.truth.poses.tobytes()
     assert made.truth.translations.tobytes() == cell.truth.translations.tobytes()
-    for one, other in zip(made.task.cameras, cell.cameras, strict=True):
-        assert azimuth(one) == pytest.approx(azimuth(other), abs=1e-9)
+    for camera, expected in zip(made.task.cameras, cell.cameras, strict=True):
+        assert azimuth(camera) == pytest.approx(azimuth(expected), abs=1e-9)
 
 
 def test_instance_0_is_the_motion_as_it_is():
@@ -44,15 +45,41 @@ def test_instance_0_is_the_motion_as_it_is():
 
 def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():
     _, plain = both("walk", 17, 3)
-    _, spoilt = both("walk", 17, 3, noise={"holes": 0.5}, mismatch_percent=10.0, translation="searched")
-    assert spoilt.truth.poses.tobytes() == plain.truth.poses.tobytes()
-    for one, other in zip(spoilt.task.cameras, plain.task.cameras, strict=True):
-        assert one.rotation.tobytes() == other.rotation.tobytes()
-    masks = [[silhouette.mask for silhouette in made.observations[0].silhouettes] for made in (plain, spoilt)]
-    assert not np.array_equal(masks[0][0], masks[1][0])
+    _, noisy = both("walk", 17, 3, noise={"holes": 0.5}, mismatch_percent=10.0, translation="searched")
+    assert noisy.truth.poses.tobytes() == plain.truth.poses.tobytes()
+    for camera, expected in zip(noisy.task.cameras, plain.task.cameras, strict=True):
+        assert camera.rotation.tobytes() == expected.rotation.tobytes()
+    masks = [made.observations[0].silhouettes[0].mask for made in (plain, noisy)]
+    assert not np.array_equal(*masks)
 
 
-def test_the_splits_share_no_motion():
-    starts = {split: range(*SPLITS[split]) for split in ("train", "test")}
-    assert not set(starts["train"]) & set(starts["test"])
-    assert 0 in starts["train"]
+def test_the_test_split_is_held_out_by_number():
+    for split, (first, last) in SPLITS.items():
+        world, rng = world_of(split=split), np.random.default_rng(0)
+        numbers = {world.next_instance(rng) for _ in range(20)}
+        assert len(numbers) > 15
+        assert all(first <= number < last for number in numbers)
+    assert SPLITS["train"] == (0, SPLITS["test"][0])
+
+
+@each("name", CORRUPTIONS)
+def test_each_corruption_changes_the_silhouette_more_the_stronger_it_is(name):
+    def masks(noise):
+        world = world_of(noise=noise, size=(160, 120))
+        return np.stack([first_episode(world, number, 10).problem.silhouettes[0].mask for number in range(12)])
+
+    clean = masks(None)
+    changed = [(masks({name: strength}) != clean).mean() for strength in (0.1, 0.4, 1.0)]
+    assert 0.0 <= changed[0] < changed[1] < changed[2] < 0.5
+    assert (masks({name: 0.0}) == clean).all()
+
+
+def test_a_mismatched_body_costs_even_the_true_pose_something():
+    costs = []
+    for percent in (0.0, 10.0):
+        made = instance(world_of(size=(160, 120), mismatch_percent=percent), 3, 1, 10)
+        camera, silhouette = made.task.cameras[0], made.observations[0].silhouettes[0]
+        counts = areas(made.task.body, camera, silhouette, made.truth.poses[:1], made.truth.translations[:1])
+        costs.append(float(mismatch(counts)[0]))
+    assert costs[0] == 0.0
+    assert 1.0 < costs[1] < 30.0

@@ -1,4 +1,4 @@
-"""Many scenes in one compiled call are what the library says of each alone."""
+"""Many scenes in one compiled call are what the library computes of each alone."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.silhouette.cost import project
-from posefit_envs.instance import first_episode, select
+from posefit_envs.instance import Episode, backdrop, first_episode, world_of
 from posefit_envs.stage import Stage
 from tests.cases import each
 
@@ -17,19 +17,23 @@ WORLDS: list[dict[str, Any]] = [
 ]
 
 
-@each("arguments", WORLDS)
-def test_scenes_together_are_what_the_library_says_of_each_alone(arguments: dict[str, Any]) -> None:
-    world = select(**arguments).world
-    episodes = [first_episode(world, number, 10) for number in (3, 17, 17, 9_000)]
-    stage = Stage(world, len(episodes))
+def staged(numbers: tuple[int, ...], **arguments: Any) -> tuple[Stage, list[Episode]]:
+    world = world_of(**arguments)
+    stage, episodes = Stage(world, len(numbers)), [first_episode(world, number, 10) for number in numbers]
     for row, episode in enumerate(episodes):
-        stage.set_scene(row, episode.scenery, episode.space)
+        stage.set_problem(row, episode.problem)
+    return stage, episodes
+
+
+@each("arguments", WORLDS)
+def test_scenes_together_are_what_the_library_computes_of_each_alone(arguments: dict[str, Any]) -> None:
+    stage, episodes = staged((3, 17, 17, 9_000), **arguments)
     rng = np.random.default_rng(0)
-    proposals = rng.uniform(-1.0, 1.0, (len(episodes), 5, episodes[0].space.dimensions))
+    proposals = rng.uniform(-1.0, 1.0, (len(episodes), 5, episodes[0].problem.space.dimensions))
     costs = stage.costs(proposals, stage.all_rows)
     evaluation = stage.evaluate(proposals[:, 0], stage.all_rows)
     for row, episode in enumerate(episodes):
-        problem = episode.scenery.problem(episode.space)
+        problem = episode.problem
         np.testing.assert_array_equal(costs[row], problem.evaluate(proposals[row]))
         poses, places = problem.decode(proposals[row, :1])
         np.testing.assert_array_equal(evaluation.poses[row], poses[0])
@@ -39,19 +43,16 @@ def test_scenes_together_are_what_the_library_says_of_each_alone(arguments: dict
             body, mask = project(problem.body, camera, poses[0], places[0]), problem.silhouettes[view].mask
             np.testing.assert_array_equal(evaluation.pictures[row, ..., 2 * view + 1], 255 * body)
             np.testing.assert_array_equal(evaluation.pictures[row, ..., 2 * view], 255 * mask)
-            counted = [(mask & ~body).sum(), (body & ~mask).sum(), (body & mask).sum()]
-            np.testing.assert_array_equal(evaluation.areas[row, view], counted)
+            areas = [(mask & ~body).sum(), (body & ~mask).sum(), (body & mask).sum()]
+            np.testing.assert_array_equal(evaluation.areas[row, view], areas)
 
 
 @pytest.mark.pure
 def test_rows_that_are_left_out_show_nothing_proposed() -> None:
-    world = select().world
-    episodes = [first_episode(world, number, 10) for number in (3, 17)]
-    stage = Stage(world, 2)
-    for row, episode in enumerate(episodes):
-        stage.set_scene(row, episode.scenery, episode.space)
+    stage, episodes = staged((3, 17))
     for rows in (np.array([1]), np.array([], dtype=np.int64)):
         evaluation = stage.evaluate(np.zeros((2, 9)), rows)
-        np.testing.assert_array_equal(evaluation.pictures[0], episodes[0].scenery.picture)
+        picture = backdrop(episodes[0].problem.silhouettes).view(np.uint8)
+        np.testing.assert_array_equal(evaluation.pictures[0], picture)
         assert not evaluation.areas[0].any()
         assert evaluation.areas[1].any() == bool(len(rows))

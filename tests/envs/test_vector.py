@@ -1,5 +1,7 @@
 """Vector environments do what single ones do; optimisers and agents run on them."""
 
+import subprocess
+import sys
 import tracemalloc
 from typing import Any
 
@@ -12,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 
 import posefit_envs
 from posefit_envs import check_vector_env, to_sb3_vec_env
+from posefit_envs.base import row_of
 from posefit_envs.fit_image import FitImageVectorEnv
 from tests.cases import each
 
@@ -34,8 +37,6 @@ TRACK: list[dict[str, Any]] = [
     {"frames": 3, "evaluations_per_frame": 3, "translation": "searched", "mismatch_percent": 10.0, "prior": "full"},
     {"frames": 2, "evaluations_per_frame": 2, "noise": {"holes": 0.4, "blobs": 0.4}, "errors": False},
 ]
-
-
 FIT_STATE: list[dict[str, Any]] = [
     {},
     {"max_evaluations": 5, "image": True, "noise": {"holes": 0.4}},
@@ -52,6 +53,7 @@ CASES = {
     "posefit/Track-v0": TRACK,
     "posefit/Configure-v0": CONFIGURE,
 }
+CHANGING = ("posefit/FitState-v0", "posefit/Configure-v0")  # whose reset gives infos of a search
 
 
 @each(("name", "arguments"), [(name, one) for name, many in CASES.items() for one in many])
@@ -62,7 +64,7 @@ def test_a_vector_environment_equals_single_ones(name: str, arguments: dict[str,
     check_vector_env(vector, lambda: gym.make(name, **arguments), steps=40)
 
 
-def test_the_checker_works_on_anyones_and_finds_what_is_wrong() -> None:
+def test_the_checker_works_on_any_vector_and_names_what_is_wrong() -> None:
     for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
         vector = gym.make_vec("posefit/FitImage-v0", 3, "sync", {"autoreset_mode": mode}, max_evaluations=4)
         check_vector_env(vector, lambda: gym.make("posefit/FitImage-v0", max_evaluations=4), steps=20)
@@ -125,40 +127,30 @@ def test_a_time_limit_truncates_a_vector_environment_too(name: str, arguments: d
     )
 
 
-def test_errors_are_told_unless_nobody_asks_for_them() -> None:
+def test_infos_hold_errors_unless_they_are_left_out() -> None:
     for name in CASES:
-        for errors, told in ((True, {"error_degrees"}), (False, set())):
+        for errors, expected in ((True, {"error_degrees"}), (False, set())):
             vector = gym.make_vec(name, num_envs=2, errors=errors)
             vector.reset(seed=0)
             infos = vector.step(vector.action_space.sample())[4]
-            assert {key for key in infos if "error" in key and not key.startswith("_")} == told
-    with pytest.raises(error.Error, match="errors must be true or false, got 'no'"):
-        gym.make_vec("posefit/FitImage-v0", num_envs=2, errors="no")
+            assert {key for key in infos if "error" in key and not key.startswith("_")} == expected
 
 
-def test_threads_change_nothing() -> None:
+def test_neither_threads_nor_neighbours_change_a_row() -> None:
+    # environments 0 to 2 of 50 are those of three: their seeds are the same, and so are their actions
     for name in CASES:
-        one, three = (gym.make_vec(name, num_envs=50, threads=threads) for threads in (1, 3))
-        np.testing.assert_array_equal(one.reset(seed=2)[0], three.reset(seed=2)[0])
+        few, many, threaded = (gym.make_vec(name, n, threads=k) for n, k in ((3, 1), (50, 1), (50, 3)))
+        first = few.reset(seed=11)[0]
+        for vector in (many, threaded):
+            np.testing.assert_array_equal(first, vector.reset(seed=11)[0][:3])
         for _ in range(2):
-            actions = one.action_space.sample()
-            for first, other in zip(one.step(actions)[:4], three.step(actions)[:4], strict=True):
-                np.testing.assert_array_equal(first, other)
+            actions = many.action_space.sample()
+            rows = few.step(actions[:3])[:4]
+            for first, own, other in zip(rows, many.step(actions), threaded.step(actions), strict=False):
+                np.testing.assert_array_equal(first, own[:3])
+                np.testing.assert_array_equal(own, other)
     with pytest.raises(error.Error, match="threads must be at least 1, got 0"):
         gym.make_vec("posefit/FitImage-v0", num_envs=2, threads=0)
-
-
-def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
-    # environments 0 to 2 of seven are those of three: their seeds are the same, and so are their actions
-    for name in CASES:
-        few, many = (gym.make_vec(name, num_envs=n, mismatch_percent=5.0) for n in (3, 7))
-        first, others = few.reset(seed=11)[0], many.reset(seed=11)[0]
-        np.testing.assert_array_equal(first, others[:3])
-        for _ in range(3):
-            actions = many.action_space.sample()
-            one, other = few.step(actions[:3]), many.step(actions)
-            np.testing.assert_array_equal(one[0], other[0][:3])
-            np.testing.assert_array_equal(one[1], other[1][:3])
 
 
 def test_some_environments_can_be_reset_alone() -> None:
@@ -178,11 +170,8 @@ def test_some_environments_can_be_reset_alone() -> None:
         assert before["evaluations"].tolist() == [first] * 3
 
 
-@each(
-    ("name", "arguments"),
-    [(name, case) for name in ("posefit/FitState-v0", "posefit/Configure-v0") for case in CASES[name]],
-)
-def test_a_reset_of_some_says_and_shows_what_gymnasiums_own_does(name: str, arguments: dict[str, Any]) -> None:
+@each(("name", "arguments"), [(name, case) for name in CHANGING for case in CASES[name]])
+def test_a_reset_of_some_gives_what_gymnasiums_own_gives(name: str, arguments: dict[str, Any]) -> None:
     native, own = (gym.make_vec(name, 3, kind, **arguments) for kind in (None, "sync"))
     for vector in (native, own):
         vector.reset(seed=0)
@@ -191,7 +180,7 @@ def test_a_reset_of_some_says_and_shows_what_gymnasiums_own_does(name: str, argu
         for vector in (native, own):
             for _ in range(3):  # in some of these an episode ends and another begins
                 vector.step(vector.action_space.sample())
-        # whoever goes on observes what he observed before, his picture too
+        # those that go on show the observation from before, the picture too
         ours, theirs = (vector.reset(options={"reset_mask": np.array(mask)}) for vector in (native, own))
         assert data_equivalence(ours[0], theirs[0])
         assert sorted(ours[1]) == sorted(theirs[1])
@@ -205,22 +194,39 @@ def test_infos_have_masks_and_no_masks_of_masks(name: str) -> None:
     vector = gym.make_vec(name, num_envs=3, **ends)
     infos = [vector.reset(seed=0)[1], vector.reset(options={"reset_mask": np.array([False, True, False])})[1]]
     infos += [vector.step(np.zeros(vector.action_space.shape or ()))[4] for _ in range(4)]
-    for one in infos:
-        names = {key for key in one if not key.startswith("_")}
-        assert set(one) == names | {f"_{key}" for key in names}
+    for info in infos:
+        names = {key for key in info if not key.startswith("_")}
+        assert set(info) == names | {f"_{key}" for key in names}
 
 
-def test_the_picture_of_who_goes_on_stays_in_the_window_too() -> None:
-    vector = gym.make_vec("posefit/FitState-v0", num_envs=2, render_mode="rgb_array")
-    vector.reset(seed=0)
-    vector.step(vector.action_space.sample())
-    before = vector.render()
-    vector.reset(options={"reset_mask": np.array([True, False])})
-    after = vector.render()
-    assert before is not None
-    assert after is not None
-    assert (before[0] != after[0]).any()
-    np.testing.assert_array_equal(before[1], after[1])
+@each("name", CASES)
+def test_a_reset_gives_each_environment_its_instance(name: str) -> None:
+    vector = gym.make_vec(name, num_envs=3)
+    for chosen, expected in (([5, 6, 7], [5, 6, 7]), (np.array([7, 6, 5]), [7, 6, 5]), (9, [9, 9, 9])):
+        assert vector.reset(seed=0, options={"instance": chosen})[1]["instance"].tolist() == expected
+    mask = np.array([False, True, False])
+    infos = vector.reset(options={"instance": [1, 2, 3], "reset_mask": mask})[1]
+    assert infos["instance"][1] == 2
+    assert infos["_instance"].tolist() == mask.tolist()
+
+
+@each(
+    ("chosen", "message"),
+    [
+        ([1, 2], r"instance must be one number or 3, one for each environment, got \[1, 2\]"),
+        ([1, [2], 3], r"instance must be a whole number from 0 to 19999, got \[2\]"),
+        (np.zeros((3, 1)), r"instance must be one number or 3, one for each environment, got array"),
+        ([1, 2, 30_000], "instance must lie in 0 to 19999, got 30000"),
+        ([1, 2.5, 3], "instance must be a whole number from 0 to 19999, got 2.5"),
+        ("all", "instance must be a whole number from 0 to 19999, got 'all'"),
+    ],
+)
+def test_a_wrong_choice_of_instances_is_named_and_changes_nothing(chosen: Any, message: str) -> None:
+    vector = gym.make_vec("posefit/FitState-v0", num_envs=3)
+    vector.reset(seed=0, options={"instance": 4})
+    with pytest.raises(error.Error, match=message):
+        vector.reset(options={"instance": chosen})
+    assert vector.step(np.zeros((3, 10)))[4]["instance"].tolist() == [4, 4, 4]
 
 
 @each(("name", "d"), [("posefit/FitImage-v0", 9), ("posefit/Track-v0", 9), ("posefit/Configure-v0", 10)])
@@ -247,13 +253,15 @@ def test_mistakes_are_named(name: str, d: int) -> None:
 def test_every_environment_has_its_picture(name: str) -> None:
     vector = gym.make_vec(name, num_envs=2, render_mode="rgb_array")
     vector.reset(seed=0)
-    before = vector.render()
+    pictures: list[Any] = [vector.render()]
     vector.step(vector.action_space.sample())
-    after = vector.render()
-    assert before is not None
-    assert after is not None
-    assert len(before) == len(after) == 2
-    assert all((a != b).any() for a, b in zip(before, after, strict=True))
+    pictures.append(vector.render())
+    vector.reset(options={"reset_mask": np.array([True, False])})
+    pictures.append(vector.render())
+    for row in range(2):
+        assert (pictures[0][row] != pictures[1][row]).any()
+    assert (pictures[1][0] != pictures[2][0]).any()
+    np.testing.assert_array_equal(pictures[1][1], pictures[2][1])  # it goes on
 
 
 # optimisers
@@ -264,7 +272,7 @@ def test_a_rounded_action_is_off_by_no_more_than_a_few_pixels() -> None:
     env = gym.make_vec("posefit/FitImage-v0", num_envs=400, instance=3, max_evaluations=10**6, target_cost=-1.0)
     env.reset(seed=0)
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (400, 9))
-    exact, rounded = (env.step(one)[4] for one in (actions, actions.astype(np.float32)))
+    exact, rounded = (env.step(rows)[4] for rows in (actions, actions.astype(np.float32)))
     differing = (exact["areas"] != rounded["areas"]).any(axis=(1, 2)).mean()
     assert differing < 0.02
     assert np.abs(exact["cost"] - rounded["cost"]).max() < 0.5
@@ -287,65 +295,51 @@ def test_memory_stays_flat() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["CnnPolicy", "MlpPolicy"])
-def test_an_agent_trains_on_the_vector_environment(policy: str) -> None:
+@each(
+    ("policy", "name", "arguments"),
+    [
+        ("CnnPolicy", "posefit/FitImage-v0", {"max_evaluations": 30}),
+        ("MlpPolicy", "posefit/FitImage-v0", {"max_evaluations": 30}),
+        # where an episode is cut, PPO asks what its last observation is worth
+        ("MultiInputPolicy", "posefit/FitState-v0", {"image": True, "size": (36, 36), "max_episode_steps": 10}),
+    ],
+)
+def test_an_agent_trains_on_the_vector_environment(policy: str, name: str, arguments: dict[str, Any]) -> None:
     sb3 = pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    vector = to_sb3_vec_env(gym.make_vec("posefit/FitImage-v0", num_envs=8, max_evaluations=30))
+    vector = to_sb3_vec_env(gym.make_vec(name, num_envs=8, **arguments))
     model = sb3.PPO(policy, vector, n_steps=64, batch_size=128, n_epochs=2, seed=0, device="cpu")
-    model.learn(2000)
-    assert model.num_timesteps >= 2000
+    model.learn(1000)
+    assert model.num_timesteps >= 1000
     vector.close()
 
 
-def test_stable_baselines3_sees_the_last_picture_of_an_episode() -> None:
-    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    for name, arguments in (
+@each(
+    ("name", "arguments"),
+    [
         ("posefit/FitImage-v0", {"max_evaluations": 3}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
-    ):
-        adapted = to_sb3_vec_env(gym.make_vec(name, num_envs=2, **arguments))
-        adapted.seed(4)
-        first = adapted.reset()
-        assert first.shape[0] == 2
-        for step in range(3):
-            observations, rewards, done, infos = adapted.step(np.zeros((2, 9), dtype=np.float32))
-            assert done.tolist() == [step == 2] * 2
-        assert rewards.shape == (2,)
-        assert infos[0]["terminal_observation"][..., 1].any()
-        assert not observations[0][..., 1].any()  # a new episode: nothing proposed yet
-        assert infos[0]["TimeLimit.truncated"] is ("Fit" in name)
-        assert adapted.get_attr("num_envs") == [2, 2]
-        adapted.close()
-
-
-def test_stable_baselines3_sees_a_dict_past_an_episodes_end() -> None:
+        ("posefit/FitState-v0", {"image": True, "max_evaluations": 4}),
+    ],
+)
+def test_stable_baselines3_gets_the_last_observation_of_an_episode(name: str, arguments: dict[str, Any]) -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    arguments: dict[str, Any] = {"instance": 3, "image": True, "max_evaluations": 3}
-    adapted = to_sb3_vec_env(gym.make_vec("posefit/FitState-v0", num_envs=2, **arguments))
-    single = gym.make("posefit/FitState-v0", **arguments)
-    first = single.reset(seed=4)[0]
+    adapted = to_sb3_vec_env(gym.make_vec(name, num_envs=2, instance=3, **arguments))
+    single = gym.make(name, instance=3, **arguments)
+    first, _ = single.reset(seed=4)
     adapted.seed(4)
     adapted.reset()
-    for ends in (False, True):
-        last = single.step(np.full(10, 0.3))[0]
-        observations, _, done, infos = adapted.step(np.full((2, 10), 0.3, dtype=np.float64))
-        assert done.tolist() == [ends] * 2
+    action = np.full(adapted.action_space.shape or (), 0.3, dtype=np.float32)
+    for step in range(3):
+        last, _, terminated, truncated, _ = single.step(action)
+        observations, rewards, done, infos = adapted.step(np.stack([action, action]))
+        assert done.tolist() == [step == 2] * 2
+    assert rewards.shape == (2,)
     for i in range(2):
+        assert infos[i]["TimeLimit.truncated"] is (truncated and not terminated)
         assert data_equivalence(infos[i]["terminal_observation"], last)
-        # the instance is one and the same, so that a new episode begins as the first one did
-        assert data_equivalence({name: one[i] for name, one in observations.items()}, first)
+        # the instance is the same, so that a new episode begins as the first one did
+        assert data_equivalence(row_of(observations, i), first)
     adapted.close()
-
-
-@pytest.mark.slow
-def test_an_agent_trains_on_a_dict_whose_episodes_are_cut() -> None:
-    sb3 = pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    made = gym.make_vec("posefit/FitState-v0", num_envs=4, image=True, size=(36, 36), max_episode_steps=10)
-    vector = to_sb3_vec_env(made)
-    model = sb3.PPO("MultiInputPolicy", vector, n_steps=32, batch_size=64, n_epochs=1, seed=0, device="cpu")
-    model.learn(200)  # where an episode is cut, PPO asks what its last observation is worth
-    assert model.num_timesteps >= 200
-    vector.close()
 
 
 def test_stable_baselines3_chooses_environments_by_indices() -> None:
@@ -355,13 +349,10 @@ def test_stable_baselines3_chooses_environments_by_indices() -> None:
     adapted.reset()
     spaces = vector.unwrapped.search_spaces  # type: ignore[attr-defined]
     assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
-    for given, wanted in ((None, [0, 1, 2]), (1, [1]), ([2, 0], [2, 0])):
-        chosen = adapted.get_attr("search_spaces", given)
-        assert [space.centre.tolist() for space in chosen] == [spaces[i].centre.tolist() for i in wanted]
-    pictures = vector.render()
-    assert pictures is not None
-    for picture, wanted in zip(adapted.env_method("render"), pictures, strict=True):
-        np.testing.assert_array_equal(picture, wanted)
+    for indices, rows in ((None, [0, 1, 2]), (1, [1]), ([2, 0], [2, 0])):
+        chosen = adapted.get_attr("search_spaces", indices)
+        assert [space.centre.tolist() for space in chosen] == [spaces[row].centre.tolist() for row in rows]
+    np.testing.assert_array_equal(adapted.env_method("render"), np.array(vector.render()))
     adapted.set_attr("note", "common")
     assert adapted.get_attr("note") == ["common"] * 3
     with pytest.raises(error.Error, match=r"indices must be all of the 3 environments, got \[1\]"):
@@ -369,43 +360,19 @@ def test_stable_baselines3_chooses_environments_by_indices() -> None:
     with pytest.raises(error.Error, match=r"indices must be all of the 3 environments, got \[0, 2\]"):
         adapted.env_method("close", indices=[0, 2])
     adapted.close()
-
-
-def test_another_kind_of_vector_environment_is_refused() -> None:
-    pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
     same = gym.make_vec("CartPole-v1", 2, "sync", {"autoreset_mode": AutoresetMode.SAME_STEP})
     with pytest.raises(error.Error, match="autoreset_mode must be NEXT_STEP, got"):
         to_sb3_vec_env(same)
 
 
-def test_the_wrapper_chain_of_cleanrl_accepts_it() -> None:
-    def make() -> Any:
-        env: Any = gym.make("posefit/FitImage-v0", max_evaluations=6)
-        env = wrappers.FlattenObservation(env)
-        env = wrappers.RecordEpisodeStatistics(env)
-        env = wrappers.ClipAction(env)
-        env = wrappers.NormalizeObservation(env)
-        env = wrappers.TransformObservation(env, lambda x: np.clip(x, -10.0, 10.0), env.observation_space)
-        env = wrappers.NormalizeReward(env, gamma=0.99)
-        return wrappers.TransformReward(env, lambda reward: float(np.clip(reward, -10.0, 10.0)))
-
-    vector = gym.vector.SyncVectorEnv([make, make])
-    vector.reset(seed=0)
-    finished = 0
-    for _ in range(20):
-        _, rewards, _, _, infos = vector.step(vector.action_space.sample())
-        assert np.isfinite(rewards).all()
-        finished += int(np.sum(infos.get("_episode", False)))
-    assert finished >= 4
-    native = wrappers.vector.RecordEpisodeStatistics(gym.make_vec("posefit/FitImage-v0", num_envs=2, max_evaluations=6))
-    native.reset(seed=0)
-    assert any("episode" in native.step(native.action_space.sample())[4] for _ in range(10))
+def test_the_statistics_of_vectors_wrap_it() -> None:
+    vector = gym.make_vec("posefit/FitImage-v0", num_envs=2, max_evaluations=6)
+    recorded = wrappers.vector.RecordEpisodeStatistics(vector)
+    recorded.reset(seed=0)
+    assert any("episode" in recorded.step(recorded.action_space.sample())[4] for _ in range(10))
 
 
 def test_the_package_is_light_to_import() -> None:
-    import subprocess
-    import sys
-
     script = "import sys, posefit_envs; print([m for m in ('numba', 'cv2', 'scipy', 'pygame') if m in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
