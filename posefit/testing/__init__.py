@@ -47,7 +47,7 @@ def optimiser_checks(
     """Return the checks of an optimiser's factory; `next_frame` as it is registered."""
     from posefit.testing.optimiser_rules import OptimiserCase, checklist
 
-    return checklist.of(OptimiserCase(factory, next_frame, settings or {}))
+    return checklist.of(OptimiserCase(factory, settings or {}, next_frame))
 
 
 def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:

@@ -1,16 +1,40 @@
 """What the rules of several kinds of plugins share: signatures, settings that make no sense, global randomness."""
 
+import copy
 import inspect
+import pickle
 import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, get_origin
 
 import numpy as np
 
 from posefit.settings import settings_of
-from posefit.testing.results import SkippedError, expect
+from posefit.testing.results import BrokenError, SkippedError, expect
+
+
+@dataclass(frozen=True)
+class PluginCase:
+    """A factory with its settings."""
+
+    factory: Callable[..., Any]
+    settings: dict[str, Any] = field(default_factory=dict)
+
+
+def duplicates(plugin: Any) -> dict[str, Any]:
+    """Return a deep copy of a plugin, and what comes out of its pickle."""
+    made = {}
+    for what, duplicate in (
+        ("a deep copy", copy.deepcopy),
+        ("a pickle", lambda original: pickle.loads(pickle.dumps(original))),
+    ):
+        try:
+            made[what] = duplicate(plugin)
+        except Exception as error:
+            raise BrokenError(f"{what} of it must be possible, got {type(error).__name__}: {error}") from None
+    return made
 
 
 def check_signature(factory: Callable[..., Any], *arguments: str) -> None:
@@ -53,33 +77,19 @@ def check_nonsense(factory: Callable[..., Any], build: Callable[..., Any], *, ha
     return f"refused: {', '.join(refused) or 'none'}"
 
 
-@dataclass
-class GlobalState:
-    """Whether the global random generators were left as they were."""
-
-    unchanged: bool = True
-
-
-@contextmanager
-def global_random_state() -> Iterator[GlobalState]:
-    """Yield a GlobalState that holds after the body."""
-
-    def state() -> tuple[object, ...]:
-        numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002
-        words = numpy_state["state"]
-        return repr(numpy_state["bit_generator"]), words["key"].tobytes(), words["pos"], random.getstate()
-
-    before, result = state(), GlobalState()
-    yield result
-    result.unchanged = state() == before
+def global_random_state() -> tuple[object, ...]:
+    """Return the state of the global random generators, to be compared."""
+    numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002
+    words = numpy_state["state"]
+    return repr(numpy_state["bit_generator"]), words["key"].tobytes(), words["pos"], random.getstate()
 
 
 @contextmanager
 def left_alone() -> Iterator[None]:
     """Check that the body leaves the global random generators as they are."""
-    with global_random_state() as state:
-        yield
-    expect(state.unchanged, "the global random state must stay as it is, got another")
+    before = global_random_state()
+    yield
+    expect(global_random_state() == before, "the global random state must stay as it is, got another")
 
 
 @contextmanager

@@ -1,14 +1,10 @@
 """Is a prior right: shapes, ranges, the same bits for a row whatever stands beside it, and does it learn anything?"""
 
-import copy
-import pickle
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +13,14 @@ from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
-from posefit.testing.common import check_nonsense, check_signature, global_random_state, left_alone
+from posefit.testing.common import (
+    PluginCase,
+    check_nonsense,
+    check_signature,
+    duplicates,
+    global_random_state,
+    left_alone,
+)
 from posefit.testing.problem import walking_angles
 from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
 
@@ -35,12 +38,8 @@ class Fitting:
     random_unchanged: bool
 
 
-@dataclass(frozen=True)
-class PriorCase:
-    """A factory with its settings."""
-
-    factory: Callable[..., Any]
-    settings: dict[str, Any] = field(default_factory=dict)
+class PriorCase(PluginCase):
+    """A prior's factory with its settings."""
 
     @cached_property
     def first(self) -> Fitting:
@@ -48,9 +47,9 @@ class PriorCase:
         prior: Prior = self.factory(**self.settings)
         angles, skeleton = walking_angles(), built_in.average_skeleton()
         before = angles.copy()
-        with global_random_state() as random:
-            returned = prior.fit(angles, skeleton)
-        return Fitting(prior, returned, np.array_equal(angles, before), random.unchanged)
+        random = global_random_state()
+        returned = prior.fit(angles, skeleton)
+        return Fitting(prior, returned, np.array_equal(angles, before), random == global_random_state())
 
     @property
     def fitted(self) -> Prior:
@@ -66,6 +65,12 @@ class PriorCase:
         """Return some latents (ROWS, m) within the range."""
         low, high = np.asarray(prior.low), np.asarray(prior.high)
         return np.random.default_rng(0).uniform(low, high, (ROWS, len(low)))
+
+
+def _check_array(method: str, values: Array, shape: tuple[int, int]) -> None:
+    expect(values.shape == shape, f"{method} must return {shape}, got {values.shape}")
+    expect(values.dtype == np.float64, f"{method} must return float64, got {values.dtype}")
+    expect(np.isfinite(values).all(), f"{method} must return finite values, got nan or infinity")
 
 
 @checklist
@@ -96,10 +101,7 @@ def transform(case: PriorCase) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted
     for rows in (1, 7):
-        latents, wanted = np.asarray(prior.transform(walking_angles()[:rows])), (rows, len(prior.low))
-        expect(latents.shape == wanted, f"transform must return {wanted}, got {latents.shape}")
-        expect(latents.dtype == np.float64, f"transform must return float64, got {latents.dtype}")
-        expect(np.isfinite(latents).all(), "transform must return finite latents, got nan or infinity")
+        _check_array("transform", np.asarray(prior.transform(walking_angles()[:rows])), (rows, len(prior.low)))
 
 
 @checklist
@@ -108,10 +110,7 @@ def inverse(case: PriorCase) -> None:
     prior = case.fitted
     corners = np.where(np.random.default_rng(1).random((64, len(prior.low))) < 0.5, prior.low, prior.high)
     for latents in (corners, case.latents(prior), case.latents(prior)[:1]):
-        angles = np.asarray(prior.inverse_transform(latents))
-        expect(angles.shape == (len(latents), 63), f"inverse_transform must return (n, 63), got {angles.shape}")
-        expect(angles.dtype == np.float64, f"inverse_transform must return float64, got {angles.dtype}")
-        expect(np.isfinite(angles).all(), "inverse_transform must return finite angles, got nan or infinity")
+        _check_array("inverse_transform", np.asarray(prior.inverse_transform(latents)), (len(latents), 63))
 
 
 @checklist
@@ -186,10 +185,9 @@ def copies(case: PriorCase) -> None:
     """A deep copy and what comes out of a pickle are the same space."""
     prior = case.fitted
     latents = case.latents(prior)
-    for twin in (copy.deepcopy(prior), pickle.loads(pickle.dumps(prior))):
-        expect(
-            np.array_equal(twin.inverse_transform(latents), prior.inverse_transform(latents)), "a copy must be the same"
-        )
+    for what, twin in duplicates(prior).items():
+        same = np.array_equal(twin.inverse_transform(latents), prior.inverse_transform(latents))
+        expect(same, f"{what} must be the same space, got another")
 
 
 @checklist
@@ -206,9 +204,8 @@ def file(case: PriorCase) -> None:
         latents = case.latents(prior)
         again = load(path)
         same = np.array_equal(again.inverse_transform(latents), prior.inverse_transform(latents))
-        expect(
-            same and np.array_equal(again.feasible(latents), prior.feasible(latents)), "load must give the same space"
-        )
+        same &= np.array_equal(again.feasible(latents), prior.feasible(latents))
+        expect(same, "load must give the same space, got another")
 
 
 @checklist
@@ -216,12 +213,9 @@ def learns(case: PriorCase) -> str:
     """Training poses come back nearer than their mean is."""
     prior, angles = case.fitted, walking_angles()
     back = prior.inverse_transform(prior.transform(angles))
-    error, mean = np.abs(back - angles).mean(), np.abs(angles.mean(axis=0) - angles).mean()
-    expect(
-        error < 0.9 * mean,
-        f"poses must come back, got {np.degrees(error):.2f} degrees; their mean has {np.degrees(mean):.2f}",
-    )
-    return f"{np.degrees(error):.2f} degrees, the mean pose {np.degrees(mean):.2f}"
+    error, mean = (np.degrees(np.abs(poses - angles).mean()) for poses in (back, angles.mean(axis=0)))
+    expect(error < 0.9 * mean, f"poses must come back, got {error:.2f} degrees; their mean has {mean:.2f}")
+    return f"{error:.2f} degrees, the mean pose {mean:.2f}"
 
 
 @checklist

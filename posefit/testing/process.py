@@ -10,13 +10,13 @@ import faulthandler
 import json
 import os
 import pickle
-import select
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from posefit import testing
@@ -27,8 +27,6 @@ from posefit.testing.results import Check, Report, Result, not_run
 
 GIGABYTES = 4.0  # what a check may need
 OVERRUN_SECONDS = 5.0  # that a check may overrun its limit before its process is ended
-START_SECONDS = 120.0  # until the process has loaded the plugin
-LEAVE_SECONDS = 0.5  # that it has to end by itself
 
 
 def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: Sequence[str] = ()) -> Report:
@@ -36,86 +34,56 @@ def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: S
 
     Raises ValueError where a setting or a check is wrong, or the plugin cannot be loaded.
     """
+    task: dict[str, Any] = {"kind": kind, "name": name, "settings": list(settings), "only": list(only)}
+    task |= {"path": sys.path, "seconds": results.SECONDS, "overrun": OVERRUN_SECONDS}
     done: list[Result] = []
-    wanted, label = None, f"{kind} {name!r}"
-    while wanted is None or wanted:
-        with _process(kind, name, settings, only if wanted is None else wanted) as process:
-            names, label = _converse(process, label, done)
-        wanted = [rule for rule in names if rule not in {result.name for result in done}]
+    while True:
+        messages, end = _messages(task)
+        plugin, last = messages[0] if messages else end, (messages or [end])[-1]
+        if "mistake" in plugin:
+            raise InputError(plugin["mistake"])
+        if "checks" not in plugin:
+            raise InputError(f"{kind} {name!r}: it must load in a process of its own; {_blame(last, end)}")
+        done += [Result(**message) for message in messages if "outcome" in message]
+        if "outcome" not in last:
+            done.append(Result(last.get("begins", plugin["checks"][0]), "failed", _blame(last, end)))
+        wanted = [rule for rule in plugin["checks"] if rule not in {result.name for result in done}]
         while wanted and (skipped := not_run(wanted[0], done)):
             done.append(skipped)
             wanted.pop(0)
-    return Report(label, tuple(done))
+        if not wanted:
+            return Report(plugin["label"], tuple(done))
+        task["only"] = wanted
 
 
-def _converse(process: "subprocess.Popen[bytes]", label: str, done: list[Result]) -> tuple[list[str], str]:
-    """Add the results of one process to `done`; return the checks that it was to run, and the plugin's label."""
-    assert process.stdout is not None
-    names: list[str] | None = None
-    running, limit, rest, late = "", START_SECONDS, b"", False
-    while not late:
-        until = time.monotonic() + limit
-        while b"\n" not in rest:
-            ready, _, _ = select.select([process.stdout], [], [], max(0.0, until - time.monotonic()))
-            more = os.read(process.stdout.fileno(), 65536) if ready else b""
-            late = not ready
-            if not more:
-                break
-            rest += more
-        if b"\n" not in rest:
-            break
-        line, _, rest = rest.partition(b"\n")
-        message: dict[str, Any] = json.loads(line)
-        if "mistake" in message:
-            raise InputError(message["mistake"])
-        if "checks" in message:
-            names, label = message["checks"], message["label"]
-        elif "begins" in message:
-            running, limit = message["begins"], results.SECONDS + OVERRUN_SECONDS
-        elif "name" in message:
-            done.append(Result(**message))
-            running, limit = "", OVERRUN_SECONDS
-        if "ends" in message or not_run("", done):
-            return names or [], label
-    if late:  # the process is made to print where it hangs
-        process.send_signal(signal.SIGABRT)
-        end = f"it must end within {results.SECONDS:g} s, and did not"
-    else:
-        status = process.wait()
-        how = f"exit status {status}" if status >= 0 else signal.Signals(-status).name
-        end = f"it must not end the program, got {how}"
-    if names is None:
-        raise InputError(f"{label}: it must load in a process of its own; {end}")
-    finished = {result.name for result in done}
-    done.append(Result(running or next(name for name in names if name not in finished), "failed", end))
-    return names, label
+def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Return what a process writes that checks a plugin, and how and when it ends; nothing that it starts is left."""
+    with tempfile.TemporaryFile() as written:
+        process = subprocess.Popen(
+            [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=written, start_new_session=True
+        )
+        try:
+            process.communicate(json.dumps(task).encode())
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        written.seek(0)
+        messages = [json.loads(line) for line in written]
+    return messages, {"status": process.returncode, "at": time.monotonic()}
 
 
-@contextmanager
-def _process(kind: Any, name: str, settings: Sequence[str], only: Sequence[str]) -> Iterator["subprocess.Popen[bytes]"]:
-    """Start a process that checks a plugin; afterwards neither it nor what it started is left."""
-    task: dict[str, Any] = {"kind": kind, "name": name, "settings": list(settings), "only": list(only)}
-    task |= {"path": sys.path, "seconds": results.SECONDS}
-    process = subprocess.Popen(
-        [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-    try:
-        process.stdin.write(json.dumps(task).encode())
-        process.stdin.close()
-        yield process
-    finally:
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(LEAVE_SECONDS)
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        process.stdout.close()
+def _blame(last: dict[str, Any], end: dict[str, Any]) -> str:
+    """Return why a process ended after its last message."""
+    if end["at"] - last.get("at", end["at"]) > results.SECONDS:
+        return f"it must end within {results.SECONDS:g} s, and did not"
+    status = end["status"]
+    how = f"exit status {status}" if status >= 0 else signal.Signals(-status).name
+    return f"it must not end the program, got {how}"
 
 
-def _check() -> int:
-    """Check what standard input asks for; return 0."""
+def _check() -> None:
+    """Check what standard input asks for, and end this process."""
     faulthandler.enable()
     out = os.fdopen(_stdout_kept_apart(), "w", encoding="utf-8")
     task = json.load(sys.stdin)
@@ -129,15 +97,17 @@ def _check() -> int:
     try:
         label, checks = _checks(task["kind"], task["name"], task["settings"], task["only"])
     except (ValueError, ImportError) as mistake:
-        send(mistake=str(mistake))
-        return 0
+        return send(mistake=str(mistake))
     send(checks=[check.name for check in checks], label=label)
+    done: list[Result] = []
     with memory(GIGABYTES):
         for check in checks:
-            send(begins=check.name)
-            send(**vars(check.run()))
-    send(ends=True)
-    return 0
+            send(begins=check.name, at=time.monotonic())
+            faulthandler.dump_traceback_later(task["seconds"] + task["overrun"], exit=True)
+            done.append(not_run(check.name, done) or check.run())
+            send(**vars(done[-1]))
+    sys.stdout.flush()
+    os._exit(0)  # whatever the plugin left running
 
 
 def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
@@ -181,4 +151,4 @@ def _stdout_kept_apart() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit((_trace if sys.argv[1:] == ["trace"] else _check)())
+    sys.exit(_trace() if sys.argv[1:] == ["trace"] else _check())

@@ -1,7 +1,7 @@
 """Is a tracker right: a frame for each observation as it comes, whole and honest frames, the same again, no leaks?"""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -16,7 +16,7 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, project
 from posefit.silhouette.mask import Silhouette
-from posefit.testing.common import check_signature, check_unknown_setting, global_random_state, left_alone
+from posefit.testing.common import PluginCase, check_signature, check_unknown_setting, global_random_state, left_alone
 from posefit.testing.problem import SIZE
 from posefit.testing.results import BrokenError, Checklist, expect
 
@@ -52,12 +52,8 @@ class Tracked:
     random_unchanged: bool
 
 
-@dataclass(frozen=True)
-class TrackerCase:
-    """A factory with its settings."""
-
-    factory: Callable[..., Any]
-    settings: dict[str, Any] = field(default_factory=dict)
+class TrackerCase(PluginCase):
+    """A tracker's factory with its settings."""
 
     def build(self) -> Tracker:
         """Return a new tracker of the scene."""
@@ -77,25 +73,18 @@ class TrackerCase:
                 count += 1
                 yield observation
 
-        before = [one.silhouettes[0].mask.copy() for one in observations], task.anchor.copy()
+        before = [np.array(observation.silhouettes[0].mask) for observation in observations], task.anchor.copy()
         audited = AuditedTracker(tracker, task, "the tracker", BETA, audit)
-        with global_random_state() as random:
-            try:
-                for frame in audited.track(stream(), np.random.default_rng(0)):
-                    frames.append(frame)
-                    taken.append(count)
-            except BrokenRuleError as broken:
-                raise BrokenError(str(broken)) from broken.__cause__
-        same = all(
-            np.array_equal(was, one.silhouettes[0].mask) for was, one in zip(before[0], observations, strict=True)
-        )
-        unchanged = same and np.array_equal(before[1], task.anchor)
-        return Tracked(tracker, frames, taken, audit.warnings, unchanged, random.unchanged)
-
-    @property
-    def frames(self) -> list[Frame]:
-        """The frames of the first track."""
-        return self.first.frames
+        random = global_random_state()
+        try:
+            for frame in audited.track(stream(), np.random.default_rng(0)):
+                frames.append(frame)
+                taken.append(count)
+        except BrokenRuleError as broken:
+            raise BrokenError(str(broken)) from broken.__cause__
+        after = [observation.silhouettes[0].mask for observation in observations]
+        unchanged = np.array_equal(before[0], after) and np.array_equal(before[1], task.anchor)
+        return Tracked(tracker, frames, taken, audit.warnings, unchanged, random == global_random_state())
 
 
 @checklist
@@ -108,7 +97,7 @@ def construction(case: TrackerCase) -> None:
 @checklist
 def one_frame_each(case: TrackerCase) -> str:
     """Every observation gives one frame: a pose (66,), a translation (3,), evaluations and seconds."""
-    return f"{len(case.frames)} frames"
+    return f"{len(case.first.frames)} frames"
 
 
 @checklist
@@ -130,7 +119,7 @@ def no_observation(case: TrackerCase) -> None:
 def audit(case: TrackerCase) -> str:
     """Cost and areas of a frame are those of its pose; it counts every pose it draws, and keeps the budget."""
     expect(not case.first.warnings, "; ".join(case.first.warnings))
-    return f"at most {max(frame.evaluations for frame in case.frames)} of {EVALUATIONS} evaluations"
+    return f"at most {max(frame.evaluations for frame in case.first.frames)} of {EVALUATIONS} evaluations"
 
 
 def _poses(frames: list[Frame]) -> Any:
@@ -141,14 +130,14 @@ def _poses(frames: list[Frame]) -> Any:
 def same_seed(case: TrackerCase) -> None:
     """The same seed gives the same poses."""
     again = list(case.build().track(scene()[2], np.random.default_rng(0)))
-    expect(np.array_equal(_poses(case.frames), _poses(again)), "one seed must give one track, got two")
+    expect(np.array_equal(_poses(case.first.frames), _poses(again)), "one seed must give one track, got two")
 
 
 @checklist
 def used_twice(case: TrackerCase) -> None:
     """A tracker that has tracked before does the same again."""
     again = list(case.first.tracker.track(scene()[2], np.random.default_rng(0)))
-    expect(np.array_equal(_poses(case.frames), _poses(again)), "a second track must be as the first, got another")
+    expect(np.array_equal(_poses(case.first.frames), _poses(again)), "a second track must be as the first, got another")
 
 
 @checklist
@@ -169,12 +158,10 @@ def inputs(case: TrackerCase) -> None:
 def follows(case: TrackerCase) -> str:
     """The track is nearer to the truth than a body lying on the floor: its MPJPE is below 400 mm."""
     task, motion, _ = scene()
-    frames = case.frames
+    frames = case.first.frames
     places = np.array([frame.translation for frame in frames])
-    skeleton = task.body.skeleton
-    error = metrics.mpjpe_mm(
-        skeleton.joints(motion.poses, motion.translations), skeleton.joints(_poses(frames), places)
-    ).mean()
+    joints = task.body.skeleton.joints
+    error = metrics.mpjpe_mm(joints(motion.poses, motion.translations), joints(_poses(frames), places)).mean()
     expect(error < 400.0, f"the MPJPE must be below 400 mm, got {error:.0f}")
     return f"MPJPE {error:.0f} mm"
 

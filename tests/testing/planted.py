@@ -137,20 +137,6 @@ class Stubborn(Sound):
         self.population = np.where(self.space.feasible(moved)[:, None], moved, self.population)
 
 
-class NeedsAsk(Sound):
-    """Breaks where it is told something unasked."""
-
-    asked: Any = None
-
-    def ask(self) -> Array:
-        self.asked = {0: 0}
-        return super().ask()
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        self.asked = self.asked.get(0)
-        super().tell(proposals, costs)
-
-
 class KnowsItsRows(Sound):
     """Looks up what it is told among what it asked; it is right, as it gets exactly that population back."""
 
@@ -223,18 +209,6 @@ class AsksForTooMuch(Sound):
         return np.tile(super().ask()[:1], (100_000, 1))
 
 
-class AskChanges(Sound):
-    """A second ask gives nothing, as if the first had used it up."""
-
-    def ask(self) -> Array:
-        given, self.population = self.population, self.population[:0]
-        return given
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        self.population = proposals
-        super().tell(proposals, costs)
-
-
 class OneDimensionFails(Sound):
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
         super().__init__(space, rng)
@@ -305,12 +279,6 @@ class SharesItsGenerator(Sound):
     def tell(self, proposals: Array, costs: Array) -> None:
         self.rng = SharesItsGenerator.generators[self.key]
         super().tell(proposals, costs)
-
-
-class LeavesThreads(Sound):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
-        super().__init__(space, rng)
-        threading.Thread(target=time.sleep, args=(5.0,), daemon=True).start()
 
 
 class IgnoresTheStart(Sound):
@@ -534,8 +502,6 @@ OPTIMISERS: dict[type, tuple[str, ...]] = {
     MixesRows: ("order",),
     Maximises: ("sphere_problem", "real_problem"),
     Stubborn: ("sphere_problem", "real_problem"),
-    NeedsAsk: ("out_of_turn",),
-    AskChanges: ("out_of_turn",),
     OneDimensionFails: ("dimensions",),
     FewDimensionsOnly: ("dimensions",),
     UsesGlobalNumpy: ("global_randomness",),
@@ -546,7 +512,6 @@ OPTIMISERS: dict[type, tuple[str, ...]] = {
     SortsInPlace: ("inputs",),
     HoldsALock: ("copies",),
     SharesItsGenerator: ("copies",),
-    LeavesThreads: ("nothing_left",),
     IgnoresTheStart: ("start",),
     InventsModes: ("modes",),
     BackwardModes: ("modes",),
