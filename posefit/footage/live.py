@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from posefit.footage.images import PIXELS
 from posefit.footage.masks import FPS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.video import Video
 from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
@@ -56,7 +57,8 @@ class Stream:
     def __init__(self, source: str, pipe: BinaryIO | None = None) -> None:
         self.name, self.fps, self.count = source, FPS, 0
         self._latest: LiveImage | None = None
-        self._ended, self._error = False, None
+        self._ended = False
+        self._error: InputError | None = None
         self._changed = threading.Condition()
         frames: Iterator[Image]
         if source == "-":
@@ -186,7 +188,7 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    video = _FirstFrames(Path(stream.name), stream.fps, learned)
+    video = cast(Video, _FirstFrames(Path(stream.name), stream.fps, learned))
     segmentation = Segmentation(video, how, (None, None))
     segmenter = segmentation.learned()
     quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))

@@ -116,7 +116,7 @@ def _scene_of(
         np.array([np.packbits(live.valid) for live in first]),
         np.array([live.usable for live in first]),
     )
-    facing = options.view_degrees[0] if options.view_degrees else None
+    facing = next(iter(options.view["view_degrees"]), None)
     body, view = body_of(options.asf, options.height), CameraView(packed, (), name)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
     scene = combined([view], name, body, known, facing, options.up, fps)
