@@ -481,7 +481,7 @@ def judgement(doubt: Calibration, kept: Kept) -> Judged:
         kept,
         np.exp(logs),
         doubt.sharpness,
-        np.array([doubt.none_right(log) for log in logs]),
+        np.array([doubt.recalibration(log).none for log in logs]),
         kept.track.off[:, None] <= radii,
         radii,
         angles.mean(axis=(0, 2)),
