@@ -31,9 +31,10 @@ from posefit.sweep.check import cell_of
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
-from posefit.uncertainty.calibration import auroc, calibration_error, false_alarms, kept_errors
+from posefit.uncertainty.calibration import calibration_error
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.jobs import Progress, each
+from scores import auroc, false_alarms, kept_errors
 from table import WORKERS, bar, markdown, percent
 
 SALT = 2026  # part of every seed

@@ -33,16 +33,15 @@ from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import (
     LEVELS,
     Recalibration,
-    auroc,
     calibration_error,
     conformal_factor,
     reliability,
 )
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
-from posefit.uncertainty.modes import APART, Posterior, modes_of
-from posefit.uncertainty.sides import nearer_mirrored, second_side
+from posefit.uncertainty.modes import APART, Posterior, modes_of, nearer_mirrored, second_side
 from posefit_exemplars.calibration import Calibration, evidence, none_features
 from posefit_reproduce.jobs import Progress, each
+from scores import auroc
 from table import WORKERS, bar, markdown
 
 FRAMES, QUICK_FRAMES = 50, 12

@@ -24,7 +24,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
-from posefit.uncertainty.sides import second_side
+from posefit.uncertainty.modes import second_side
 from posefit_exemplars.calibration import probability_of
 
 FITTED = Path(__file__).with_name("lost_model.json")  # made by `docs/studies/lost.py --store`

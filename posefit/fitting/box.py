@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.uncertainty.landscape import Box
 from posefit.uncertainty.landscape import displacement as displacement
 from posefit.uncertainty.landscape import wrap as wrap
 
@@ -25,26 +25,12 @@ class Start:
     velocity: Array  # (d,) v_pred
 
 
-class Space(Protocol):
+class Space(Box, Protocol):
     """The box [-1, 1]^d, part of which is feasible: all that an optimiser knows of it. `SearchSpace` is one."""
-
-    @property
-    def dimensions(self) -> int:
-        """d."""
-        ...
 
     @property
     def start(self) -> Start | None:
         """Where to start; None for anywhere."""
-        ...
-
-    @property
-    def periodic(self) -> NDArray[np.bool_]:
-        """Which coordinates wrap around (d,)."""
-        ...
-
-    def feasible(self, proposals: Array) -> NDArray[np.bool_]:
-        """Return which proposals (n, d) lie in the box and are allowed (n,)."""
         ...
 
 

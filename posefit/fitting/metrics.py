@@ -7,7 +7,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, joint_distances
-from posefit.uncertainty.sides import nearer_mirrored
+from posefit.uncertainty.modes import nearer_mirrored
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 

@@ -18,7 +18,7 @@ from posefit.tracking.measures import Measures, Spread
 from posefit.tracking.trajectory import motion_of
 from posefit.uncertainty.calibration import LEVELS
 from posefit.uncertainty.intervals import joint_intervals
-from posefit.uncertainty.sides import unknown_sides
+from posefit.uncertainty.modes import unknown_sides
 
 MAX_FULL_SIZE_POSES = 8_000  # training poses, more than which are not all drawn at full size in every frame
 SMALL_STRIDE = 4  # of so many poses each is drawn in a small picture

@@ -10,13 +10,12 @@ A silhouette seldom determines one pose. What it leaves open is a `Posterior`: w
     joints = joint_intervals(skeleton, posterior, pose)    # metres about the joints of a pose (66,)
     print(joints.radii[1])                                 # that hold each joint in 80 of 100 cases
 
-| looking for | field's term | file |
+| subject | field's term | file |
 |---|---|---|
-| weighted poses, clustered by their joints | modes, clustering | modes.py |
-| how far joints and angles may be off | credible intervals, of a mixture | intervals.py |
-| whether left and right are known | mirror ambiguity | sides.py |
+| weighted poses, clustered by their joints; exchanged sides | modes, clustering, mirror ambiguity | modes.py |
+| errors of joints and angles | credible intervals, of a mixture | intervals.py |
 | modes with weights from several searches of any optimiser | multimodal optimisation | searches.py |
-| which proposals lie in one valley of the cost | hill-valley clustering, niching | hill_valley.py |
-| how much of the box each valley holds | tempered sequential Monte Carlo, waste-free | smc.py, mixture.py, kernels.py |
-| whether probabilities and intervals are calibrated | conformal prediction, coverage, ECE, AUROC | calibration.py |
+| proposals in one valley of the cost | hill-valley clustering, niching | hill_valley.py |
+| the share of each valley | tempered sequential Monte Carlo, waste-free | smc.py, landscape.py, kernels.py |
+| calibrated probabilities and intervals | conformal prediction, coverage, ECE | calibration.py |
 """

@@ -1,9 +1,9 @@
 """Which proposals lie in one valley of the cost: hill-valley clustering.
 
-R. K. Ursem, Multinational evolutionary algorithms, CEC 1999, has the test: two points are of different valleys where
-a point between them costs more than both. S. C. Maree, T. Alderliesten, D. Thierens, P. A. N. Bosman, Real-valued
-evolutionary multi-modal optimization driven by hill-valley clustering, GECCO 2018, makes clusters of it. They test one
-pair after the other; here all pairs are tested in one call, as a population is cheaper to evaluate than its parts.
+R. K. Ursem, Multinational evolutionary algorithms, CEC 1999: two points are in different valleys where a point between
+them costs more than both. S. C. Maree, T. Alderliesten, D. Thierens, P. A. N. Bosman, Real-valued evolutionary
+multi-modal optimization driven by hill-valley clustering, GECCO 2018: clusters by that test, here of all pairs in one
+call.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Valleys:
 
 
 def edge_length(dimensions: int, count: int) -> float:
-    """Return how far neighbours lie apart where so many proposals are spread evenly over the box [-1, 1]^d."""
+    """Return the distance of neighbours among `count` proposals spread evenly over the box [-1, 1]^d."""
     return float(2.0 * count ** (-1.0 / dimensions))  # MAREE2018 (edge length)
 
 
@@ -37,10 +37,10 @@ def same_valley(
     probes: NDArray[np.int64],
     tolerance: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Return which pairs (p, 2) of proposals (n, d) lie in one valley (p,): no hill stands between them.
+    """Return which pairs (p, 2) of proposals (n, d) lie in one valley (p,): there is no hill between them.
 
-    So many `probes` (p,) are spaced evenly on the way between two, the short way round where a coordinate is periodic.
-    A hill costs more than both by more than `tolerance`, and what is not feasible is one. All are evaluated at once.
+    The `probes` (p,) are spaced evenly between the two, the short way round where a coordinate is periodic. A hill
+    costs more than both by more than `tolerance`, or is infeasible. All are evaluated at once.
     """
     origins, ways = proposals[pairs[:, 0]], displacement(landscape.box, proposals[pairs[:, 0]], proposals[pairs[:, 1]])
     owner = np.repeat(np.arange(len(pairs)), probes)
@@ -55,10 +55,9 @@ def same_valley(
 def valleys(landscape: Landscape, proposals: Array, costs: Array, *, tolerance: float = 0.0, least: int = 1) -> Valleys:
     """Return the valleys of proposals (n, d) whose costs (n,) are known.
 
-    Each one, the best first, joins the valley of the nearest among those that are better, unless a hill stands between
-    them; then that of the next nearest, of d + 1 at most. One that joins none begins a valley. A pair is probed `least`
-    times (1 in the source) and once more for every edge length between them. Raises ValueError where a cost is not
-    finite.
+    Each, the best first, joins the valley of the nearest better one unless there is a hill between them; then that of
+    the next nearest, of d + 1 at most. One that joins none begins a valley. A pair is probed `least` times (1 in the
+    source) and once more for every edge length between them. Raises ValueError where a cost is not finite.
     """
     if not np.isfinite(costs).all():
         raise InputError(f"costs must be finite, got {costs[~np.isfinite(costs)][0]}")
@@ -72,7 +71,7 @@ def valleys(landscape: Landscape, proposals: Array, costs: Array, *, tolerance: 
         tried: set[int] = set()
         for k in range(first[place], first[place + 1]):
             valley = int(labels[pairs[k, 1]])
-            if valley in tried:  # a hill stood before another proposal of it
+            if valley in tried:  # there is a hill before another of its proposals
                 continue
             if joined[k]:
                 labels[row] = valley

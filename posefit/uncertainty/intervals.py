@@ -12,14 +12,14 @@ from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.modes import Posterior
 
 HALVINGS = 12  # of where a radius may be: to a quarter of a thousandth of the widest
-NARROWEST = 1e-6  # metres or radians: the least that every pose is blurred by
-FARTHEST = 6.0  # spreads, beyond which nothing is looked for
-CLOSE = 1e-3  # spreads: what is nearer to the middle is as if it were so far off, where a difference of two is divided
+NARROWEST = 1e-6  # metres or radians: the least error of every pose
+FARTHEST = 6.0  # spreads: the widest radius searched
+CLOSE = 1e-3  # spreads: the least distance that a difference is divided by
 
 
 @dataclass(frozen=True, eq=False)
 class JointIntervals:
-    """Where joints are, relative to the root, and how sure that is. Metres."""
+    """Joints relative to the root, and their intervals. Metres."""
 
     mean: Array = field(repr=False)  # (27, 3)
     covariance: Array = field(repr=False)  # (27, 3, 3)
@@ -28,18 +28,18 @@ class JointIntervals:
 
 @dataclass(frozen=True, eq=False)
 class AngleIntervals:
-    """What angles are, and how sure that is. Radians."""
+    """Angles and their intervals. Radians."""
 
     mean: Array = field(repr=False)  # (66,) circular
     halves: Array = field(repr=False)  # (levels, 66): to either side of the reported angles
 
 
 def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> JointIntervals:
-    """Return where joints are, by weighted poses, and the balls about those of a `pose` (66,) that hold them.
+    """Return the joints of weighted poses, and the balls about those of a `pose` (66,) that hold them.
 
-    A ball's radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a pose drawn by weight and
-    blurred by a normal error along each axis: where two modes are likely, the wider balls reach from one to the other.
-    Then it is multiplied by its factor. The posterior's recalibration has spreads and factors.
+    A ball's radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a pose drawn by weight, with
+    a normal error along each axis, times a factor; the posterior's recalibration has both. Where two modes are likely,
+    the wider balls reach from one to the other.
     """
     model = posterior.recalibration or Recalibration()
     joints, centre = skeleton.joints(posterior.poses), skeleton.joints(pose)
@@ -52,9 +52,9 @@ def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> Jo
 
 
 def angle_intervals(posterior: Posterior, pose: Array) -> AngleIntervals:
-    """Return the circular means of angles, and how far to either side of those of a `pose` (66,) the true ones are.
+    """Return the circular means of angles, and their intervals to either side of those of a `pose` (66,).
 
-    As for joints, but that an interval is never more than half a turn to either side.
+    As for joints, but an interval is never more than half a turn to either side.
     """
     model = posterior.recalibration or Recalibration()
     turns = np.einsum("k,ka->a", posterior.weights, np.exp(1j * posterior.poses))

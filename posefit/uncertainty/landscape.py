@@ -1,4 +1,4 @@
-"""A box and the costs in it, as far as samplers need to know of them: what is not feasible costs infinitely much."""
+"""A box and the costs in it; an infeasible proposal costs infinitely much."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from posefit.arrays import Array
 
 
 class Box(Protocol):
-    """The box [-1, 1]^d, of which some is feasible: what `posefit.Space` is, and less."""
+    """The box [-1, 1]^d, part of which is feasible."""
 
     @property
     def dimensions(self) -> int:
@@ -42,14 +42,14 @@ def displacement(box: Box, origin: Array, target: Array) -> Array:
 
 @dataclass(eq=False)
 class Landscape:
-    """The costs of a box's proposals, and how many of them were asked for."""
+    """The costs of a box's proposals, with the number of evaluations."""
 
     box: Box
     evaluate: Callable[[Array], Array]  # costs (n,) of feasible proposals (n, d)
     evaluations: int = 0
 
     def costs(self, proposals: Array) -> Array:
-        """Return the costs (n,) of proposals (n, d): infinite where one is not feasible, or its cost no number."""
+        """Return the costs (n,) of proposals (n, d): infinite where one is infeasible, or its cost is nan."""
         feasible = self.box.feasible(proposals)
         costs = np.full(len(proposals), np.inf)
         if feasible.any():

@@ -1,4 +1,4 @@
-"""Weighted poses of a frame, and the few of them that are really different: the modes."""
+"""Weighted poses of a frame, their modes, and how likely it is that left and right are exchanged."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
-from posefit.geometry.skeleton import ANGLES, Skeleton, joint_distances
+from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR, SIDES, Skeleton, joint_distances, root_centred
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.kernels import mean_distances
 
-# ours: metres, the mean over joints, beyond which two poses are of two modes; a mirrored stride is 0.15 to 0.2 off
+# ours: metres, the mean over joints, beyond which poses are of different modes; a mirrored stride is 0.15 to 0.2 off
 APART = 0.1
 DIGITS = 6  # of radians, metres and weights in a file
 ARRAYS = ("poses", "translations", "weights")
@@ -21,7 +21,7 @@ ARRAYS = ("poses", "translations", "weights")
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """A pose that a frame may show, and how likely that is."""
+    """A possible pose of a frame, with its probability."""
 
     weight: float
     pose: Array = field(repr=False)  # (66,)
@@ -30,7 +30,7 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class TrackMode:
-    """A track that all frames may show, and how likely that is."""
+    """A possible track of all frames, with its probability."""
 
     weight: float
     poses: Array = field(repr=False)  # (T, 66)
@@ -39,9 +39,9 @@ class TrackMode:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """The poses that one frame may show, each with its weight; weights are divided by their sum.
+    """The possible poses of one frame, each with its weight; weights are divided by their sum.
 
-    Where it is `coherent`, row k of each frame is of one and the same track that may be the true one.
+    Where it is `coherent`, row k of all frames is one possible track.
     """
 
     poses: Array = field(repr=False)  # (K, 66)
@@ -64,7 +64,7 @@ class Posterior:
         total, least = float(self.weights.sum()), float(self.weights.min())
         if least < 0.0 or not total > 0.0:
             raise InputError(
-                f"weights of a posterior must be 0 or more, not all 0, got {least:g} or more, sum {total:g}"
+                f"weights of a posterior must be 0 or more, with a sum above 0, got {least:g}, sum {total:g}"
             )
         object.__setattr__(self, "weights", self.weights / total)
 
@@ -73,27 +73,26 @@ class Posterior:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it, to a millionth."""
-        held: dict[str, Any] = {name: getattr(self, name).round(DIGITS).tolist() for name in ARRAYS}
-        learned = None if self.recalibration is None else self.recalibration.as_dict()
-        return {**held, "coherent": self.coherent, "recalibration": learned}
+        arrays = {name: getattr(self, name).round(DIGITS).tolist() for name in ARRAYS}
+        corrections = None if self.recalibration is None else self.recalibration.as_dict()
+        return {**arrays, "coherent": self.coherent, "recalibration": corrections}
 
     @classmethod
-    def from_dict(cls, held: Mapping[str, Any]) -> Self:
-        """Return what `as_dict` gave."""
-        learned = None if held["recalibration"] is None else Recalibration(**held["recalibration"])
-        poses, translations, weights = (np.array(held[name]) for name in ARRAYS)
-        return cls(poses, translations, weights, held["coherent"], learned)
+    def from_dict(cls, stored: Mapping[str, Any]) -> Self:
+        """Return the posterior that `as_dict` gave."""
+        corrections = None if stored["recalibration"] is None else Recalibration(**stored["recalibration"])
+        return cls(*(np.array(stored[name]) for name in ARRAYS), stored["coherent"], corrections)
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
-    """Return what a frame may show, the likeliest first: similar poses are one mode.
+    """Return the modes of a frame, the likeliest first: similar poses are one mode.
 
-    Poses are similar where their joints are at most `apart` metres from each other, the mean over joints, both roots at
-    one point. The pose of a mode is that of its medoid, a pose that is possible; a mean might not be.
-    Weights are shares of the poses' weight, raised to the sharpness of the posterior's recalibration; they sum to 1,
-    less its probability that the truth is like none of them.
+    Poses are similar where they are at most `apart` metres from each other, see `poses_apart`. The pose of a mode is
+    its medoid; a mean might be no possible pose. Weights are shares of the poses' weight, raised to the sharpness of
+    the posterior's recalibration; they sum to 1, less its probability that no mode is right.
     """
-    clusters = _clusters(_distances(skeleton.joints(posterior.poses)), posterior.weights, apart)
+    distances = mean_distances(writeable(skeleton.joints(posterior.poses)))
+    clusters = _clusters(distances, posterior.weights, apart)
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
         share = (1.0 - posterior.recalibration.none) / sum(powers)
@@ -102,63 +101,54 @@ def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> 
 
 
 def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
-    """Return the likeliest mode that a pose (66,) is not of; None where there is none whose weight is above that.
-
-    A pose is of the mode that it is nearest to.
-    """
+    """Return the likeliest mode but the one nearest to a pose (66,); None where no weight is above `above`."""
     if len(modes) < 2:
         return None
-    mine = _nearest(skeleton, modes, skeleton.joints(pose))[0]
-    rest = [mode for k, mode in enumerate(modes) if k != mine]
-    other = max(rest, key=lambda mode: mode.weight)
+    nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
+    other = max((mode for k, mode in enumerate(modes) if k != nearest), key=lambda mode: mode.weight)
     return other if other.weight > above else None
 
 
 def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART) -> bool:
-    """Return whether true joints (27, 3) are those of the likeliest mode: nearest to it of all, and similar.
-
-    Similar as in `modes_of`: at most `apart` metres from each other, the mean over joints.
-    """
+    """Return whether true joints (27, 3) are nearest to the likeliest mode, and at most `apart` metres from it."""
     nearest, off = _nearest(skeleton, modes, joints)
     return nearest == max(range(len(modes)), key=lambda k: modes[k].weight) and off <= apart
 
 
 def _nearest(skeleton: Skeleton, modes: Sequence[Mode], joints: Array) -> tuple[int, float]:
-    """Return which mode joints (27, 3) are nearest to, and how far off, metres, both roots at one point."""
-    each = skeleton.joints(np.array([mode.pose for mode in modes]))
-    off = joint_distances(each, joints).mean(axis=-1)
-    return int(off.argmin()), float(off.min())
+    """Return the nearest mode to joints (27, 3), and how far it is away, in metres."""
+    centres = skeleton.joints(np.array([mode.pose for mode in modes]))
+    distances = joint_distances(centres, joints).mean(axis=-1)
+    return int(distances.argmin()), float(distances.min())
+
+
+def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
+    """Return the distances (n, K), metres, of poses (n, 66) from others (K, 66): the mean over joints, root-centred."""
+    joints, targets = skeleton.joints(poses), skeleton.joints(others)
+    distances = [joint_distances(each, targets).mean(axis=-1) for each in joints]
+    return np.array(distances).reshape(len(poses), len(others))
 
 
 def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: float = APART) -> list[TrackMode]:
-    """Return the tracks that a clip may show, the likeliest first, given what each of its frames may show.
+    """Return the possible tracks of a clip, the likeliest first, by the posteriors of its frames.
 
     Tracks are similar as poses are in `modes_of`, by the mean over frames. Raises ValueError where rows are no tracks.
     """
-    if not posteriors or any(not one.coherent or len(one) != len(posteriors[0]) for one in posteriors):
+    if not posteriors or any(not frame.coherent or len(frame) != len(posteriors[0]) for frame in posteriors):
         raise InputError("posteriors must be coherent, of one length and at least one, to be tracks")
-    distances = np.mean([_distances(skeleton.joints(one.poses)) for one in posteriors], axis=0)
-    weights = np.mean([one.weights for one in posteriors], axis=0)
-    return [
-        TrackMode(
-            weight,
-            np.array([one.poses[row] for one in posteriors]),
-            np.array([one.translations[row] for one in posteriors]),
-        )
-        for weight, row in _clusters(distances, weights, apart)
-    ]
-
-
-def _distances(joints: Array) -> Array:
-    """Return how far joints (K, 27, 3) are from each other (K, K), metres, the mean over joints."""
-    return np.asarray(mean_distances(writeable(joints)))
+    distances = np.mean([mean_distances(writeable(skeleton.joints(frame.poses))) for frame in posteriors], axis=0)
+    weights = np.mean([frame.weights for frame in posteriors], axis=0)
+    poses = np.array([frame.poses for frame in posteriors])
+    translations = np.array([frame.translations for frame in posteriors])
+    clusters = _clusters(distances, weights, apart)
+    return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row in clusters]
 
 
 def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[float, int]]:
     """Return the weight and the medoid of each cluster, the heaviest first.
 
-    A centre is the row that has most weight about it among those that no earlier centre is near; then every row goes
-    to its nearest centre.
+    A centre is the row with the greatest weight near it among those that are near no earlier centre; then every row
+    joins its nearest centre.
     """
     near = distances <= apart
     left = weights > 0.0
@@ -168,12 +158,40 @@ def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[floa
         centres.append(int(about.argmax()))
         left &= ~near[centres[-1]]
     owners = distances[:, centres].argmin(axis=1)
-    members = [owners == k for k in range(len(centres))]
-    clusters = [(float(weights[rows].sum()), _medoid(distances, weights, rows)) for rows in members]
+    clusters = []
+    for k in range(len(centres)):
+        rows = np.flatnonzero(owners == k)
+        medoid = int(rows[(distances[np.ix_(rows, rows)] @ weights[rows]).argmin()])
+        clusters.append((float(weights[rows].sum()), medoid))
     return sorted(clusters, key=lambda cluster: -cluster[0])
 
 
-def _medoid(distances: Array, weights: Array, members: NDArray[np.bool_]) -> int:
-    """Return which of the members of a cluster (K,) is nearest to them all."""
-    rows = np.flatnonzero(members)
-    return int(rows[(distances[np.ix_(rows, rows)] @ weights[rows]).argmin()])
+_LEFT_HIP, _RIGHT_HIP = JOINTS.index("lhipjoint"), JOINTS.index("rhipjoint")
+_PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
+
+
+def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
+    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15.
+
+    The mirror is the plane through the root between the hips; left and right are exchanged. Roots are at one point, and
+    only joints that have a counterpart count.
+    """
+    targets, joints = root_centred(targets), root_centred(joints)
+    across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+    mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
+    named = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(axis=1)
+    traded = np.linalg.norm(targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1).mean(axis=1)
+    return np.asarray(traded < named)
+
+
+def second_side(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:
+    """Return the probability that left and right of a pose (66,) are exchanged: the weight of poses nearer to it so."""
+    reported = np.repeat(skeleton.joints(pose)[None], len(posterior), axis=0)
+    return float(posterior.weights @ nearer_mirrored(skeleton.joints(posterior.poses), reported))
+
+
+def unknown_sides(skeleton: Skeleton, posterior: Posterior, pose: Array) -> bool:
+    """Return whether left and right of a pose (66,) are unknown: the other way round is too likely."""
+    model = posterior.recalibration or Recalibration()
+    return second_side(skeleton, posterior, pose) >= model.second_side

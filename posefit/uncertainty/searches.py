@@ -1,8 +1,7 @@
-"""Several searches of one problem become modes with weights, whatever optimiser they are made by.
+"""Modes with weights from several searches of one problem, by any optimiser.
 
-Hill-valley clustering sorts what they evaluated into valleys, and a tempered sampler that starts there estimates how
-much of exp(-cost / temperature) each valley holds: a deep one may be narrow, and weigh less than a shallow one that is
-wide.
+Hill-valley clustering sorts their proposals into valleys, and a tempered sampler that starts there estimates the share
+of exp(-cost / temperature) in each: a deep valley may be narrow, and weigh less than a shallow and wide one.
 """
 
 from collections.abc import Sequence
@@ -15,20 +14,19 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.uncertainty.hill_valley import valleys
 from posefit.uncertainty.landscape import Box, Landscape, displacement
-from posefit.uncertainty.mixture import WIDEST, NormalMixture
-from posefit.uncertainty.smc import reweighed, systematic_rows, tempered
+from posefit.uncertainty.smc import WIDEST, NormalMixture, reweighed, systematic_rows, tempered
 
-EACH = 8  # ours: of each search, so many of its best proposals are sorted into valleys, at most
-TOUCHED = 12.0  # ours: evaluations for each pair of them that is; of a budget, no more than about one in eight
-PROBES = 2  # ours: of a pair, at the least, as these valleys may be narrow
-MOST = 16  # ours: valleys that the sampler starts in, the deepest
-REACH = 20.0  # ours: in temperatures above the least cost: what is not as deep weighs nothing worth a start
+MAX_OF_SEARCH = 8  # ours: proposals of each search, its best, that are sorted into valleys
+PAIR_EVALUATIONS = 12.0  # ours: for each pair of them, so that they take about one in eight of a budget at most
+PROBES = 2  # ours: of a pair at least, as valleys may be narrow
+MAX_VALLEYS = 16  # ours: the deepest, in which the sampler starts
+REACH = 20.0  # ours: temperatures above the least cost: a shallower valley has no weight
 BROAD = 0.3  # ours: the share of particles that start anywhere
-NARROWEST = 2.0**-7  # ours: how narrow a valley may be, in half-ranges of the box
+NARROWEST = 2.0**-7  # ours: half-ranges of the box: the least width of a valley
 ENOUGH = 3  # ours: proposals a coordinate from which a valley's own width is estimated
-LOOKED_AT = 300  # ours: of those, about so many, evenly over the searches
-RIDGE = 1e-3  # of how fast costs rise, as a share of what is known of them
-WIDER = np.array([1.0, 3.0])  # ours: particles start as wide, and wider, as coordinates may change together
+WIDTH_SAMPLE = 300  # ours: proposals from which widths are estimated, evenly over the searches
+RIDGE = 1e-3  # of the slopes of costs, as a share of their scale
+WIDER = np.array([1.0, 3.0])  # ours: factors on the widths of the start, as coordinates may change together
 EVALUATIONS = 10_000  # ours
 CHAIN = 3  # P, ours: each survivor becomes so many particles
 ROUNDS = 1  # ours: of moves, that a budget holds
@@ -38,7 +36,7 @@ Searched = tuple[Array, Array]  # all that one search evaluated: proposals (n, d
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """Weighted proposals of one problem, and the modes that they belong to."""
+    """Weighted proposals of one problem, and their modes."""
 
     proposals: Array  # (n, d)
     weights: Array  # (n,), which sum to 1
@@ -49,7 +47,7 @@ class Weighed:
     evaluations: int  # beyond those of the searches
 
     def even(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Return proposals (count, d) of equal weights (count,): each mode has its share, as nearly as it goes."""
+        """Return proposals (count, d) of equal weights (count,): each mode has its share, rounded up or down."""
         order = np.lexsort([self.costs, self.groups])
         rows = order[systematic_rows(self.weights[order], rng.random(), count)]
         return self.proposals[rows], np.full(count, 1.0 / count)
@@ -63,36 +61,27 @@ def weighed(
     *,
     evaluations: int = EVALUATIONS,
 ) -> Weighed:
-    """Return weighted proposals of the density exp(-cost / temperature), from what several searches evaluated.
+    """Return weighted proposals of the density exp(-cost / temperature), from the evaluations of several searches.
 
-    Hills lower than a `temperature` part no valleys: pixels cause many meaningless ones.
-    It takes about so many `evaluations` more. Raises ValueError where no search has met a finite cost.
+    Hills lower than a `temperature` separate no valleys: pixels cause many meaningless ones. It takes about
+    `evaluations` more. Raises ValueError where no search has a finite cost.
     """
     before = landscape.evaluations
-    proposals, costs = best_of_each(landscape, searched, _each(evaluations, len(searched)))
+    each = min(max(int(np.sqrt(evaluations / PAIR_EVALUATIONS) / len(searched)), 1), MAX_OF_SEARCH)
+    proposals, costs = best_of_each(landscape, searched, each)
     clusters = valleys(landscape, proposals, costs, tolerance=temperature, least=PROBES)
-    lowest = clusters.lowest[costs[clusters.lowest] <= costs.min() + REACH * temperature][:MOST]
+    lowest = clusters.lowest[costs[clusters.lowest] <= costs.min() + REACH * temperature][:MAX_VALLEYS]
     modes = proposals[lowest]
-    spreads = WIDER[:, None, None] * widths(landscape.box, searched, modes, costs[lowest], temperature)
-    centres = np.broadcast_to(modes, spreads.shape)
-    start = NormalMixture(_rows(centres), np.minimum(_rows(spreads), WIDEST), BROAD)
+    valley_widths = widths(landscape.box, searched, modes, costs[lowest], temperature)
+    spreads = np.concatenate([np.minimum(factor * valley_widths, WIDEST) for factor in WIDER])
+    start = NormalMixture(np.tile(modes, (len(WIDER), 1)), spreads, BROAD)
     left = max(evaluations - (landscape.evaluations - before), 0)
     particles = max(int(left / (CHAIN + ROUNDS * (CHAIN - 1))), 2) * CHAIN
     sample = tempered(landscape, start, temperature, rng, particles=particles, chain=CHAIN, evaluations=left)
     groups = start.nearest(landscape.box, sample.proposals) % len(modes)
     shares: Array = np.bincount(groups, sample.weights, len(modes)).astype(np.float64)
-    spent = landscape.evaluations - before
-    return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, shares, spent)
-
-
-def _each(evaluations: int, searches: int) -> int:
-    """Return how many of the best proposals of each search are sorted into valleys."""
-    return min(max(int(np.sqrt(evaluations / TOUCHED) / searches), 1), EACH)
-
-
-def _rows(several: Array) -> Array:
-    """Return what has the shape (s, k, d) as (s k, d)."""
-    return several.reshape(-1, several.shape[-1])
+    used = landscape.evaluations - before
+    return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, shares, used)
 
 
 def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) -> Searched:
@@ -100,22 +89,19 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
 
     Raises ValueError where none of them has a finite cost.
     """
-    chosen, known = [], []
+    chosen, chosen_costs = [], []
     for proposals, costs in searched:
         order = np.flatnonzero(np.isfinite(costs))
         if len(order) > 4 * each:
             order = order[costs[order] <= np.partition(costs[order], 4 * each)[4 * each]]
         order = order[np.argsort(costs[order], kind="stable")][: 4 * each]
         order = order[landscape.box.feasible(proposals[order])] if len(order) else order
-        different: dict[bytes, int] = {}
-        for row in order.tolist():
-            different.setdefault(proposals[row].tobytes(), row)
-        rows = np.array(list(different.values())[:each], dtype=np.int64)
-        chosen.append(proposals[rows])
-        known.append(costs[rows])
-    if not sum(map(len, known)):
-        raise InputError(f"searches must meet a finite cost, got none in {len(searched)} searches")
-    return np.concatenate(chosen), np.concatenate(known)
+        order = order[np.sort(np.unique(proposals[order], axis=0, return_index=True)[1])[:each]]
+        chosen.append(proposals[order])
+        chosen_costs.append(costs[order])
+    if not sum(map(len, chosen)):
+        raise InputError(f"searches must have a finite cost, got none in {len(searched)} searches")
+    return np.concatenate(chosen), np.concatenate(chosen_costs)
 
 
 def boltzmann_weights(costs: Array, temperature: float) -> Array:
@@ -127,15 +113,14 @@ def boltzmann_weights(costs: Array, temperature: float) -> Array:
 
 
 def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, temperature: float) -> Array:
-    """Return how wide each mode (k, d) is along each coordinate (k, d), in half-ranges of the box.
+    """Return the widths (k, d) of modes (k, d) along each coordinate, in half-ranges of the box.
 
-    That is the standard deviation of exp(-cost / temperature) where the cost rises from the mode as a sum of squares:
-    those sums are fitted, by least squares, to the costs of what was evaluated nearest to the mode, and where that is
-    little, of all.
+    A width is the standard deviation of exp(-cost / temperature) where the cost rises from the mode as a sum of
+    squares, fitted by least squares to the proposals nearest to the mode, or where those are few, to all.
     """
     proposals, known = (np.concatenate(part) for part in zip(*searched, strict=True))
     usable = np.flatnonzero(known <= costs.min() + REACH * temperature)
-    usable = usable[:: max(len(usable) // LOOKED_AT, 1)]
+    usable = usable[:: max(len(usable) // WIDTH_SAMPLE, 1)]
     proposals, known = proposals[usable], known[usable]
     away = np.array([displacement(box, mode, proposals) ** 2 for mode in modes])  # (k, n, d)
     owners = away.sum(axis=2).argmin(axis=0)
@@ -149,7 +134,7 @@ def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, t
 
 
 def _width(squares: Array, rises: Array, temperature: float) -> Array:
-    """Return the standard deviations (d,) that go with costs that rise (n,) over squared distances (n, d)."""
+    """Return the standard deviations (d,) for costs that rise (n,) over squared distances (n, d)."""
     gram = squares.T @ squares
     gram += (RIDGE * np.trace(gram) / len(gram) + np.finfo(float).tiny) * np.eye(len(gram))
     slopes = np.linalg.solve(gram, squares.T @ rises)

@@ -4,35 +4,112 @@ H.-D. Dau, N. Chopin, Waste-free sequential Monte Carlo, Journal of the Royal St
 Constants of our own are marked.
 """
 
+import math
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
-from posefit.uncertainty.kernels import accept_moves, covariance_within, effective, longest_step, random_walk
-from posefit.uncertainty.landscape import Landscape
-from posefit.uncertainty.mixture import NormalMixture
+from posefit.uncertainty import kernels
+from posefit.uncertainty.landscape import Box, Landscape, wrap
 
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
 SURVIVAL = 0.5  # alpha: the share of the particles that the next temperature leaves
 HALVINGS = 24  # ours: bisection steps, to a ten millionth of what is left
-WANTED = 0.234  # ours: the share of moves that is to be accepted, as is best for long random walks
+ACCEPTANCE = 0.234  # ours: the share of accepted moves that is aimed at, best for long random walks
 STEPS = 500  # ours: temperatures, at most
+REDRAWS = 100  # Interpretation S7
+SPARE = 8  # ours: proposals that are drawn beyond those that are expected to be enough
+WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest images to nine digits
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMixture:
+    """The start of a sampler: normal distributions around `centres`, cut off at the box, and a uniform share `broad`.
+
+    They wrap around where a coordinate is periodic. Without centres all is uniform.
+    """
+
+    centres: Array  # (k, d)
+    spreads: Array  # (k, d) standard deviations, at most 0.5
+    broad: float  # between 0 and 1; 1 without centres
+
+    @classmethod
+    def anywhere(cls, dimensions: int) -> Self:
+        """Return the uniform distribution over the box."""
+        return cls(np.empty((0, dimensions)), np.empty((0, dimensions)), 1.0)
+
+    def __post_init__(self) -> None:
+        for name in ("centres", "spreads"):
+            object.__setattr__(self, name, writeable(getattr(self, name)))
+        if not ((self.spreads > 0.0) & (self.spreads <= WIDEST)).all():
+            raise InputError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
+
+    def draw(self, box: Box, rng: np.random.Generator, count: int) -> tuple[Array, float]:
+        """Return feasible proposals (count, d), and the share of all draws that was feasible.
+
+        Where 100 attempts give too few, those are repeated. Raises ValueError where they give none.
+        """
+        accepted, tried, total, more = list[Array](), 0, 0, count
+        for _ in range(REDRAWS):
+            drawn = self._drawn(box, rng, more)
+            accepted.append(drawn[box.feasible(drawn)])
+            tried, total = tried + more, total + len(accepted[-1])
+            if total >= count:
+                break
+            more = min(count, (count - total) * tried // max(total, 1) + SPARE)
+        if not total:
+            raise InputError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
+        drawn = np.concatenate(accepted)
+        return (drawn if total >= count else drawn[rng.integers(0, total, count)])[:count], total / tried
+
+    def log_density(self, box: Box, proposals: Array) -> Array:
+        """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""
+        if not len(self.centres):
+            return np.zeros(len(proposals))
+        each = math.log((1.0 - self.broad) / len(self.centres))
+        return np.asarray(kernels.log_sums(self._log_parts(box, proposals), each, math.log(self.broad)))
+
+    def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
+        """Return the densest normal distribution (n,) at each of proposals (n, d); 0 without centres."""
+        if not len(self.centres):
+            return np.zeros(len(proposals), dtype=np.int64)
+        return np.asarray(self._log_parts(box, proposals).argmax(axis=1))
+
+    def _log_parts(self, box: Box, proposals: Array) -> Array:
+        return np.asarray(kernels.log_parts(writeable(proposals), self.centres, self.spreads, box.periodic))
+
+    def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
+        drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))
+        near = np.flatnonzero(rng.random(count) >= self.broad)
+        if not len(near):
+            return drawn
+        which = rng.integers(0, len(self.centres), len(near))
+        means, spreads = self.centres[which], self.spreads[which]
+        mine = wrap(box, means + spreads * rng.standard_normal(means.shape))
+        rows, columns = np.nonzero(np.abs(mine) > 1.0)
+        while len(rows):  # around a mean in the box at least a third of the draws stay inside
+            redrawn = means[rows, columns] + spreads[rows, columns] * rng.standard_normal(len(rows))
+            mine[rows, columns] = redrawn
+            outside = np.abs(redrawn) > 1.0
+            rows, columns = rows[outside], columns[outside]
+        drawn[near] = mine
+        return drawn
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Weighted proposals, and what they say of the whole box."""
+    """Weighted proposals of a density over the box."""
 
     proposals: Array  # (n, d)
     weights: Array  # (n,), which sum to 1
     costs: Array  # (n,)
-    log_evidence: float  # of the mean of exp(-cost / temperature) over the box, where nothing infeasible counts
-    exponents: Array = field(repr=False)  # (t,) how much of the temperature was reached after each step; the last is 1
-    accepted: Array = field(repr=False)  # (t - 1,) share of the moves that was accepted in each
+    log_evidence: float  # the logarithm of the mean of exp(-cost / temperature) over the box, 0 where infeasible
+    exponents: Array = field(repr=False)  # (t,) the inverse temperature after each step, as a share of the last
 
 
 def tempered(
@@ -48,11 +125,11 @@ def tempered(
 ) -> Sampled:
     """Return weighted proposals of the density that exp(-cost / temperature) has in the feasible box.
 
-    The particles begin at `start` and go in steps to that density, on the geometric path between both: each step is as
-    long as leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of
-    `chain` random-walk moves, all of which are particles. With a budget of so many `evaluations`, steps are as long as
-    it takes to arrive within it, and the last particles are weighed by what is left. Raises ValueError where a setting
-    makes no sense, or where nothing is feasible.
+    The particles begin at `start` and go in steps to that density, on the geometric path between both: each step
+    leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of `chain`
+    random-walk moves, all of which are particles. With a budget of `evaluations`, steps are long enough to end within
+    it, and the last particles are weighed by the rest. Raises ValueError where a setting makes no sense, or where
+    nothing is feasible.
     """
     if not temperature > 0.0:
         raise InputError(f"temperature must be above 0, got {temperature}")
@@ -65,10 +142,11 @@ def tempered(
     costs, starts = landscape.costs(proposals), start.log_density(landscape.box, proposals)
     log_evidence, exponent, factor = float(np.log(share)), 0.0, 1.0
     exponents: list[float] = []
-    accepted: list[float] = []
     while True:
         rises = -costs / temperature - starts
-        rounds = _rounds(evaluations, landscape.evaluations - before, moved)
+        rounds = np.inf  # of moves within what is left of the budget
+        if evaluations is not None:
+            rounds = max(evaluations - (landscape.evaluations - before), 0) // moved
         step = left = 1.0 - exponent
         if rounds and len(exponents) < STEPS - 1:
             step = max(next_step(rises, left, survival), left / (1 + rounds))
@@ -77,7 +155,7 @@ def tempered(
         exponent = 1.0 if step >= left else exponent + step
         exponents.append(exponent)
         if exponent == 1.0:
-            return Sampled(proposals, weights, costs, log_evidence, np.array(exponents), np.array(accepted))
+            return Sampled(proposals, weights, costs, log_evidence, np.array(exponents))
         rows = systematic_rows(weights, rng.random(), particles // chain)
         walk = factor * _walk(start, landscape, proposals, weights)
         state = (proposals[rows], costs[rows], starts[rows])
@@ -86,26 +164,20 @@ def tempered(
             state, share = _moved(landscape, start, state, walk, exponent, temperature, rng)
             states.append(state)
             moves += share / (chain - 1)
-        accepted.append(moves)
-        factor = float(np.clip(factor * np.exp(2.0 * (moves - WANTED)), 0.01, 1.0))
+        factor = float(np.clip(factor * np.exp(2.0 * (moves - ACCEPTANCE)), 0.01, 1.0))
         proposals, costs, starts = (np.concatenate(part) for part in zip(*states, strict=True))  # DAU2022 (waste-free)
 
 
-def _rounds(evaluations: int | None, used: int, moved: int) -> float:
-    """Return how often so many particles can be `moved` within what is left of a budget."""
-    return np.inf if evaluations is None else max(evaluations - used, 0) // moved
-
-
 def next_step(rises: Array, left: float, survival: float) -> float:
-    """Return how far to go on a path, at most what is `left`, so that weights exp(step rise) leave a share `survival`.
+    """Return the longest step, `left` at most, at which weights exp(step rise) leave a share `survival`.
 
-    The share is the effective sample size of the weights over the number of particles that have any; it falls as the
-    step grows, so bisection finds it.
+    The share is the effective sample size of the weights over the number of particles that have any. It falls as the
+    step grows: bisection.
     """
     alive = rises[rises > -np.inf]
-    if not len(alive) or effective(left * alive) >= survival * len(alive):
+    if not len(alive) or kernels.effective(left * alive) >= survival * len(alive):
         return left
-    return float(longest_step(alive, left, survival * len(alive), HALVINGS))  # DAU2022 (exponent)
+    return float(kernels.longest_step(alive, left, survival * len(alive), HALVINGS))  # DAU2022 (exponent)
 
 
 def reweighed(rises: Array, step: float) -> tuple[Array, float]:
@@ -121,9 +193,9 @@ def reweighed(rises: Array, step: float) -> tuple[Array, float]:
 
 
 def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
-    """Return `count` rows, each as often as its weight asks: one of the two whole numbers next to count times it.
+    """Return `count` rows, each as often as its weight times `count`, rounded up or down: systematic resampling.
 
-    `u` in [0, 1) is where the comb of evenly spaced teeth begins.
+    `u` in [0, 1) is the offset of the evenly spaced points.
     """
     rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
     return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
@@ -132,13 +204,12 @@ def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
 def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
     """Return the root (d, d) of a random walk's covariance, in proportion to that of the particles.
 
-    It is taken within the modes of the start, as a walk does not reach from one to the other; where there are none, of
-    all particles, as they lie around the heaviest one.
+    The covariance is that within the modes of the start, or else about the heaviest particle.
     """
     box, dimensions = landscape.box, proposals.shape[1]
     groups = start.nearest(box, proposals)
     centres = start.centres if len(start.centres) else proposals[[weights.argmax()]]
-    covariance = covariance_within(writeable(proposals), weights, groups, centres, box.periodic)
+    covariance = kernels.covariance_within(writeable(proposals), weights, groups, centres, box.periodic)
     covariance += 1e-12 * np.eye(dimensions)
     return np.asarray(2.38 / np.sqrt(dimensions) * np.linalg.cholesky(covariance))  # DAU2022 (random walk)
 
@@ -156,8 +227,8 @@ def _moved(
     rng: np.random.Generator,
 ) -> tuple[_State, float]:
     """Return a chain's next state, and the share of its moves that was accepted."""
-    tried = random_walk(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
+    tried = kernels.random_walk(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
     new = (tried, landscape.costs(tried), start.log_density(landscape.box, tried))
     moved_state = (state[0].copy(), state[1].copy(), state[2].copy())
-    share = accept_moves(*moved_state, *new, rng.random(len(tried)), exponent, temperature)
+    share = kernels.accept_moves(*moved_state, *new, rng.random(len(tried)), exponent, temperature)
     return moved_state, float(share)

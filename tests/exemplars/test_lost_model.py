@@ -10,8 +10,7 @@ import pytest
 from posefit.fitting.tracker import Frame
 from posefit.geometry.camera import Camera
 from posefit.geometry.symmetry import mirrored_poses
-from posefit.uncertainty.modes import Posterior
-from posefit.uncertainty.sides import unknown_sides
+from posefit.uncertainty.modes import Posterior, unknown_sides
 from posefit_exemplars.lost_model import (
     EVIDENCE,
     MAX_SPEED,

@@ -1,4 +1,4 @@
-"""Which poses of a frame are really different, on poses whose distances are known."""
+"""Modes and exchanged sides of weighted poses, on poses whose distances are known."""
 
 from dataclasses import replace
 
@@ -6,9 +6,20 @@ import numpy as np
 import pytest
 
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
-from posefit.motion.built_in import average_skeleton
+from posefit.geometry.symmetry import mirrored_poses
+from posefit.motion.built_in import average_skeleton, motion
 from posefit.uncertainty.calibration import Recalibration
-from posefit.uncertainty.modes import Mode, Posterior, likeliest_is_right, modes_of, other_mode, track_modes
+from posefit.uncertainty.modes import (
+    Mode,
+    Posterior,
+    likeliest_is_right,
+    modes_of,
+    nearer_mirrored,
+    other_mode,
+    second_side,
+    track_modes,
+    unknown_sides,
+)
 
 SKELETON = average_skeleton()
 STILL = np.zeros(ANGLES)
@@ -29,20 +40,20 @@ def test_weights_are_divided_by_their_sum() -> None:
     np.testing.assert_allclose(posterior([STILL, STILL], [1.0, 3.0]).weights, [0.25, 0.75])
 
 
-def test_what_is_no_posterior_is_told_with_what_was_expected() -> None:
+def test_a_wrong_posterior_is_refused() -> None:
     with pytest.raises(ValueError, match=r"translations of a posterior must have shape \(2, 3\), got \(1, 3\)"):
         Posterior(np.zeros((2, ANGLES)), np.zeros((1, 3)), np.ones(2))
     with pytest.raises(ValueError, match=r"poses of a posterior must have shape \(0, 66\)"):
         Posterior(np.zeros((0, ANGLES)), np.zeros((0, 3)), np.ones(0))
-    with pytest.raises(ValueError, match="not all 0, got -1 or more, sum 1"):
+    with pytest.raises(ValueError, match="with a sum above 0, got -1, sum 1"):
         posterior([STILL, STILL], [-1.0, 2.0])
-    with pytest.raises(ValueError, match="not all 0, got 0 or more, sum 0"):
+    with pytest.raises(ValueError, match="with a sum above 0, got 0, sum 0"):
         posterior([STILL], [0.0])
     with pytest.raises(ValueError, match="poses of a posterior must be finite, got 65 of 66"):
         posterior([np.where(np.arange(ANGLES) == 3, np.nan, 0.0)], [1.0])
 
 
-def test_poses_that_are_alike_are_one_mode_and_one_that_is_turned_around_is_another() -> None:
+def test_similar_poses_are_one_mode_and_a_turned_one_is_another() -> None:
     # at rest the feet, knees and arms are beside the body: turned around they are where the others were
     modes = modes_of(SKELETON, posterior([turned(0), turned(180), turned(1), turned(-1)], [0.2, 0.3, 0.25, 0.25]))
     assert [mode.weight for mode in modes] == pytest.approx([0.7, 0.3])
@@ -52,7 +63,7 @@ def test_poses_that_are_alike_are_one_mode_and_one_that_is_turned_around_is_anot
     np.testing.assert_array_equal(modes[1].translation, [3.0, 4.0, 5.0])
 
 
-def test_the_other_mode_is_the_likeliest_that_a_pose_is_not_of() -> None:
+def test_the_other_mode_is_the_likeliest_but_the_nearest() -> None:
     modes = [Mode(weight, turned(degrees), np.zeros(3)) for weight, degrees in ((0.5, 0), (0.3, 180), (0.2, 90))]
     assert other_mode(SKELETON, modes, turned(5)) is modes[1]
     assert other_mode(SKELETON, modes, turned(170)) is modes[0]
@@ -62,26 +73,23 @@ def test_the_other_mode_is_the_likeliest_that_a_pose_is_not_of() -> None:
     assert other_mode(SKELETON, [], turned(5)) is None
 
 
-def test_the_likeliest_mode_is_right_where_the_truth_is_alike_and_no_other_is_nearer() -> None:
+def test_the_likeliest_mode_is_right_where_the_truth_is_near_and_no_other_is_nearer() -> None:
     modes = [Mode(weight, turned(degrees), np.zeros(3)) for weight, degrees in ((0.3, 180), (0.7, 0))]
     away = np.array([3.0, 1.0, -2.0])
     assert likeliest_is_right(SKELETON, modes, SKELETON.joints(turned(5), away))
     assert not likeliest_is_right(SKELETON, modes, SKELETON.joints(turned(178), away))
-    quarter = SKELETON.joints(turned(80), away)  # nearer to the likeliest, but nowhere near
+    quarter = SKELETON.joints(turned(80), away)  # nearest to the likeliest, but not near
     assert not likeliest_is_right(SKELETON, modes, quarter)
     assert likeliest_is_right(SKELETON, modes, quarter, apart=1.0)
 
 
-def test_where_a_body_stands_makes_no_mode() -> None:
-    assert len(modes_of(SKELETON, posterior([STILL] * 5, [0.2] * 5))) == 1
+def test_translations_and_poses_without_weight_are_no_modes() -> None:
+    assert [mode.weight for mode in modes_of(SKELETON, posterior([STILL] * 2 + [turned(180)], [0.5, 0.5, 0.0]))] == [
+        1.0
+    ]
 
 
-def test_a_pose_of_no_weight_is_no_mode() -> None:
-    modes = modes_of(SKELETON, posterior([turned(0), turned(180)], [1.0, 0.0]))
-    assert [mode.weight for mode in modes] == [1.0]
-
-
-def test_a_raised_arm_comes_apart_as_soon_as_its_joints_are_so_far_off() -> None:
+def test_a_raised_arm_is_a_mode_from_its_distance_on() -> None:
     raised = STILL.copy()
     raised[angle_index(INNER[[JOINTS[j] for j in INNER].index("lhumerus")]) + 2] = np.pi / 2
     off = float(np.linalg.norm(SKELETON.joints(raised) - SKELETON.joints(STILL), axis=1).mean())
@@ -90,7 +98,7 @@ def test_a_raised_arm_comes_apart_as_soon_as_its_joints_are_so_far_off() -> None
     assert len(modes_of(SKELETON, both, apart=0.99 * off)) == 2
 
 
-def test_whole_tracks_are_alike_by_the_mean_over_their_frames() -> None:
+def test_tracks_are_compared_by_the_mean_over_frames() -> None:
     # the second of three tracks is turned around in one frame of four, the third in all
     frames = [
         posterior([turned(0), turned(180 if k == 0 else 0), turned(180)], [0.5, 0.3, 0.2], coherent=True)
@@ -103,23 +111,46 @@ def test_whole_tracks_are_alike_by_the_mean_over_their_frames() -> None:
     assert modes[0].translations.shape == (4, 3)
 
 
-def test_rows_that_are_no_tracks_are_told() -> None:
-    with pytest.raises(ValueError, match="coherent"):
-        track_modes(SKELETON, [posterior([STILL], [1.0])])
-    with pytest.raises(ValueError, match="coherent"):
-        track_modes(SKELETON, [])
+def test_rows_that_are_no_tracks_are_refused() -> None:
+    for posteriors in ([], [posterior([STILL], [1.0])]):
+        with pytest.raises(ValueError, match="coherent"):
+            track_modes(SKELETON, posteriors)
 
 
-def test_modes_are_as_sure_as_their_recalibration_says() -> None:
-    skeleton = average_skeleton()
+def test_weights_of_modes_are_recalibrated() -> None:
     poses = np.zeros((10, 66))
     poses[8:, 3:] = 0.5
     plain = Posterior(poses, np.zeros((10, 3)), np.ones(10))
-    np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, plain)], [0.8, 0.2])
-    softer = replace(plain, recalibration=Recalibration(sharpness=0.5))
-    # the roots of 0.8 and 0.2 are as two to one
-    np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, softer)], [2 / 3, 1 / 3])
-    unsure = replace(plain, recalibration=Recalibration(sharpness=0.5, none=0.4))
-    np.testing.assert_allclose([mode.weight for mode in modes_of(skeleton, unsure)], [0.4, 0.2])
-    nobody = replace(plain, recalibration=Recalibration(none=1.0))
-    assert [mode.weight for mode in modes_of(skeleton, nobody)] == [0.0, 0.0]
+    for recalibration, weights in (
+        (None, [0.8, 0.2]),
+        (Recalibration(sharpness=0.5), [2 / 3, 1 / 3]),  # the roots of 0.8 and 0.2 are as two to one
+        (Recalibration(sharpness=0.5, none=0.4), [0.4, 0.2]),
+        (Recalibration(none=1.0), [0.0, 0.0]),
+    ):
+        modes = modes_of(SKELETON, replace(plain, recalibration=recalibration))
+        np.testing.assert_allclose([mode.weight for mode in modes], weights)
+
+
+STRIDE = motion("walk-a", frames=30).poses
+
+
+def strides(k: int, weights: list[float], recalibration: Recalibration | None = None) -> Posterior:
+    """Return frame k of a stride and its mirror image."""
+    poses = np.array([STRIDE[k], mirrored_poses(SKELETON, STRIDE[k : k + 1])[0]])
+    return Posterior(poses, np.zeros((2, 3)), np.array(weights), recalibration=recalibration)
+
+
+def test_a_stride_is_nearer_to_itself_and_not_to_its_mirror_image() -> None:
+    frames = STRIDE[::7]  # in none of which one leg passes the other: there a pose is nearly its own mirror image
+    joints = SKELETON.joints(frames)
+    assert not nearer_mirrored(joints, joints).any()
+    assert nearer_mirrored(SKELETON.joints(mirrored_poses(SKELETON, frames)), joints).all()
+    for k in range(0, 30, 7):
+        assert second_side(SKELETON, strides(k, [0.7, 0.3]), STRIDE[k]) == pytest.approx(0.3)
+
+
+def test_sides_are_unknown_from_a_threshold_on() -> None:
+    for second, threshold, unknown in ((0.2, 0.2, True), (0.19, 0.2, False), (0.19, 0.1, True), (0.0, 0.2, False)):
+        posterior = strides(0, [1.0 - second, second], Recalibration(second_side=threshold))
+        assert unknown_sides(SKELETON, posterior, STRIDE[0]) == unknown
+    assert unknown_sides(SKELETON, strides(0, [0.8, 0.2]), STRIDE[0])

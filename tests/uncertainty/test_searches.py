@@ -1,4 +1,4 @@
-"""What several searches evaluated becomes modes with weights: on mixtures whose weights are known."""
+"""Modes with weights from several searches, on mixtures whose weights are known."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,8 @@ import pytest
 from posefit.arrays import Array
 from posefit.testing.toy import Toy
 from posefit.uncertainty.landscape import Landscape
-from posefit.uncertainty.mixture import NormalMixture
 from posefit.uncertainty.searches import best_of_each, boltzmann_weights, weighed, widths
-from posefit.uncertainty.smc import tempered
+from posefit.uncertainty.smc import NormalMixture, tempered
 from tests.cases import each
 
 WEIGHTS = np.array([0.6, 0.3, 0.1])
@@ -20,7 +19,7 @@ def means(dimensions: int) -> Array:
 
 
 def mixture(proposals: Array) -> Array:
-    """Costs (n,) whose exp(-cost) is a mixture of three normal distributions."""
+    """Return costs (n,) whose exp(-cost) is a mixture of three normal distributions."""
     d = proposals.shape[1]
     away = ((proposals[:, None] - means(d)) ** 2).sum(axis=2) / SPREADS**2
     logs = -0.5 * away - d * np.log(SPREADS * np.sqrt(2.0 * np.pi)) + np.log(WEIGHTS)
@@ -28,72 +27,72 @@ def mixture(proposals: Array) -> Array:
 
 
 def searches(dimensions: int, rng: np.random.Generator) -> list[tuple[Array, Array]]:
-    """What nine searches evaluated, each of which has come near one of the three."""
-    found = []
+    """Return the evaluations of nine searches, each near one of the three."""
+    evaluated = []
     for k in range(9):
         proposals = means(dimensions)[k % 3] + 0.5 * SPREADS[k % 3] * rng.standard_normal((60, dimensions))
-        found.append((proposals, mixture(proposals)))
-    return found
+        evaluated.append((proposals, mixture(proposals)))
+    return evaluated
 
 
 @each(("dimensions", "off"), [(2, 0.05), (5, 0.08), (10, 0.15)])
-def test_the_weights_of_modes_are_known(dimensions: int, off: float) -> None:
+def test_modes_have_their_weights(dimensions: int, off: float) -> None:
     wrong = []
     for seed in range(8):
         rng = np.random.default_rng(seed)
         landscape = Landscape(Toy(dimensions), mixture)
-        found = weighed(landscape, searches(dimensions, rng), 1.0, rng)
-        assert landscape.evaluations == found.evaluations
-        assert found.mode_weights.sum() == pytest.approx(1.0)
-        nearest = ((found.modes[:, None] - means(dimensions)) ** 2).sum(axis=2).argmin(axis=1)
+        sample = weighed(landscape, searches(dimensions, rng), 1.0, rng)
+        assert landscape.evaluations == sample.evaluations
+        assert sample.mode_weights.sum() == pytest.approx(1.0)
+        nearest = ((sample.modes[:, None] - means(dimensions)) ** 2).sum(axis=2).argmin(axis=1)
         assert set(nearest) == {0, 1, 2}
-        wrong.append(0.5 * np.abs(np.bincount(nearest, found.mode_weights, 3) - WEIGHTS).sum())
+        wrong.append(0.5 * np.abs(np.bincount(nearest, sample.mode_weights, 3) - WEIGHTS).sum())
     assert np.mean(wrong) < off
 
 
-def test_a_sampler_that_starts_anywhere_does_not_know_the_weights_in_ten_dimensions() -> None:
+def test_a_sampler_that_starts_anywhere_fails_in_ten_dimensions() -> None:
     wrong = []
     for seed in range(8):
         start = NormalMixture.anywhere(10)
-        found = tempered(Landscape(Toy(10), mixture), start, 1.0, np.random.default_rng(seed))
-        nearest = ((found.proposals[:, None] - means(10)) ** 2).sum(axis=2).argmin(axis=1)
-        wrong.append(0.5 * np.abs(np.bincount(nearest, found.weights, 3) - WEIGHTS).sum())
+        sample = tempered(Landscape(Toy(10), mixture), start, 1.0, np.random.default_rng(seed))
+        nearest = ((sample.proposals[:, None] - means(10)) ** 2).sum(axis=2).argmin(axis=1)
+        wrong.append(0.5 * np.abs(np.bincount(nearest, sample.weights, 3) - WEIGHTS).sum())
     assert np.mean(wrong) > 0.3
 
 
-def test_even_rows_keep_the_shares_of_the_modes() -> None:
+def test_even_rows_have_the_shares_of_the_modes() -> None:
     rng = np.random.default_rng(1)
-    found = weighed(Landscape(Toy(3), mixture), searches(3, rng), 1.0, rng)
-    rows, weights = found.even(100, rng)
+    sample = weighed(Landscape(Toy(3), mixture), searches(3, rng), 1.0, rng)
+    rows, weights = sample.even(100, rng)
     np.testing.assert_array_equal(weights, 0.01)
-    near = np.array([((rows - mode) ** 2).sum(axis=1) for mode in found.modes]).argmin(axis=0)
-    shares = np.bincount(near, minlength=len(found.modes)) / 100.0
-    np.testing.assert_allclose(shares, found.mode_weights, atol=0.03)
+    near = np.array([((rows - mode) ** 2).sum(axis=1) for mode in sample.modes]).argmin(axis=0)
+    shares = np.bincount(near, minlength=len(sample.modes)) / 100.0
+    np.testing.assert_allclose(shares, sample.mode_weights, atol=0.03)
 
 
-def test_a_valley_is_as_wide_as_its_deviation() -> None:
+def test_the_width_of_a_valley_is_its_standard_deviation() -> None:
     # costs are a sum of squares: exp(-cost / 2) has the deviations 0.1 and 0.03 times the root of 2 about the mode
     spread, box = np.array([0.1, 0.03]), Toy(2)
     proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, 2)) * 0.3
     costs = 0.5 * ((proposals / spread) ** 2).sum(axis=1)
     mode = np.zeros((1, 2)), np.zeros(1)
-    found = widths(box, [(proposals, costs)], *mode, 2.0)
-    np.testing.assert_allclose(found, [np.sqrt(2.0) * spread], rtol=0.01)
-    # what is flat is as wide as may be, and so is what nothing is known of
+    valley = widths(box, [(proposals, costs)], *mode, 2.0)
+    np.testing.assert_allclose(valley, [np.sqrt(2.0) * spread], rtol=0.01)
+    # a flat or unknown valley has the greatest width
     np.testing.assert_allclose(widths(box, [(proposals, np.zeros(2000))], *mode, 1.0), 0.5)
     np.testing.assert_allclose(widths(box, [(np.zeros((1, 2)), np.zeros(1))], *mode, 1.0), 0.5)
 
 
-def test_each_valley_has_its_own_width_where_enough_is_known_of_it() -> None:
+def test_a_valley_has_its_own_width_where_enough_is_known() -> None:
     rng, modes, spreads = np.random.default_rng(0), np.array([[-0.5], [0.5], [0.9]]), np.array([0.05, 0.1])
     near = [modes[k] + spreads[k] * rng.standard_normal((50, 1)) for k in range(2)]
     searched = [(near[k], 0.5 * ((near[k][:, 0] - modes[k]) / spreads[k]) ** 2) for k in range(2)]
-    found = widths(Toy(1), searched, modes, np.zeros(3), 1.0)[:, 0]
-    np.testing.assert_allclose(found[:2], spreads, rtol=0.01)
-    assert spreads[0] < found[2] < spreads[1]  # of which nothing is known: as all are, together
+    valley = widths(Toy(1), searched, modes, np.zeros(3), 1.0)[:, 0]
+    np.testing.assert_allclose(valley[:2], spreads, rtol=0.01)
+    assert spreads[0] < valley[2] < spreads[1]  # nothing is known of it: as all together
 
 
-def test_the_best_of_each_search_are_different_and_feasible() -> None:
+def test_the_best_of_each_search_are_distinct_and_feasible() -> None:
     space = Toy(1, lambda x: x[:, 0] >= 0.0)
     proposals = np.array([[0.3], [0.1], [0.1], [-0.2], [0.5], [0.4]])
     costs = np.array([3.0, 1.0, 1.0, 0.0, np.nan, 4.0])
@@ -103,12 +102,12 @@ def test_the_best_of_each_search_are_different_and_feasible() -> None:
     np.testing.assert_array_equal(known, [1.0, 3.0, 3.0])
 
 
-def test_searches_that_met_no_finite_cost_are_refused() -> None:
+def test_searches_without_a_finite_cost_are_refused() -> None:
     landscape = Landscape(Toy(1), lambda x: x[:, 0])
-    with pytest.raises(ValueError, match="searches must meet a finite cost, got none in 1 searches"):
+    with pytest.raises(ValueError, match="searches must have a finite cost, got none in 1 searches"):
         weighed(landscape, [(np.zeros((3, 1)), np.full(3, np.inf))], 1.0, np.random.default_rng(0))
 
 
-def test_likelihoods_are_exponentials_and_what_is_not_finite_weighs_nothing() -> None:
+def test_boltzmann_weights_are_exponentials_and_0_where_a_cost_is_not_finite() -> None:
     np.testing.assert_allclose(boltzmann_weights(np.array([0.0, 2.0 * np.log(3.0), np.nan]), 2.0), [0.75, 0.25, 0.0])
     np.testing.assert_allclose(boltzmann_weights(np.array([np.inf, np.nan]), 2.0), 0.5)

@@ -1,4 +1,4 @@
-"""Simulation-based calibration: where a truth is drawn from the prior, it is one more draw of what the sampler tells.
+"""Simulation-based calibration: a truth drawn from the prior is one more draw of the sampler.
 
 S. Talts, M. Betancourt, D. Simpson, A. Vehtari, A. Gelman, Validating Bayesian inference algorithms with
 simulation-based calibration, 2018.
@@ -19,8 +19,8 @@ from tests.cases import each
 NOISE, DRAWS, TRUTHS = 0.2, 9, 400
 
 
-def shown(proposals: Array) -> Array:
-    """What is seen (n, d) of proposals (n, d): of the first coordinate not its sign, of the others sums."""
+def observed(proposals: Array) -> Array:
+    """Return observations (n, d) of proposals (n, d): the first coordinate without its sign, sums of the others."""
     return np.concatenate([np.abs(proposals[:, :1]), proposals[:, 1:] @ MIXED], axis=1)
 
 
@@ -33,18 +33,18 @@ def test_a_truth_is_one_more_draw(evaluations: int) -> None:
     ranks = []
     for _ in range(TRUTHS):
         truth = rng.uniform(-1.0, 1.0, (1, 4))
-        seen = shown(truth) + NOISE * rng.standard_normal((1, 4))
+        observation = observed(truth) + NOISE * rng.standard_normal((1, 4))
 
-        def cost(proposals: Array, seen: Array = seen) -> Array:
-            return np.asarray(0.5 * ((shown(proposals) - seen) ** 2).sum(axis=1) / NOISE**2)
+        def cost(proposals: Array, observation: Array = observation) -> Array:
+            return np.asarray(0.5 * ((observed(proposals) - observation) ** 2).sum(axis=1) / NOISE**2)
 
         landscape = Landscape(space, cost)
         first = gathered([(one.copy(), costs) for one, costs in populations(make(space, rng), cost, 2440)])
         other = first[0][[first[1].argmin()]] * [-1.0, 1.0, 1.0, 1.0]  # its twin, as a tracker knows those of poses
-        found = weighed(landscape, [first, (other, cost(other))], 1.0, rng, evaluations=evaluations)
+        sample = weighed(landscape, [first, (other, cost(other))], 1.0, rng, evaluations=evaluations)
         assert landscape.evaluations <= 1.1 * evaluations
-        rows = rng.choice(len(found.weights), DRAWS, p=found.weights)
-        ranks.append((found.proposals[rows] < truth).sum(axis=0))
+        rows = rng.choice(len(sample.weights), DRAWS, p=sample.weights)
+        ranks.append((sample.proposals[rows] < truth).sum(axis=0))
     for column in np.transpose(ranks):
         counts = np.bincount(column, minlength=DRAWS + 1)
         assert chisquare(counts).pvalue > 0.01, counts
