@@ -4,17 +4,17 @@ A TOML file holds `stay`, a table `groups` of names and their models, and a tabl
 they change into.
 """
 
-import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.fitting.check import one_of
+from posefit.reading import parsed_toml, read_text
 
 SIZE_LIMIT = 100_000  # bytes
 
@@ -60,40 +60,28 @@ def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
 
     Raises ValueError naming the file where it is not what it should be, or names a model that is not known.
     """
-    source = files("posefit_vsmm") / "groups.toml" if path is None else Path(path)
-    if isinstance(source, Path):
-        if not source.is_file():
-            raise InputError(f"{source}: expected a file of groups, got none")
-        if source.stat().st_size > SIZE_LIMIT:
-            raise InputError(f"{source}: expected at most {SIZE_LIMIT} bytes, got {source.stat().st_size}")
     label = "groups.toml" if path is None else str(path)
     try:
-        values = tomllib.loads(source.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:  # bad UTF-8, bad TOML, endless nesting
+        text = (files("posefit_vsmm") / label).read_text("utf-8") if path is None else read_text(path, SIZE_LIMIT)
+        values = parsed_toml(text)
+    except FileNotFoundError:
+        raise InputError(f"{label}: expected a file of groups, got none") from None
+    except ValueError as error:
         raise InputError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
     if set(values) != {"stay", "groups", "neighbours"}:
         raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
     stay = values["stay"]
     if not isinstance(stay, float) or not 0.0 < stay < 1.0:
         raise InputError(f"{label}: stay must be a number between 0 and 1, got {stay!r}")
-    groups, neighbours = (_lists(label, key, values[key], known) for key in ("groups", "neighbours"))
+    for key in ("groups", "neighbours"):
+        if not isinstance(values[key], dict) or not all(isinstance(models, list) for models in values[key].values()):
+            raise InputError(f"{label}: {key} must be a table of lists of models, got {values[key]!r}")
+    groups, neighbours = (
+        {name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in ("groups", "neighbours")
+    )
     if not groups or not all(groups.values()):
         raise InputError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
-    used = {model for mine in groups.values() for model in mine}
-    for model in neighbours:
-        _check(label, model, known)
-    return Topology(groups, {model: neighbours.get(model, ()) for model in used | set(neighbours)}, stay)  # VSMM 4
-
-
-def _lists(label: str, key: str, table: Any, known: Collection[str]) -> dict[str, tuple[str, ...]]:
-    if not isinstance(table, dict) or not all(isinstance(mine, list) for mine in table.values()):
-        raise InputError(f"{label}: {key} must be a table of lists of models, got {table!r}")
-    for mine in table.values():
-        for model in mine:
-            _check(label, model, known)
-    return {str(name): tuple(dict.fromkeys(mine)) for name, mine in table.items()}
-
-
-def _check(label: str, model: Any, known: Collection[str]) -> None:
-    if model not in known:
-        raise InputError(f"{label}: a model must be one of {', '.join(known)}, got {model!r}")
+    used = {model for models in groups.values() for model in models} | set(neighbours)
+    for model in used.union(*neighbours.values()):
+        one_of(f"{label}: a model", model, known)
+    return Topology(groups, {model: neighbours.get(model, ()) for model in used}, stay)  # VSMM 4

@@ -22,7 +22,8 @@ from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
-from posefit_vsmm.tracker import VSMM, Matcher, SearchResult
+from posefit_vsmm.switching import Measure
+from posefit_vsmm.tracker import VSMM, Matcher
 
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 
@@ -100,8 +101,11 @@ class Search:
 
     def find(
         self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
-    ) -> SearchResult | None:
-        """Return the best state around one (43,) with covariance (33, 33), and what it tells the filter."""
+    ) -> tuple[Array, int, Measure] | None:
+        """Return the best pose (66,) around a state (43,) with covariance (33, 33), and its measurement of the filter.
+
+        Between them are the evaluations that it took; None where the budget is too small.
+        """
         if budget < LEAST_BUDGET:
             return None
         poses, places = decode(state[None], self.reliance)
@@ -129,7 +133,7 @@ class Search:
         def measure(one: Array) -> Measurement:
             return Measurement(PLACED.minus(best_state, one), np.eye(ERROR), np.diag(SEARCH_DEVIATIONS**2))
 
-        return SearchResult(pose[0], best.evaluations, measure)
+        return pose[0], best.evaluations, measure
 
 
 def joined(

@@ -80,7 +80,7 @@ class JointMeasurement:
     variances: Array = field(repr=False)  # (17, 2) square pixels
     unassigned: int  # end points of the skeleton line that belong to none of them
     # mean squared standard deviations a coordinate (NIS / 2) of the points that the rules detected by themselves
-    surprise: float
+    surprise: float | None  # None where the camera shows nobody
 
     def imputed(self, points: Array) -> "JointMeasurement":
         """Return the same with other points (17, 2) where none are detected, as if they were. Interpretation V9."""
@@ -97,13 +97,15 @@ class JointCameras:
     figure: Figure
     how: Settings
 
-    def detect(self, view: int, lines: Lines, expected: Array, spread: Array) -> JointMeasurement:
+    def detect(self, view: int, lines: Lines | None, expected: Array, spread: Array) -> JointMeasurement:
         """Return the joints that a camera shows, where a state (43,) is expected with a covariance (33, 33).
 
-        Detections outside the Mahalanobis gate are rejected.
+        Detections outside the Mahalanobis gate are rejected. Where the camera shows nobody, no joint is detected.
         """
         camera = self.cameras[view]
         pixels, jacobian = self.figure.project(camera, expected)
+        if lines is None:
+            return JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, None)
         depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
         metre = float(camera.focal.mean()) / max(depth, NEAREST)  # in pixels, at the root's depth
         leg = leg_of(self.body.skeleton) * metre
@@ -119,33 +121,27 @@ class JointCameras:
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
         accepted = (distance < SURPRISE) | (not self.how.gates)
         confidence = np.where(accepted, detection.confidence, 0.0)
+        own = (detection.confidence > 0.0) & OWN
         dropped = np.count_nonzero((confidence == 0.0) & (detection.confidence > 0.0))
         return JointMeasurement(
             detection.points,
             confidence,
             variances,
             detection.unassigned + int(dropped),
-            _surprise(distance, detection.confidence),
+            float(distance[own].mean() / 2.0) if own.any() else 0.0,
         )
 
-    def measure(self, state: Array, measured: Sequence[JointMeasurement | None], known: Array | None) -> Measurement:
+    def measure(self, state: Array, measured: Sequence[JointMeasurement], known: Array | None) -> Measurement:
         """Return the residuals of detected joints for a state (43,). Hidden joints have no row. Interpretation V9."""
         residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
-        for camera, one in zip(self.cameras, measured, strict=True):
-            if one is None:
-                continue
+        for camera, joints in zip(self.cameras, measured, strict=True):
             pixels, jacobian = self.figure.project(camera, state)  # VSMM 6.1
-            shown = one.confidence > 0.0
-            residuals.append((one.points - pixels)[shown].ravel())
+            shown = joints.confidence > 0.0
+            residuals.append((joints.points - pixels)[shown].ravel())
             jacobians.append(jacobian[shown].reshape(-1, ERROR))
-            noise.append(one.variances[shown].ravel())
+            noise.append(joints.variances[shown].ravel())
         if known is not None:
             residuals.append(known - state[:3])
             jacobians.append(np.eye(3, ERROR))
             noise.append(np.full(3, KNOWN**2))
         return Measurement(np.concatenate(residuals), np.concatenate(jacobians), np.diag(np.concatenate(noise)))
-
-
-def _surprise(distance: Array, confidence: Array) -> float:
-    own = (confidence > 0.0) & OWN
-    return float(distance[own].mean() / 2.0) if own.any() else 0.0

@@ -9,7 +9,6 @@ import json
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,14 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
+from posefit.reading import parsed_json, read_text
 from posefit_vsmm import kernels
 from posefit_vsmm.imm import product
 from posefit_vsmm.settings import Poses, Shrink
 from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
+SIZE_LIMIT = 10_000_000  # bytes of a file of models
 CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
@@ -137,11 +138,11 @@ def library(shrink: Shrink = "identity", path: str = "") -> Library:
 
     Raises ValueError naming the file where it holds no such models.
     """
-    source = Path(path) if path else files("posefit_vsmm") / "models.json"
+    if not path:
+        return _library(json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8")), shrink)
     try:
-        stored: dict[str, Any] = json.loads(source.read_text(encoding="utf-8"))
-        return _library(stored, shrink)
-    except (OSError, LookupError, TypeError, ValueError) as error:
+        return _library(parsed_json(read_text(path, SIZE_LIMIT)), shrink)
+    except (FileNotFoundError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"{path}: expected motion models as make_models.py writes them, got {error!r}") from None
 
 

@@ -3,9 +3,9 @@
 import inspect
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.silhouette.cost import areas, mismatch
+from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement, product
 from posefit_vsmm.joints import JointFilter
@@ -23,7 +23,10 @@ from posefit_vsmm.motion import STIFF, MotionModel, library
 from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
-from posefit_vsmm.switching import Measure, Models
+from posefit_vsmm.switching import Models
+
+if TYPE_CHECKING:
+    from posefit_vsmm.joined import Search
 
 NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # yaws that are tried where one is about known
 ALL_AROUND = np.linspace(-np.pi, np.pi, 12, endpoint=False)
@@ -49,13 +52,8 @@ class Matcher:
             places[:] = observation.translation
         else:
             places = align(task.body, task.cameras, observation.silhouettes, poses, places)
-        costs = np.mean(
-            [
-                mismatch(areas(task.body, camera, silhouette, poses, places, task.threads))
-                for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True)
-            ],
-            axis=0,
-        )
+        silhouettes = observation.silhouettes
+        costs, _ = pose_costs(task.body, task.cameras, silhouettes, poses, places, threads=task.threads)
         self.evaluations += len(states)
         return costs, np.column_stack([places, states[:, 3:]])
 
@@ -123,29 +121,6 @@ _LIMBS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """The result of a search in one frame."""
-
-    pose: Array  # (66,)
-    evaluations: int
-    measure: Measure  # its measurement for the filter
-
-
-class Searcher(Protocol):
-    """Looks around what the filter holds."""
-
-    def likelihood(self, state: Array, observation: Observation) -> float:
-        """Return the log-likelihood of a predicted state (43,), for one evaluation."""
-        ...
-
-    def find(
-        self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator
-    ) -> SearchResult | None:
-        """Return the best result around a state (43,) with covariance (33, 33), for at most so many evaluations."""
-        ...
-
-
 @final
 class TrackFilter:
     """One track, as far as it has come; with a `searcher`, every frame ends in a search."""
@@ -184,11 +159,9 @@ class TrackFilter:
         if self._how.recovery and (extra := self._missing_spread(measured)).any():
             belief = models.widened(belief, extra)
             measured = self._look(lines, expected, spread + np.diag(extra))
-        details = {**self._joints(measured, expected), "detection_seconds": time.perf_counter() - began}
-        imputed = [one and one.imputed(joints) for one, joints in zip(measured, details["joints"], strict=True)]
+        details = {**self._joints(measured), "detection_seconds": time.perf_counter() - began}
         if self._how.hidden == "imputed":
-            measured = imputed
-
+            measured = [joints.imputed(points) for joints, points in zip(measured, details["joints"], strict=True)]
         filtering, used = time.perf_counter(), spent
 
         def measure(one: Array) -> Measurement:
@@ -199,17 +172,19 @@ class TrackFilter:
             used += 1
             return replace(measurement, log_likelihood=self._searcher.likelihood(one, observation))
 
-        surprise = float(np.mean([one.surprise for one in measured if one is not None] or [0.0]))
+        surprise = float(np.mean([one.surprise for one in measured if one.surprise is not None] or [0.0]))
         self._belief = models.cycle(belief, measure, surprise)
         state, spread = models.fused(self._belief)
         details["filter_seconds"] = time.perf_counter() - filtering
         poses, places = decode(state[None], self._reliance)
         pose, place = poses[0], places[0]
         if self._searcher is not None and not blind:
-            result = self._searcher.find(state, spread, observation, self._task.evaluations - used - 1, self._rng)
+            budget = self._task.evaluations - used - 1
+            result = self._searcher.find(state, spread, observation, budget, self._rng)
             if result is not None:
-                pose, used = result.pose, used + result.evaluations
-                self._belief = models.imm.updated(self._belief, result.measure)
+                pose, evaluations, search_measure = result
+                used += evaluations
+                self._belief = models.imm.updated(self._belief, search_measure)
                 place = models.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
         drawn = details["joints"][0]
         if self._how.angles == "state":
@@ -218,10 +193,8 @@ class TrackFilter:
         details |= {"surprise": surprise, **self._model_details()}
         return self._frame(pose, place, observation, used + 1, began, details)
 
-    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement | None]:
-        return [
-            None if one is None else self._cameras.detect(view, one, expected, spread) for view, one in enumerate(lines)
-        ]
+    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement]:
+        return [self._cameras.detect(view, one, expected, spread) for view, one in enumerate(lines)]
 
     def _begin(self, observation: Observation) -> int:
         """Estimate a pose from this frame alone, with all models equally probable; return the evaluations that took."""
@@ -241,30 +214,26 @@ class TrackFilter:
         self._missing = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
 
-    def _missing_spread(self, measured: Sequence[JointMeasurement | None]) -> Array:
+    def _missing_spread(self, measured: Sequence[JointMeasurement]) -> Array:
         """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
         extra = np.zeros(ERROR)
-        unassigned = any(one.unassigned for one in measured if one is not None)
+        unassigned = any(one.unassigned for one in measured)
         for limb, bones in _LIMBS.items():
-            detected = any(one.confidence[AT[limb]] > 0.0 for one in measured if one is not None)
+            detected = any(one.confidence[AT[limb]] > 0.0 for one in measured)
             self._missing[limb] = self._missing[limb] + 1 if unassigned and not detected else 0
             if self._missing[limb] >= MISSING_FRAMES:
                 for bone in bones:
                     extra[bone_errors(bone)] = MISSING_SPREAD**2
         return np.asarray(extra * self._free**2)
 
-    def _joints(self, measured: Sequence[JointMeasurement | None], expected: Array) -> dict[str, Any]:
+    def _joints(self, measured: Sequence[JointMeasurement]) -> dict[str, Any]:
         """Return the joints (views, 17, 2), predicted where hidden, and the rules' confidence in them (views, 17)."""
-        points, confidence = [], []
-        for view, (camera, one) in enumerate(zip(self._task.cameras, measured, strict=True)):
-            if one is None:
-                pixels, _ = self._cameras.figure.project(camera, expected)
-                one = JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, 0.0)
-            if len(self._shown) == view:
-                self._shown.append(JointFilter(one.points))
-            points.append(one.imputed(self._shown[view].follow(one.points, one.confidence, one.variances)).points)
-            confidence.append(one.confidence)
-        return {"joints": np.array(points), "confidence": np.array(confidence)}
+        self._shown = self._shown or [JointFilter(one.points) for one in measured]
+        points = [
+            one.imputed(shown.follow(one.points, one.confidence, one.variances)).points
+            for one, shown in zip(measured, self._shown, strict=True)
+        ]
+        return {"joints": np.array(points), "confidence": np.array([one.confidence for one in measured])}
 
     def _model_details(self) -> dict[str, Any]:
         """Return the details of a frame that are about the models."""
@@ -290,14 +259,12 @@ class TrackFilter:
         task = self._task
         if observation.translation is not None:
             place = np.array(observation.translation, dtype=np.float64)
-        views = zip(task.cameras, observation.silhouettes, strict=True)
         pose = np.where(task.body.skeleton.free, pose, 0.0)
-        counts = np.concatenate([areas(task.body, camera, one, pose[None], place[None]) for camera, one in views])
-        known = [one.known for one in observation.silhouettes]
-        counted = counts[known] if any(known) else counts
-        cost = float(mismatch(counted).mean())
+        costs, counts = pose_costs(task.body, task.cameras, observation.silhouettes, pose[None], place[None])
+        cost, counts = float(costs[0]), counts[:, 0]
         if not self._unseen:
-            self._bad = self._bad + 1 if float(metrics.iou(counted).mean()) < LOST else 0
+            iou = metrics.iou(np.array(known_views(list(counts), observation.silhouettes))).mean()
+            self._bad = self._bad + 1 if iou < LOST else 0
         seconds = time.perf_counter() - began
         spent = time.process_time() - self._begun
         self._latest = Frame(
@@ -312,7 +279,7 @@ class VSMM:
     With a `search`, every frame ends in one.
     """
 
-    def __init__(self, task: Task, how: Settings, search: Searcher | None = None) -> None:
+    def __init__(self, task: Task, how: Settings, search: "Search | None" = None) -> None:
         self.task, self.how, self.search = task, how, search
         self.library = library(how.shrink, how.models)
         self.topology = read_topology(Path(how.groups) if how.groups else None, self.library.names)
