@@ -57,7 +57,7 @@ def requested_group(points: Sequence[Array], how: Settings) -> int | None:
     return None
 
 
-def limb_angles(points: Array, hip_angle: HipAngle = "trunk") -> Array:
+def limb_angles(points: Array, hip_angle: HipAngle = "vertical") -> Array:
     """Return the angles (6,) in the image of thighs and shanks, left and right, and of the hips. Interpretation V15.
 
     A hip's is that of its thigh to the trunk, or to the vertical.

@@ -294,7 +294,8 @@ class VSMM:
 def vsmm(task: Task, **given: Any) -> VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
-    `vsmm:patent` sets every interpretation to the patent's letter, but for what else is given.
+    `vsmm:patent` sets every interpretation to the patent's letter, but for what else is given; defaults differ from it
+    where tracks are better.
 
     Settings:
         variant: the preset, "default" or "patent".

@@ -136,7 +136,7 @@ def test_errors_against_detected_joints_leave_hidden_ones_out(film: activities.F
     assert hand == pytest.approx(100.0 * 5.0 * depths[0, HAND] / film.camera.focal[0])
 
 
-def test_a_letter_is_compared_film_by_film() -> None:
+def test_alternatives_are_compared_film_by_film() -> None:
     rows: list[list[dict[str, Any]]] = [[{"mpjpe_mm": mm} for mm in values] for values in ((90, 110), (100, 104))]
     assert change(*rows) == {"worse_mm": 2.0, "worse_films": 1.0}
 

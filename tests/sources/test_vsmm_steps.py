@@ -519,8 +519,8 @@ def test_the_patents_test_has_limits_of_09_and_1_on_what_came_since_k0() -> None
 
 def test_the_sequential_test_waits_for_evidence_of_99_to_1() -> None:
     even, ratios = [0.5, 0.5], [3.0] * 4 + [1.3]  # 81, then 105
-    assert decided([(even, [1.0, ratio]) for ratio in ratios]) == [None] * 4 + ["new"]
-    assert decided([(even, [1.0, 1.0 / ratio]) for ratio in ratios]) == [None] * 4 + ["old"]
+    assert decided([(even, [1.0, ratio]) for ratio in ratios], test="sequential") == [None] * 4 + ["new"]
+    assert decided([(even, [1.0, 1.0 / ratio]) for ratio in ratios], test="sequential") == [None] * 4 + ["old"]
 
 
 def test_the_sequential_tests_two_error_rates_are_walds() -> None:
@@ -529,11 +529,11 @@ def test_the_sequential_tests_two_error_rates_are_walds() -> None:
     # beta / (1 - alpha). alpha = 0.05, beta = 0.2: 16 and 4 / 19; the other way round they would be 4.75 and 1 / 16.
     for ratios, decision in (([15.9, 16.1 / 15.9], "new"), ([0.22, 0.20 / 0.22], "old")):  # 4 / 19 = 0.2105
         steps = [([0.5, 0.5], [1.0, ratio]) for ratio in ratios]
-        assert decided(steps, false_alarm=0.05, miss=0.2) == [None, decision]
+        assert decided(steps, test="sequential", false_alarm=0.05, miss=0.2) == [None, decision]
 
 
 def test_a_rivalry_that_is_never_decided_ends() -> None:
-    assert decided([([0.4, 0.6], [1.0, 1.0])] * 3, longest=3) == [None, None, "new"]
+    assert decided([([0.4, 0.6], [1.0, 1.0])] * 3, test="sequential", longest=3) == [None, None, "new"]
 
 
 def test_the_body_and_its_models_fit_any_frame_rate() -> None:

@@ -15,15 +15,15 @@ NEIGHBOURS = "Processes. Seconds of a frame are those beside so many neighbours.
 @click.command("vsmm")
 @click.option("--seeds", type=int, default=5, show_default=True, help="Films, each in other phases and views.")
 @click.option("--searches", is_flag=True, help="Compare with SAPSO and with the joined tracker too; minutes more.")
-@click.option("--letters", is_flag=True, help="Compare with each interpretation as the patent writes it; minutes more.")
+@click.option("--alternatives", is_flag=True, help="Compare with the other value of every setting; minutes more.")
 @click.option("--out", metavar="DIR", help="New folder for report.json and the figures; needs posefit[figures].")
 @click.option("--workers", type=int, default=1, show_default=True, metavar="N", help=NEIGHBOURS)
 @JSON
-def vsmm_command(seeds: int, searches: bool, letters: bool, out: str | None, workers: int, as_json: bool) -> None:
+def vsmm_command(seeds: int, searches: bool, alternatives: bool, out: str | None, workers: int, as_json: bool) -> None:
     """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, by its letter and by default."""
     from posefit_reproduce.vsmm.report import patent_report, patent_text
 
-    figures = patent_report(seeds, searches, letters, out, workers, partial(progress, unit="run"))
+    figures = patent_report(seeds, searches, alternatives, out, workers, partial(progress, unit="run"))
     click.echo(json_line(figures) if as_json else patent_text(figures))
     if out and not as_json:
         click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")

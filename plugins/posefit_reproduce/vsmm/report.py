@@ -46,7 +46,7 @@ _KEYS = ("still_1", "identity_1", "zero_1", "still_10", "identity_10", "zero_10"
 def patent_report(
     seeds: int,
     searches: bool,
-    letters: bool,
+    alternatives: bool,
     out: str | Path | None,
     workers: int = WORKERS,
     progress: Progress | None = None,
@@ -59,7 +59,7 @@ def patent_report(
     if out is not None and find_spec("matplotlib") is None:
         raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
     with nullcontext() if out is None else new_folder(out) as folder:
-        figures, shown = repeat_patent(seeds, searches, letters, workers, progress)
+        figures, shown = repeat_patent(seeds, searches, alternatives, workers, progress)
         figures["version"] = __version__
         if folder is not None:
             from posefit_reproduce.vsmm.figures import patent_figures
