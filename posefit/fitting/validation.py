@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -56,22 +55,22 @@ class CheckedOptimiser:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
         with plugin_errors(self._name, "ask", self._limit):
             proposals = self._optimiser.ask()
-        shape = getattr(proposals, "shape", None)
         if not isinstance(proposals, np.ndarray) or proposals.shape[1:] != (self._space.dimensions,):
+            shape = getattr(proposals, "shape", None)
             came = type(proposals).__name__ if shape is None else f"shape {shape}"
             raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
         if proposals.dtype.kind != "f":
             raise self._broken(f"ask must return numbers of type float64, got {proposals.dtype}")
-        if self._first:
-            self._check_first(len(proposals))
-        if proposals.size:
-            reach = np.abs(proposals).max()
-            if np.isnan(reach):
-                raise self._broken("ask must return finite proposals, got nan")
-            if reach > 1.0:
-                raise self._broken(
-                    f"ask must return proposals in [-1, 1], got {proposals.flat[abs(proposals).argmax()]}"
-                )
+        count, budget = len(proposals), self._evaluations
+        if self._first and not count:
+            raise self._broken("ask must return a first population of one proposal or more, got none")
+        if self._first and budget is not None and count > budget:
+            raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {budget}")
+        farthest = np.abs(proposals).max(initial=0.0)
+        if np.isnan(farthest):
+            raise self._broken("ask must return finite proposals, got nan")
+        if farthest > 1.0:
+            raise self._broken(f"ask must return proposals in [-1, 1], got {proposals.flat[abs(proposals).argmax()]}")
         return proposals
 
     def tell(self, proposals: Array, costs: Array) -> None:
@@ -85,12 +84,6 @@ class CheckedOptimiser:
         self._space, self._first = space, True
         with plugin_errors(self._name, "advance", self._limit):
             self._optimiser.advance(space)  # type: ignore[attr-defined]
-
-    def _check_first(self, count: int) -> None:
-        if not count:
-            raise self._broken("ask must return a first population of one proposal or more, got none")
-        if self._evaluations is not None and count > self._evaluations:
-            raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {self._evaluations}")
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")
@@ -139,20 +132,17 @@ class CheckedPrior:
         CheckedPrior.__init__(self, self._call("fit", angles, skeleton), self._name)
         return self
 
-    def transform(self, angles: Array) -> Array:
+    def transform(self, angles: Array) -> Any:
         """Return the latents (n, m) of joint angles (n, 63)."""
-        latents: Array = self._call("transform", angles)
-        return latents
+        return self._call("transform", angles)
 
-    def inverse_transform(self, latents: Array) -> Array:
+    def inverse_transform(self, latents: Array) -> Any:
         """Return the joint angles (n, 63) of latents (n, m)."""
-        angles: Array = self._call("inverse_transform", latents)
-        return angles
+        return self._call("inverse_transform", latents)
 
-    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+    def feasible(self, latents: Array) -> Any:
         """Return which latents (n, m) are poses at all (n,)."""
-        allowed: NDArray[np.bool_] = self._call("feasible", latents)
-        return allowed
+        return self._call("feasible", latents)
 
     def save(self, path: str | Path) -> None:
         """Write what it learned to an .npz file."""
@@ -292,7 +282,7 @@ class _Stream:
             raise
         self.count += 1
         self.waiting.append(observation)
-        return replace(observation, silhouettes=self._drawn.own(observation.silhouettes))
+        return observation
 
 
 def _short(value: object) -> str:

@@ -1,20 +1,18 @@
 """Counts of drawn poses, by which the evaluations that a plugin reports are checked."""
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from copy import copy
-from weakref import WeakKeyDictionary
 
 from posefit.silhouette.mask import Silhouette
 
 
 class PoseCount:
-    """Counts the poses that are drawn within `counting`, and in any thread those compared with its `own` silhouettes.
+    """Counts the poses that are drawn within `counting`, by posefit's threads too.
 
-    Several may count at once, in one thread or in many. In threads started by a plugin, poses are counted by their
-    silhouettes alone; direct calls of the compiled loops, and other processes, are not counted.
+    Several may count at once, in one thread or in many. Poses drawn in threads that a plugin starts, in other processes
+    or by direct calls of the compiled loops are not counted.
     """
 
     def __init__(self) -> None:
@@ -38,23 +36,8 @@ class PoseCount:
             if outer is not None:
                 outer.add(self.poses - before)
 
-    def own(self, silhouettes: Sequence[Silhouette]) -> list[Silhouette]:
-        """Return the same silhouettes, as new objects whose poses this count gets."""
-        mine = [copy(one) for one in silhouettes]
-        for one in mine:
-            _owners[one] = self
-        return mine
-
-
-def belongs(silhouette: Silhouette, origin: Silhouette) -> Silhouette:
-    """Return a silhouette, counted from now on by the count that owns the one it was made of."""
-    if _owners and (owner := _owners.get(origin)) is not None:
-        _owners[silhouette] = owner
-    return silhouette
-
 
 _current: ContextVar[PoseCount | None] = ContextVar("drawn", default=None)
-_owners: WeakKeyDictionary[Silhouette, PoseCount] = WeakKeyDictionary()
 
 
 @contextmanager
@@ -69,8 +52,6 @@ def uncounted() -> Iterator[None]:
 
 def count_poses(poses: int, silhouette: Silhouette | None = None) -> None:
     """Add poses that are drawn now to the current count; in a smaller picture by its share of the pixels."""
-    counted = _current.get()
-    if counted is None and _owners and silhouette is not None:
-        counted = _owners.get(silhouette)
-    if counted is not None:
-        counted.add(poses if silhouette is None else poses / silhouette.scale**2)
+    count = _current.get()
+    if count is not None:
+        count.add(poses if silhouette is None else poses / silhouette.scale**2)

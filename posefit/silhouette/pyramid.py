@@ -6,7 +6,6 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera
-from posefit.silhouette.drawn import belongs
 from posefit.silhouette.mask import Silhouette
 
 
@@ -33,7 +32,7 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
     coarse = replace(Silhouette.of(mask, valid), scale=silhouette.scale * factor, device=silhouette.device)
     # the full-size borders, so that poses aligned to them stand where they stand at full size
     vars(coarse)["extent"] = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
-    return belongs(coarse, silhouette)
+    return coarse
 
 
 def _first(factor: int, size: tuple[int, int]) -> int:

@@ -56,13 +56,12 @@ def test_the_borders_are_those_at_full_size() -> None:
     assert (left, top, bottom) == (3.25, 4.75, 15.25)
 
 
-def test_who_knows_a_silhouette_knows_its_smaller_one_and_counts_poses_by_its_pixels() -> None:
-    count = PoseCount()
-    (mine,) = count.own([Silhouette.of(np.ones((8, 8)))])
-    count_poses(3, coarser_silhouette(mine, 2))
-    assert count.poses == 0.75  # a quarter of the pixels
-    count_poses(2, coarser_silhouette(coarser_silhouette(mine, 2), 2))
-    assert count.poses == 0.875
+def test_a_pose_in_a_smaller_picture_counts_by_its_pixels() -> None:
+    count, half = PoseCount(), coarser_silhouette(Silhouette.of(np.ones((8, 8))), 2)
+    with count.counting():
+        count_poses(3, half)
+        count_poses(2, coarser_silhouette(half, 2))
+    assert count.poses == 3 / 4 + 2 / 16
 
 
 def test_a_factor_that_leaves_no_pixel_is_refused(camera: Camera) -> None:

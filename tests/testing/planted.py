@@ -443,18 +443,6 @@ class SpendsInSecret(Holds):
         return replace(super().frame(observation), evaluations=100)
 
 
-class SpendsInThreads(Holds):
-    """Says 100 evaluations and spends 20,000 in threads of its own."""
-
-    def frame(self, observation: Any) -> Frame:
-        threads = [threading.Thread(target=self.draw, args=(observation, 10_000)) for _ in range(2)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        return replace(super().frame(observation), evaluations=100)
-
-
 class CostsNothing(Holds):
     def frame(self, observation: Any) -> Frame:
         return replace(super().frame(observation), cost=0.0, history=np.zeros(1))
@@ -546,7 +534,6 @@ TRACKERS: dict[type, tuple[str, ...]] = {
     Remembers: ("used_twice",),
     SpendsAndSaysSo: ("audit",),
     SpendsInSecret: ("audit",),
-    SpendsInThreads: ("audit",),
     CostsNothing: ("audit",),
     InventsAreas: ("audit",),
     GivesFramesTwice: ("one_frame_each",),

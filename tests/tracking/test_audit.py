@@ -45,7 +45,6 @@ def test_an_honest_tracker_is_left_as_it_is() -> None:
     [
         (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
         (planted.SpendsInSecret, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
-        (planted.SpendsInThreads, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
         (planted.CostsNothing, ", got 0 (12 such frames)"),
         (planted.InventsAreas, ", got [[0, 0, 100]] (12 such frames)"),
     ],
@@ -58,7 +57,7 @@ def test_what_a_tracker_says_is_held_against_what_the_host_finds(kind: Any, said
     for one, other in zip(frames, honest, strict=True):
         assert one.cost == other.cost
         np.testing.assert_array_equal(one.areas, other.areas)
-        if kind in (planted.SpendsInSecret, planted.SpendsInThreads):
+        if kind is planted.SpendsInSecret:
             assert one.evaluations == 20_001
 
 
@@ -84,7 +83,7 @@ def test_no_method_of_posefits_own_is_warned_of(method: dict[str, str]) -> None:
 def test_trackers_in_several_threads_are_counted_each_for_itself() -> None:
     together = threading.Barrier(4)
 
-    class Patient(planted.SpendsInThreads):
+    class Patient(planted.SpendsInSecret):
         def frame(self, observation: Any) -> Any:
             together.wait(60.0)
             return super().frame(observation)

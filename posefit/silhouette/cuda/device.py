@@ -4,7 +4,6 @@ from copy import copy
 from importlib.util import find_spec
 
 from posefit.errors import InputError
-from posefit.silhouette.drawn import belongs
 from posefit.silhouette.mask import Silhouette
 
 DEVICES = ("cpu", "cuda")
@@ -41,4 +40,4 @@ def moved_to(silhouette: Silhouette, device: str) -> Silhouette:
         return silhouette
     moved = copy(silhouette)  # its borders, too, which a smaller picture has from a larger one
     object.__setattr__(moved, "device", device)
-    return belongs(moved, silhouette)
+    return moved
