@@ -34,7 +34,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from itertools import chain, combinations, product
 from math import prod
@@ -70,7 +70,7 @@ MAX_BYTES = 1_000_000  # bytes
 DIGEST_BYTES = 32  # of a key
 NAMES = tuple(sorted(field.name for field in fields(TrackCell)))  # in the order of a key
 CROSSED = ("method", "motion", "train", "settings", "frames", "fps", "evaluations")  # checked together by `cell_of`
-CACHED = 1000  # combinations of these, and entries of a list, that are kept in memory
+CACHED = 4096  # combinations of these, and entries of a list, that are kept in memory
 
 Entry = Mapping[str, Any]
 
@@ -81,7 +81,7 @@ class Entries:
     def __init__(self, field: str, values: Sequence[Any], whole: bool = False) -> None:
         self._field, self._values, self._whole = field, values, whole
         # the checked fields of an entry; and, as JSON, with their places among all fields
-        self.checked = lru_cache(CACHED)(self._checked)
+        self.checked = cache(self._checked) if len(values) <= CACHED else self._checked
 
     def __len__(self) -> int:
         return len(self._values)

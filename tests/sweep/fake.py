@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from posefit.sweep.cell import CellResult, TrackCell, packed_joints
-from posefit.sweep.engines.engine import Limits
+from posefit.sweep.engines.engine import Limits, Outcome
 
 if TYPE_CHECKING:
-    from posefit.sweep.driver import Tally
+    from posefit.sweep.driver import Driver, Lease, Tally
     from posefit.sweep.engines.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
@@ -54,7 +54,7 @@ def behave(cell: TrackCell) -> CellResult:
             os._exit(0)
         case n if n == EXIT:
             sys.exit(0)
-        case n if n == KILLED:  # from outside, as far as anybody can tell
+        case n if n == KILLED:  # as if from outside
             os.kill(os.getpid(), (signal.SIGKILL, signal.SIGTERM)[cell.seed % 2])
         case n if n == COMPILE:
             compiled()
@@ -104,6 +104,51 @@ def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
 
     with Driver(out) as driver:
         return drive_cells(chosen, driver, engine, print)
+
+
+class Instant:
+    """An engine that makes up a cell's result at once."""
+
+    def __init__(self) -> None:
+        self.ended: list[Outcome] = []
+
+    def window(self) -> int:
+        return 1
+
+    def submit(self, cell: TrackCell) -> None:
+        self.ended.append(Outcome(cell, result(cell)))
+
+    def wait(self, seconds: float) -> list[Outcome]:
+        ended, self.ended = self.ended, []
+        return ended
+
+    def close(self) -> None: ...
+
+
+def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
+    """Return a ledger with the rows of so many cells."""
+    assert swept(folder, cells(start + count)[start:], Instant()).done == count
+    return folder
+
+
+def leased(driver: "Driver", cell: TrackCell) -> "Lease":
+    """Return the lease on a cell that is free."""
+    from posefit.sweep.driver import Lease
+
+    lease = driver.lease(cell)
+    assert isinstance(lease, Lease)
+    return lease
+
+
+def finished(driver: "Driver", cell: TrackCell) -> None:
+    """Lease a cell, and write its row."""
+    driver.finish(leased(driver, cell), result(cell))
+
+
+def failed(driver: "Driver", cell: TrackCell, *reasons: str, own: bool = True) -> None:
+    """Note failed attempts at a cell."""
+    for reason in reasons:
+        driver.fail(leased(driver, cell), reason, own)
 
 
 def starts(path: Path) -> list[tuple[str, int]]:

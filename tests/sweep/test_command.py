@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 
 from posefit.sweep.command import duration_text
-from posefit.sweep.driver import Driver, Lease, State
+from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from tests.cases import each
 from tests.cli.test_command_line import fails, run
+from tests.sweep.fake import failed
 
 PLAN = """
 [defaults]
@@ -72,28 +73,15 @@ def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> 
     assert lines[-1].endswith(" on 2 workers")
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
     run("sweep", plan, "--out", tmp_path / "out")
-    found = json.loads(run("sweep", plan, "--dry-run", "--json", "--out", tmp_path / "out").stdout)
-    assert [cell["done"] for cell in found["cells"]] == [True] * 8
-    assert found["seconds"] == 0.0
+    listed = json.loads(run("sweep", plan, "--dry-run", "--json", "--out", tmp_path / "out").stdout)
+    assert [cell["done"] for cell in listed["cells"]] == [True] * 8
+    assert listed["seconds"] == 0.0
 
 
-def test_times_are_told_as_people_say_them() -> None:
+def test_durations_in_words() -> None:
     assert [duration_text(seconds) for seconds in (0.2, 1.3, 4.4, 89.0, 90.0, 5400.0)] == [
         "0 seconds", "1 second", "4 seconds", "89 seconds", "1.5 minutes", "1.5 hours",
     ]  # fmt: skip
-
-
-@pytest.mark.slow
-def test_a_cell_that_fails_is_quarantined_and_the_exit_status_says_so(plan: Path, tmp_path: Path) -> None:
-    plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
-    out = tmp_path / "out"
-    result = run("sweep", plan, "--out", out, "--workers", 1)
-    assert result.exit_code == 1, result.stderr
-    assert (
-        f"8 of 9 cells done, 8 of them now, written to {out}; 1 quarantined: the reasons are in {out}" in result.stdout
-    )
-    (lost,) = Ledger(out).quarantined()
-    assert "components must be a whole number" in lost["reasons"][0]
 
 
 def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(plan: Path) -> None:
@@ -108,15 +96,14 @@ def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(pl
 
 def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path, tmp_path: Path) -> None:
     plan.write_text('[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n')
+    words, out = ["sweep", plan, "--out", tmp_path / "out", "--workers", 1], tmp_path / "out"
     (cell,) = Plan.read(plan)
-    with Driver(tmp_path / "out") as driver:
-        for _ in range(3):
-            lease = driver.lease(cell)
-            assert isinstance(lease, Lease)
-            driver.fail(lease, "the disk of its files was away")
-        assert driver.lease(cell) is State.QUARANTINED
-    assert run("sweep", plan, "--out", tmp_path / "out", "--workers", 1).exit_code == 1
-    again = run("sweep", plan, "--out", tmp_path / "out", "--workers", 1, "--retry-quarantined")
+    with Driver(out) as driver:
+        failed(driver, cell, *["the disk of its files was away"] * 3)
+    lost = run(*words)
+    assert lost.exit_code == 1
+    assert f"written to {out}; 1 quarantined: the reasons are in {out}" in lost.stdout
+    again = run(*words, "--retry-quarantined")
     assert again.exit_code == 0, again.stderr
     assert "1 of 1 cells done, 1 of them now" in again.stdout
     assert "1 cell is out of quarantine, to be tried again" in again.stderr

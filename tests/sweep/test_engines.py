@@ -4,7 +4,7 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
 from http.client import HTTPConnection
@@ -14,9 +14,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from posefit.sweep.cell import TIMES, run_cell
+from posefit.sweep.cell import TIMES, TrackCell, run_cell
 from posefit.sweep.driver import ATTEMPTS, Driver, Tally, drive_cells
-from posefit.sweep.engines.engine import Engine, EngineError, Limits
+from posefit.sweep.engines.engine import Engine, EngineError, Limits, Outcome
 from posefit.sweep.engines.processes import Processes
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
@@ -29,15 +29,33 @@ ROOT = Path(__file__).parents[2]
 Make = Callable[..., Engine]
 
 
-@pytest.fixture(params=["processes", pytest.param("dask", marks=pytest.mark.slow)])
-def make(request: pytest.FixtureRequest) -> Make:
-    """Return what makes an engine of two workers."""
-    if request.param == "processes":
-        return lambda run=behave, limits=LIMITS: Processes(2, limits, run)
+def cluster(*address: str, workers: int | None = None, limits: Limits = LIMITS, patience: float = PATIENCE) -> Any:
+    """Return an engine of Dask workers: those of a scheduler at an address, or so many of its own."""
     pytest.importorskip("distributed")
     from posefit.sweep.engines.cluster import Cluster
 
-    return lambda run=behave, limits=LIMITS: Cluster(workers=2, limits=limits, run=run, patience=PATIENCE)
+    return Cluster(*address, workers=workers, limits=limits, run=behave, patience=patience)
+
+
+@pytest.fixture(params=["processes", pytest.param("dask", marks=pytest.mark.slow)])
+def make(request: pytest.FixtureRequest) -> Make:
+    """Return what makes an engine of so many workers."""
+    if request.param == "processes":
+        return lambda workers, limits=LIMITS: Processes(workers, limits, behave)
+    return lambda workers, limits=LIMITS: cluster(workers=workers, limits=limits)
+
+
+def one_by_one(engine: Engine, chosen: Sequence[TrackCell]) -> list[Outcome]:
+    """Return what becomes of cells, each of which begins when the one before has ended."""
+    outcomes: list[Outcome] = []
+    with closing(engine):
+        engine.window()
+        for cell in chosen:
+            engine.submit(cell)
+            while not (ended := engine.wait(1.0)):
+                pass
+            outcomes += ended
+    return outcomes
 
 
 def test_a_cell_that_was_quarantined_is_tried_again_once_its_file_is_gone(tmp_path: Path) -> None:
@@ -54,25 +72,16 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
     pytest.importorskip("distributed")
     from posefit.sweep.engines.cluster import Cluster
 
-    plan = Plan.of(
-        {
-            "defaults": {"frames": 3, "size": [80, 60], "evaluations": 200},
-            "product": {
-                "methods": ["sapso@pca", "cma@pca", "particle@full"],
-                "motions": ["walk"],
-                "corruptions": [{}, {"holes": 0.5, "dropped": 0.5}],
-                "views": [[0, 90]],
-                "instances": [1],
-                "seeds": 2,
-            },
-        }
-    )
+    corruptions = [{}, {"holes": 0.5, "dropped": 0.5}]
+    methods = ["sapso@pca", "cma@pca", "particle@full"]
+    product = {"methods": methods, "motions": ["walk"], "corruptions": corruptions, "views": [[0, 90]], "seeds": 2}
+    plan = Plan.of({"defaults": {"frames": 3, "size": [80, 60], "evaluations": 200, "instance": 1}, "product": product})
     runs: list[tuple[str, Any, Engine]] = [
         ("processes", list(plan), Processes(2, Limits(), run_cell)),
         ("again", list(plan)[::-1], Processes(1, Limits(), run_cell)),
         ("dask", list(plan)[::-1], Cluster(workers=2, patience=PATIENCE)),
     ]
-    found = []
+    results = []
     for name, chosen, engine in runs:
         assert swept(tmp_path / name, chosen, engine).done == len(plan)
         ledger = Ledger(tmp_path / name)
@@ -82,59 +91,38 @@ def test_a_plan_gives_the_same_rows_twice_on_both_engines_and_in_another_order(t
             for column in TIMES:
                 assert row.pop(column) > 0.0
         joints = {key: {k: v.tobytes() for k, v in ledger.joints(key).items()} for key in rows}
-        found.append((rows, joints))
-    assert found[0] == found[1] == found[2]
-    first = next(iter(found[0][0].values()))
+        results.append((rows, joints))
+    assert results[0] == results[1] == results[2]
+    first = next(iter(results[0][0].values()))
     assert first["trace"]["evaluations"][-1] <= 200
     assert first["trace"]["cost"] == sorted(first["trace"]["cost"], reverse=True)
 
 
-@pytest.mark.parametrize("engine", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
-def test_a_cell_that_ends_its_process_with_status_0_is_noticed_at_once(engine: str, tmp_path: Path) -> None:
+def test_a_cell_that_ends_its_process_with_status_0_is_noticed_at_once(make: Make, tmp_path: Path) -> None:
     # the limit is an hour: a sweep that waits for it takes three, and no test here does
     bad = [replace(cells(1)[0], frames=n) for n in (fake.LEAVE, fake.EXIT)]
-    tally = swept(tmp_path / "ledger", [*bad, *cells(3)], made(engine, Limits(3600.0, 0.6)))
+    tally = swept(tmp_path / "ledger", [*bad, *cells(3)], make(1, Limits(3600.0, 0.6)))
     assert (tally.done, tally.quarantined, tally.failed) == (3, 2, 2 * ATTEMPTS)
     reasons = {row["spec"]["frames"]: row["reasons"] for row in Ledger(tmp_path / "ledger").quarantined()}
     assert reasons[fake.LEAVE] == ["its process ended itself with status 0"] * 3
     assert reasons[fake.EXIT] == ["SystemExit: 0"] * 3
 
 
-@pytest.mark.parametrize("engine", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
-def test_a_process_that_something_outside_kills_costs_its_cell_no_attempt(engine: str, tmp_path: Path) -> None:
-    pair = [replace(cell, frames=fake.KILLED) for cell in cells(2)]
-    running = made(engine, LIMITS)
-    ended: list[Any] = []
-    with closing(running):
-        running.window()
-        for cell in pair:
-            running.submit(cell)
-            while not (found := running.wait(1.0)):
-                pass
-            ended += found
-    assert [(one.reason, one.own) for one in ended] == [
-        ("its process died of SIGKILL", False),
-        ("its process died of SIGTERM", False),
-    ]
+def test_a_process_that_something_outside_kills_costs_its_cell_no_attempt(make: Make) -> None:
+    ended = one_by_one(make(1), cells(2, fake.KILLED))
+    reasons = ["its process died of SIGKILL", "its process died of SIGTERM"]
+    assert [(outcome.reason, outcome.own) for outcome in ended] == [(reason, False) for reason in reasons]
 
 
-@pytest.mark.parametrize("engine", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
-def test_limits_of_memory_and_time_segfaults_and_exceptions_are_the_cells_own_faults(engine: str) -> None:
-    bad = [replace(cells(1)[0], frames=n) for n in (fake.SEGFAULT, fake.HOG, fake.RAISE, fake.ENDLESS)]
-    running = made(engine, Limits(5.0, 0.6))
-    with closing(running):
-        running.window()
-        for cell in bad:
-            running.submit(cell)
-            while not (found := running.wait(1.0)):
-                pass
-            assert found[0].own
-            assert found[0].reason in (
-                "its process died of SIGSEGV",
-                "it wanted more memory than its limit of 0.6 GB",
-                "ZeroDivisionError: one by none",
-                "it ran past its limit of 5 s",
-            )
+def test_limits_of_memory_and_time_segfaults_and_exceptions_are_the_cells_own_faults(make: Make) -> None:
+    reasons = {
+        fake.SEGFAULT: "its process died of SIGSEGV",
+        fake.HOG: "it wanted more memory than its limit of 0.6 GB",
+        fake.RAISE: "ZeroDivisionError: one by none",
+        fake.ENDLESS: "it ran past its limit of 5 s",
+    }
+    ended = one_by_one(make(1, Limits(5.0, 0.6)), [replace(cells(1)[0], frames=n) for n in reasons])
+    assert [(outcome.reason, outcome.own) for outcome in ended] == [(reason, True) for reason in reasons.values()]
 
 
 def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> None:
@@ -154,15 +142,13 @@ assert compiled() == 1
 
 
 @pytest.mark.slow
-def test_a_cell_changes_nothing_for_other_peoples_tasks_on_a_shared_worker(served: "Served", tmp_path: Path) -> None:
-    from posefit.sweep.engines.cluster import Cluster
-
+def test_a_cell_changes_nothing_for_other_tasks_on_a_shared_worker(served: "Served", tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     with distributed.Client(served.address) as client:
         client.wait_for_workers(1, timeout=PATIENCE)
         before = client.submit(surroundings, pure=False).result()
         bad = [replace(cells(1)[0], frames=n) for n in (fake.SEGFAULT, fake.LEAVE, fake.HOG, fake.COMPILE)]
-        engine = Cluster(served.address, limits=LIMITS, run=behave, patience=PATIENCE)
+        engine = cluster(served.address)
         assert swept(tmp_path / "ledger", [*bad, *cells(2)], engine).quarantined == 3
         assert client.submit(surroundings, pure=False).result() == before
 
@@ -187,9 +173,7 @@ def test_workers_of_this_machine_listen_on_the_loopback_alone_and_show_no_page_u
     for asked, status in ((False, 404), (True, 200)):
         with closing(Cluster(workers=1, run=behave, patience=PATIENCE, dashboard=asked)) as engine:
             engine.window()
-            found = set(listening())
-            assert found
-            assert found <= {"0100007F"}  # 127.0.0.1, as the kernel writes it
+            assert set(listening()) == {"0100007F"}  # 127.0.0.1, as the kernel writes it
             address = urlsplit(engine._local.dashboard_link)
             connection = HTTPConnection(str(address.hostname), address.port)
             connection.request("GET", "/status")
@@ -217,32 +201,12 @@ def listening() -> Iterator[str]:
                 yield words[1].partition(":")[0]
 
 
-def made(engine: str, limits: Limits) -> Engine:
-    """Return an engine of one worker."""
-    if engine == "processes":
-        return Processes(1, limits, behave)
-    pytest.importorskip("distributed")
-    from posefit.sweep.engines.cluster import Cluster
-
-    return Cluster(workers=1, limits=limits, run=behave, patience=PATIENCE)
-
-
 def test_two_workers_run_two_cells_at_once(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # each of the two ends once both have begun
     monkeypatch.setenv(fake.STARTS, str(tmp_path / "starts"))
-    tally = swept(tmp_path / "ledger", cells(2, fake.TOGETHER), make())
+    tally = swept(tmp_path / "ledger", cells(2, fake.TOGETHER), make(2))
     assert (tally.done, tally.failed) == (2, 0)
     assert len({worker for _, worker in fake.starts(tmp_path / "starts")}) == 2
-
-
-def test_a_number_of_workers_below_one_is_a_mistake() -> None:
-    with pytest.raises(ValueError, match="workers must be at least 1, got 0"):
-        Processes(0, Limits(), run_cell)
-
-
-def test_a_limit_of_nothing_is_a_mistake() -> None:
-    with pytest.raises(ValueError, match="the limit of seconds must be above 0, got 0"):
-        Limits(seconds=0.0)
 
 
 def port() -> int:
@@ -256,7 +220,7 @@ def dask(*words: str) -> subprocess.Popen[bytes]:
         [sys.executable, "-m", "distributed.cli." + words[0], *words[1:]],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        cwd=Path(__file__).parents[2],
+        cwd=ROOT,
     )
 
 
@@ -290,19 +254,14 @@ def served() -> Iterator[Served]:
 
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    from posefit.sweep.engines.cluster import Cluster
-
     address = f"tcp://127.0.0.1:{port()}"
     with pytest.raises(EngineError, match=f"scheduler must be one that answers, got {address}"):
-        Cluster(address, run=behave, patience=1.0)
+        cluster(address, patience=1.0)
 
 
 @pytest.mark.slow
 def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp_path: Path) -> None:
-    from posefit.sweep.engines.cluster import Cluster
-
-    engine = Cluster(served.address, limits=LIMITS, run=behave, patience=PATIENCE)
+    engine = cluster(served.address)
     assert engine.window() == 1
     engine._patience = 1.0
 
@@ -322,9 +281,7 @@ def test_a_scheduler_that_goes_away_leaves_all_finished_rows(served: Served, tmp
 
 @pytest.mark.slow
 def test_a_scheduler_that_comes_back_is_waited_for(served: Served, tmp_path: Path) -> None:
-    from posefit.sweep.engines.cluster import Cluster
-
-    engine = Cluster(served.address, limits=LIMITS, run=behave, patience=PATIENCE)
+    engine = cluster(served.address)
     gone = []
 
     def watch(tally: Tally) -> None:

@@ -1,4 +1,4 @@
-"""How long a plan will take is told from a few small cells, whatever its cells are."""
+"""How long a plan will take is estimated from a few small cells, whatever its cells are."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -47,6 +47,13 @@ def searches(**more: Any) -> Sequence[Cell]:
     return search_cells(plan)
 
 
+def workload(cells: Sequence[Cell]) -> Workload:
+    total = Workload()
+    for cell in cells:
+        total.add(cell)
+    return total
+
+
 @each(
     ("cells", "evaluations"),
     [
@@ -59,21 +66,16 @@ def searches(**more: Any) -> Sequence[Cell]:
 def test_an_estimate_is_the_time_of_all_cells_where_evaluations_take_the_same(
     cells: Sequence[Cell], evaluations: int
 ) -> None:
-    workload, engine = Workload(), Even()
-    for cell in cells:
-        workload.add(cell)
-    found = estimate_of(workload, engine, 2)
-    assert found.untried == {}
-    assert found.seconds == pytest.approx((len(cells) * SECONDS + evaluations * EACH) / 2)
+    engine = Even()
+    estimate = estimate_of(workload(cells), engine, 2)
+    assert estimate.untried == {}
+    assert estimate.seconds == pytest.approx((len(cells) * SECONDS + evaluations * EACH) / 2)
     assert sum(cell.total_evaluations for cell in engine.tried) < 10_000
     for cell in engine.tried:
         assert cell.evaluations >= cell.settings.get("population_size", 1)
 
 
 def test_a_kind_that_fails_is_named_once_and_counts_for_nothing() -> None:
-    workload, engine = Workload(), Even()
-    for cell in searches(methods=["random", "pso"]):
-        workload.add(cell)
-    found = estimate_of(workload, engine, 1)
-    assert found.untried == {"pso on f1 in 9D, instance 10000, seed 0": "it does not work"}
-    assert found.seconds == pytest.approx(2 * SECONDS + 2 * 900 * EACH)
+    estimate = estimate_of(workload(searches(methods=["random", "pso"])), Even(), 1)
+    assert estimate.untried == {"pso on f1 in 9D, instance 10000, seed 0": "it does not work"}
+    assert estimate.seconds == pytest.approx(2 * SECONDS + 2 * 900 * EACH)

@@ -12,14 +12,13 @@ from typing import Any
 import pytest
 
 from posefit.report.live import progress_of
-from posefit.sweep.driver import Driver, Lease, drive_cells
+from posefit.sweep.driver import Driver, drive_cells
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.log import on_one_machine
 from tests.cases import each
-from tests.sweep.fake import cells, result
-from tests.sweep.test_ledger import Here, filled
+from tests.sweep.fake import Instant, cells, filled, finished, leased, result
 
-DEEP = b"[" * 200_000  # nested more deeply than anybody reads
+DEEP = b"[" * 200_000  # nested too deeply to be read
 ROOT = Path(__file__).parents[2]
 KILLS = 24
 # Drivers that are gone right before their nth call that changes a disk, half of the bytes of a write being there. Each
@@ -27,8 +26,7 @@ KILLS = 24
 KILLED = """
 import os, sys
 from pathlib import Path
-from tests.sweep.fake import cells
-from tests.sweep.test_ledger import Here
+from tests.sweep.fake import Instant, cells
 from posefit.sweep.driver import drive_cells
 from posefit.sweep.driver import Driver
 
@@ -55,13 +53,12 @@ for last in range(1, kills + 1):
     for name in real:
         setattr(os, name, faulty(name))
     with Driver(folder) as driver:
-        drive_cells(cells(1 + last // 4), driver, Here(), lambda _: None)
+        drive_cells(cells(1 + last // 4), driver, Instant(), lambda _: None)
     os._exit(0)
 """
 
 
 def test_a_driver_may_be_killed_before_any_call_that_changes_the_disk(tmp_path: Path) -> None:
-    # one ledger goes through all of it: every driver folds the logs of those that were killed before it
     folder = tmp_path / "ledger"
     words = [sys.executable, "-c", KILLED, str(folder), str(KILLS)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
@@ -80,27 +77,25 @@ def test_a_driver_may_be_killed_before_any_call_that_changes_the_disk(tmp_path: 
 
 def test_a_log_that_is_cut_off_behind_its_driver_takes_no_later_row_with_it(tmp_path: Path) -> None:
     folder, chosen = tmp_path / "ledger", cells(3)
-    said: list[str] = []
-    with Driver(folder, said.append) as driver:
+    messages: list[str] = []
+    with Driver(folder, messages.append) as driver:
         for k, cell in enumerate(chosen):
-            lease = driver.lease(cell)
-            assert isinstance(lease, Lease)
-            driver.finish(lease, result(cell))
+            finished(driver, cell)
             if k == 1:
                 (log,) = (folder / "rows").glob("*.jsonl")
                 os.truncate(log, log.stat().st_size - 40)
     assert {row["key"] for row in Ledger(folder).rows()} == {chosen[0].key, chosen[2].key}
-    assert len(said) == 1
+    assert len(messages) == 1
     filled(folder, 3)
 
 
-def test_a_log_that_somebody_removes_ends_the_sweep_in_one_line(tmp_path: Path) -> None:
+def test_a_log_that_is_removed_ends_the_sweep_in_one_line(tmp_path: Path) -> None:
     expected = "got a log that was removed; 0 of 2 cells are done and safe"
     with Driver(tmp_path / "ledger") as driver:
         for path in (tmp_path / "ledger" / "rows").iterdir():
             path.unlink()
         with pytest.raises(ValueError, match=expected):
-            drive_cells(cells(2), driver, Here(), print)
+            drive_cells(cells(2), driver, Instant(), print)
 
 
 @each("content", [b'{"key"', DEEP, b"\xff"])
@@ -110,9 +105,9 @@ def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_aga
     folder = filled(tmp_path / "ledger", 1)
     bad = folder / "quarantine" / f"{cells(2)[1].key}.json"
     bad.write_bytes(content)
-    said: list[str] = []
-    assert Ledger(folder, said.append).quarantined() == []
-    assert len(said) == 1
+    messages: list[str] = []
+    assert Ledger(folder, messages.append).quarantined() == []
+    assert len(messages) == 1
     assert (folder / "aside" / bad.name).read_bytes() == content
     filled(folder, 2)
 
@@ -122,9 +117,7 @@ def test_a_damaged_lease_holds_nothing(content: bytes, tmp_path: Path) -> None:
     folder, cell = tmp_path / "ledger", cells(1)[0]
     with Driver(folder) as driver:
         (folder / "leases" / f"{cell.key}.1").write_bytes(content)
-        found = driver.lease(cell)
-    assert isinstance(found, Lease)
-    assert found.attempt == 2
+        assert leased(driver, cell).attempt == 2
     assert progress_of(Ledger(folder)).running == 0
 
 
@@ -139,8 +132,7 @@ def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:
 def test_a_clock_that_is_set_back_or_ahead_changes_nothing(step: float, tmp_path: Path, monkeypatch: Any) -> None:
     folder, clock = tmp_path / "ledger", time.time
     with Driver(folder) as one:
-        lease = one.lease(cells(1)[0])
-        assert isinstance(lease, Lease)
+        lease = leased(one, cells(1)[0])
         (folder / "leases" / ".half").write_text("")  # what another one is writing just now
         monkeypatch.setattr(time, "time", lambda: clock() + step)
         monkeypatch.setattr(time, "gmtime", lambda: time.localtime(clock() + step))
@@ -169,7 +161,7 @@ def test_a_disk_that_forgets_locks_is_refused(tmp_path: Path, monkeypatch: Any) 
 
 
 @each(
-    ("mount", "found"),
+    ("mount", "reason"),
     [
         ("nfs rw - nfs host:/x rw,vers=3,local_lock=none", None),
         ("nfs rw - nfs host:/x rw,vers=3,local_lock=all", "nfs local_lock=all"),
@@ -180,30 +172,25 @@ def test_a_disk_that_forgets_locks_is_refused(tmp_path: Path, monkeypatch: Any) 
         ("nfs rw - ext4 /dev/sda1 rw", None),
     ],
 )
-def test_a_mount_whose_locks_stay_on_one_machine_is_known(mount: str, found: str | None, tmp_path: Path) -> None:
+def test_a_mount_whose_locks_stay_on_one_machine_is_known(mount: str, reason: str | None, tmp_path: Path) -> None:
     place, _, rest = mount.partition(" ")
     (tmp_path / "a b" / place / "ledger").mkdir(parents=True)
     escaped = str(tmp_path / "a b" / place).replace(" ", "\\040")  # proc(5)
     mounts = tmp_path / "mountinfo"
     mounts.write_text(f"1 0 8:1 / / rw - ext4 /dev/sda2 rw\n36 35 98:0 / {escaped} {rest}\n")
-    assert on_one_machine(tmp_path / "a b" / place / "ledger", mounts) == found
+    assert on_one_machine(tmp_path / "a b" / place / "ledger", mounts) == reason
     assert on_one_machine(tmp_path, mounts) is None
     assert on_one_machine(tmp_path, tmp_path / "nothing") is None
 
 
 def test_where_locks_stay_on_one_machine_another_ones_cells_are_not_judged(tmp_path: Path, monkeypatch: Any) -> None:
-    folder = tmp_path / "ledger"
-    with Driver(folder) as there:
+    folder, driver = tmp_path / "ledger", "posefit.sweep.driver"
+    with Driver(folder) as there, Driver(folder) as here:
         monkeypatch.setattr("socket.gethostname", lambda: "there")
-        assert isinstance(there.lease(cells(1)[0]), Lease)
+        leased(there, cells(1)[0])
         monkeypatch.setattr("socket.gethostname", lambda: "here")
-        monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: "nfs nolock")
-        with (
-            Driver(folder) as here,
-            pytest.raises(
-                ValueError, match="expected a disk whose locks other machines see, got nfs nolock, and there"
-            ),
-        ):
+        monkeypatch.setattr(f"{driver}.on_one_machine", lambda _: "nfs nolock")
+        with pytest.raises(ValueError, match="a disk whose locks other machines see, got nfs nolock, and there"):
             here.lease(cells(1)[0])
-    monkeypatch.setattr("posefit.sweep.driver.on_one_machine", lambda _: None)
+    monkeypatch.setattr(f"{driver}.on_one_machine", lambda _: None)
     filled(folder, 1)

@@ -20,29 +20,31 @@ def cell(**fields: Any) -> TrackCell:
 
 def test_cells_with_less_knowledge_have_keys_of_their_own_however_they_are_made() -> None:
     known = [{}, {"yaw_off_degrees": 25}, {"yaw_off_degrees": 180}, {"body_off_percent": 10}]
-    cells = [cell(**one) for one in known]
-    assert len({one.key for one in cells}) == len(known)
+    cells = [cell(**fields) for fields in known]
+    assert len({made.key for made in cells}) == len(known)
     assert cells[1].spec["yaw_off_degrees"] == 25.0
     product = {"methods": ["sapso@pca"], "motions": ["walk"], "seeds": [0]}
-    for one, made in zip(known, cells, strict=True):
-        entry = {"instance": 0, **one}  # of fields that are checked by themselves
+    for fields, made in zip(known, cells, strict=True):
+        entry = {"instance": 0, **fields}  # of fields that are checked by themselves
         plan = Plan.of({"defaults": {"frames": 2, "size": [160, 120]}, "product": {**product, "instances": [entry]}})
-        assert list(plan.keys()) == [found.key for found in plan] == [made.key]
+        assert list(plan.keys()) == [planned.key for planned in plan] == [made.key]
 
 
-def test_the_first_yaw_is_off_by_no_more_than_was_said_and_unknown_at_180() -> None:
-    truth = cell_scene(cell()).yaw
-    assert truth is not None
-    offs = []
-    for instance in range(8):
-        true = cell_scene(cell(instance=instance)).yaw
-        given = cell_scene(cell(instance=instance, yaw_off_degrees=25.0)).yaw
-        assert true is not None
-        assert given is not None
-        offs.append(np.degrees(given - true))
-    assert np.abs(offs).max() <= 25.0
-    assert np.abs(offs).max() > 10.0
-    assert min(offs) < 0.0 < max(offs)
+def yaw(**fields: Any) -> float:
+    first = cell_scene(cell(**fields)).yaw
+    assert first is not None
+    return first
+
+
+def yaw_off(**fields: Any) -> float:
+    """Return by how many radians the yaw that a method knows is off."""
+    return yaw(yaw_off_degrees=25.0, **fields) - yaw(**fields)
+
+
+def test_the_first_yaw_is_off_by_no_more_than_the_limit_and_unknown_at_180() -> None:
+    offs = np.degrees([yaw_off(instance=instance) for instance in range(8)])
+    assert 10.0 < np.abs(offs).max() <= 25.0
+    assert offs.min() < 0.0 < offs.max()
     assert cell_scene(cell(yaw_off_degrees=180.0)).yaw is None
 
 
@@ -54,23 +56,17 @@ def test_the_body_is_off_and_neither_the_truth_nor_the_observations() -> None:
     assert off.truth is not None
     assert np.array_equal(off.truth.skeleton.offsets, exact.truth.skeleton.offsets)
     for k in range(2):
-        one, other = (scene.observations[k].silhouettes[0].mask for scene in (exact, off))
-        assert np.array_equal(one, other)
+        masks = [scene.observations[k].silhouettes[0].mask for scene in (exact, off)]
+        assert np.array_equal(*masks)
 
 
-def test_what_is_known_is_the_same_for_every_method_and_seed_and_another_for_another_motion() -> None:
-    def known(**fields: Any) -> float:
-        found, true = cell_scene(cell(yaw_off_degrees=25.0, **fields)).yaw, cell_scene(cell(**fields)).yaw
-        assert found is not None
-        assert true is not None
-        return found - true
-
-    assert known() == known(seed=3) == known(method="random@full") == known(body_off_percent=5.0)
-    assert known() != known(motion="run")
+def test_the_yaw_is_off_by_the_same_for_every_method_and_seed_and_by_another_for_another_motion() -> None:
+    assert yaw_off() == yaw_off(seed=3) == yaw_off(method="random@full") == yaw_off(body_off_percent=5.0)
+    assert yaw_off() != yaw_off(motion="run")
 
 
 @each(
-    ("field", "value", "said"),
+    ("field", "value", "message"),
     [
         ("yaw_off_degrees", 181, "yaw_off_degrees must lie in 0 to 180, got 181"),
         ("yaw_off_degrees", -1, "yaw_off_degrees must lie in 0 to 180, got -1"),
@@ -78,8 +74,8 @@ def test_what_is_known_is_the_same_for_every_method_and_seed_and_another_for_ano
         ("body_off_percent", 51, "body_off_percent must lie in 0 to 50, got 51"),
     ],
 )
-def test_a_value_that_makes_no_sense_is_named(field: str, value: object, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_a_value_that_makes_no_sense_is_named(field: str, value: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         cell(**{field: value})
 
 

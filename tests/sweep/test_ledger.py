@@ -4,8 +4,9 @@ import errno
 import os
 import subprocess
 import sys
-import threading
 import zlib
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,40 +15,12 @@ import numpy as np
 import pytest
 
 from posefit.sweep import log
-from posefit.sweep.cell import TrackCell
 from posefit.sweep.command import swept
 from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State, drive_cells
-from posefit.sweep.engines.engine import Outcome
 from posefit.sweep.ledger import Ledger
 from posefit.version import posefit_build
 from tests.cases import each
-from tests.sweep.fake import cells, result
-
-
-class Here:
-    """An engine that makes up a cell's result at once."""
-
-    def __init__(self) -> None:
-        self.ended: list[Outcome] = []
-
-    def window(self) -> int:
-        return 1
-
-    def submit(self, cell: TrackCell) -> None:
-        self.ended.append(Outcome(cell, result(cell)))
-
-    def wait(self, seconds: float) -> list[Outcome]:
-        ended, self.ended = self.ended, []
-        return ended
-
-    def close(self) -> None: ...
-
-
-def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
-    """Return a ledger with the rows of so many cells."""
-    with Driver(folder) as driver:
-        assert drive_cells(cells(start + count)[start:], driver, Here(), print).done == count
-    return folder
+from tests.sweep.fake import Instant, cells, failed, filled, finished, leased, result
 
 
 def the_log(folder: Path) -> Path:
@@ -59,43 +32,33 @@ def test_rows_and_joints_come_back_as_they_were_written(tmp_path: Path) -> None:
     ledger = Ledger(filled(tmp_path / "ledger"))
     assert len(ledger) == 5
     for cell in cells(5):
-        row = ledger.row(cell.key)
-        assert {name: value for name, value in row.items() if name not in ("joints", "seconds")} == {
-            name: value for name, value in result(cell).row.items() if name != "seconds"
-        }
-        joints = ledger.joints(cell.key)
+        row, joints = ledger.row(cell.key), ledger.joints(cell.key)
+        del row["joints"], row["seconds"]
+        assert row.items() <= result(cell).row.items()
         assert joints["estimate"].dtype == np.float32
         np.testing.assert_array_equal(joints["truth"], np.full((1, 27, 3), cell.seed))
 
 
-def test_a_frame_has_a_row_a_cell_whose_order_does_not_follow_from_when_it_was_run(tmp_path: Path) -> None:
+def test_a_frame_has_a_row_a_cell_in_the_order_of_the_specs(tmp_path: Path, monkeypatch: Any) -> None:
     pytest.importorskip("pandas")
     folder = filled(tmp_path / "ledger", 3, start=2)
     filled(folder, 2)
     bad = cells(6)[5]
     with Driver(folder) as driver:
-        for _ in range(3):
-            lease = driver.lease(bad)
-            assert isinstance(lease, Lease)
-            driver.fail(lease, "it had to")
+        failed(driver, bad, *["it had to"] * ATTEMPTS)
         assert driver.lease(bad) is State.QUARANTINED
     table = Ledger(folder).frame()
     assert table["seed"].tolist() == [0, 1, 2, 3, 4, 5]
     assert table["status"].tolist() == ["done"] * 5 + ["quarantined"]
     assert table["reason"].iloc[5] == "it had to; it had to; it had to"
-    assert table["version"].unique().tolist() == [posefit_build()]
-    assert table["view_degrees"].unique().tolist() == ["45"]
-    assert table["evaluations"].unique().tolist() == [2440]
+    for name, value in (("version", posefit_build()), ("view_degrees", "45"), ("evaluations", 2440)):
+        assert table[name].unique().tolist() == [value]
     assert table["error_degrees.mean"].iloc[0] == result(cells(1)[0]).row["error_degrees"]["mean"]
     assert table["joint_errors_mm.rhand"].iloc[4] == 4.0
     assert np.isnan(table["cost"].iloc[5])
-    assert Ledger(filled(tmp_path / "other", 1)).frame().shape[0] == 1
-
-
-def test_without_pandas_a_frame_says_what_to_install(tmp_path: Path, monkeypatch: Any) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match=r"pip install 'posefit\[sweep\]'"):
-        Ledger(filled(tmp_path / "ledger", 1)).frame()
+        Ledger(folder).frame()
 
 
 @each(
@@ -114,21 +77,21 @@ def test_a_damaged_row_is_named_put_aside_and_run_again(harm: Any, tmp_path: Pat
     lines[2] = harm(lines[2])
     the_log(folder).write_bytes(b"".join(lines))
 
-    said: list[str] = []
-    ledger = Ledger(folder, said.append)
+    messages: list[str] = []
+    ledger = Ledger(folder, messages.append)
     assert len(ledger) == len(list(ledger.rows())) == 4
     assert key not in ledger
-    assert len(said) == 1
-    assert str(the_log(folder)) in said[0]
-    assert "put aside" in said[0]
+    assert len(messages) == 1
+    assert str(the_log(folder)) in messages[0]
+    assert "put aside" in messages[0]
     if b"key" in lines[2]:
-        assert f"the row of cell {key[:8]}" in said[0]
+        assert f"the row of cell {key[:8]}" in messages[0]
     (aside,) = (folder / "aside").iterdir()
     assert aside.read_bytes() == lines[2]
 
-    with Driver(folder, said.append) as driver:
-        assert drive_cells(cells(5), driver, Here(), print).ran == 1
-    assert len(said) == 1
+    with Driver(folder, messages.append) as driver:
+        assert drive_cells(cells(5), driver, Instant(), print).ran == 1
+    assert len(messages) == 1
     assert sorted(row["key"] for row in Ledger(folder).rows()) == sorted(cell.key for cell in cells(5))
 
 
@@ -158,11 +121,8 @@ def test_of_two_rows_of_one_cell_the_first_counts(tmp_path: Path) -> None:
 def test_a_checksum_is_of_the_key_and_the_row() -> None:
     key = "0123456789abcdef" * 4
     line = log.encoded(key, {"cost": 1.0})
-    # CRC-32 as zip and PNG have it, of the key's 64 digits and then the row as JSON
-    assert line == b'{"key": "%s", "crc": "%08x", "row": {"cost": 1.0}}\n' % (
-        key.encode(),
-        zlib.crc32(key.encode() + b'{"cost": 1.0}'),
-    )
+    crc = zlib.crc32(key.encode() + b'{"cost": 1.0}')  # CRC-32 as zip and PNG have it
+    assert line == b'{"key": "%s", "crc": "%08x", "row": {"cost": 1.0}}\n' % (key.encode(), crc)
     assert log.decoded(line) == (key, b'{"cost": 1.0}')
     assert log.decoded(line.replace(b"0123", b"0133", 1)) is None  # one digit of the key
     assert log.decoded(line.replace(b"1.0", b"1.1")) is None
@@ -173,9 +133,7 @@ def test_a_row_that_was_cut_off_when_its_driver_died_is_no_row(tmp_path: Path) -
     whole = the_log(folder).read_bytes()
     for cut in (1, 100):
         the_log(folder).write_bytes(whole[:-cut])
-        said: list[str] = []
-        assert len(Ledger(folder, said.append)) == 4
-        assert not said
+        assert len(Ledger(folder, pytest.fail)) == 4
     filled(folder)
 
 
@@ -190,13 +148,13 @@ def test_damaged_joints_are_named(tmp_path: Path) -> None:
 def test_rows_of_another_version_are_read_and_counted_and_their_cells_are_run_again(tmp_path: Path) -> None:
     folder, old = tmp_path / "ledger", [replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)]
     with Driver(folder) as driver:
-        drive_cells(old, driver, Here(), print)
+        drive_cells(old, driver, Instant(), print)
         assert driver.ledger.version == "0.0.9 a1"
         assert driver.ledger.outdated() == 2
-        assert drive_cells(cells(3), driver, Here(), print).ran == 3
-    said: list[str] = []
-    assert swept(cells(4), folder, Here(), said.append).ran == 1
-    assert said[0] == f"2 of the 5 rows in {folder} are of another version, and do not count here"
+        assert drive_cells(cells(3), driver, Instant(), print).ran == 3
+    messages: list[str] = []
+    assert swept(cells(4), folder, Instant(), messages.append).ran == 1
+    assert messages[0] == f"2 of the 5 rows in {folder} are of another version, and do not count here"
     ledger = Ledger(folder)
     assert (len(ledger), ledger.outdated()) == (6, 2)
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
@@ -269,30 +227,28 @@ def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(
             ValueError, match=r"expected room to write to, got No space left on device; \d of 9 cells are done"
         ),
     ):
-        drive_cells(cells(9), driver, Here(), print)
+        drive_cells(cells(9), driver, Instant(), print)
     monkeypatch.undo()
-    said: list[str] = []
-    assert 3 <= len(Ledger(folder, said.append)) < 9
-    assert not said
+    messages: list[str] = []
+    assert 3 <= len(Ledger(folder, messages.append)) < 9
+    assert not messages
     assert not list((folder / "leases").iterdir())
     filled(folder, 9)
 
 
-def test_nobody_runs_what_a_living_driver_has_leaseed_and_a_dead_ones_cells_are_tried_again(tmp_path: Path) -> None:
-    cell = cells(1)[0]
+def test_a_lease_holds_as_long_as_its_driver_lives(tmp_path: Path) -> None:
+    cell, second = cells(2)
     with Driver(tmp_path / "ledger") as one, Driver(tmp_path / "ledger") as other:
-        lease = one.lease(cell)
+        lease = leased(one, cell)
         assert lease == Lease(cell, 1)
-        assert other.lease(cell) is State.ELSEWHERE
-        assert one.lease(cell) is State.ELSEWHERE
+        assert other.lease(cell) is one.lease(cell) is State.ELSEWHERE
         one.release(lease)
-        assert other.lease(cell) == Lease(cell, 1)
-        other.finish(Lease(cell, 1), result(cell))
+        finished(other, cell)
         assert one.lease(cell) is State.DONE
     with Driver(tmp_path / "ledger") as dead:
-        assert dead.lease(cells(2)[1]) == Lease(cells(2)[1], 1)
+        assert dead.lease(second) == Lease(second, 1)
     with Driver(tmp_path / "ledger") as last:
-        assert last.lease(cells(2)[1]) == Lease(cells(2)[1], 2)
+        assert last.lease(second) == Lease(second, 2)
 
 
 def test_the_death_of_drivers_is_no_fault_of_a_cell_until_fifty_of_them_got_nothing_else_done(tmp_path: Path) -> None:
@@ -300,8 +256,7 @@ def test_the_death_of_drivers_is_no_fault_of_a_cell_until_fifty_of_them_got_noth
 
     def die() -> int:
         with Driver(folder) as dead:
-            lease = dead.lease(cell)
-            assert isinstance(lease, Lease)
+            lease = leased(dead, cell)
         return lease.attempt
 
     assert [die() for _ in range(LOSSES - 1)] == list(range(1, LOSSES))
@@ -320,9 +275,7 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts(tmp_path: Path
     folder, (cell,) = tmp_path / "ledger", cells(1)
     with Driver(folder) as driver:
         for own in (False, True, False, False, True, False, True):
-            lease = driver.lease(cell)
-            assert isinstance(lease, Lease)
-            driver.fail(lease, "its own" if own else "from outside", own)
+            driver.fail(leased(driver, cell), "its own" if own else "from outside", own)
         assert driver.lease(cell) is State.QUARANTINED
     assert Ledger(folder).quarantined()[0]["reasons"] == ["its own"] * ATTEMPTS
 
@@ -330,11 +283,9 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts(tmp_path: Path
 def test_a_lease_that_is_damaged_or_removed_costs_no_row_and_stops_nobody(tmp_path: Path) -> None:
     folder, (cell, other) = tmp_path / "ledger", cells(2)
     with Driver(folder) as one, Driver(folder) as two:
-        first = one.lease(cell)
-        assert isinstance(first, Lease)
+        first = leased(one, cell)
         (folder / "leases" / f"{cell.key}.1").unlink()
-        second = two.lease(cell)
-        assert isinstance(second, Lease)
+        second = leased(two, cell)
         one.fail(first, "too late")  # the lease is another one's by now
         one.release(first)
         assert two.lease(cell) is State.ELSEWHERE
@@ -348,24 +299,27 @@ def test_a_lease_that_is_damaged_or_removed_costs_no_row_and_stops_nobody(tmp_pa
     assert not list((folder / "leases").iterdir())
 
 
+def at_once(count: int, work: Callable[[], object]) -> None:
+    """Do work in so many threads; an error in one is raised."""
+    with ThreadPoolExecutor(count) as threads:
+        for future in [threads.submit(work) for _ in range(count)]:
+            future.result()
+
+
 def test_of_many_drivers_that_lease_the_same_cells_one_gets_each(tmp_path: Path) -> None:
     chosen = cells(60)
-    got: list[str] = []
+    leased_keys: list[str] = []
 
     def work() -> None:
         with Driver(tmp_path / "ledger") as driver:
             for cell in chosen:
                 lease = driver.lease(cell)
                 if isinstance(lease, Lease):
-                    got.append(cell.key)
+                    leased_keys.append(cell.key)
                     driver.finish(lease, result(cell))
 
-    threads = [threading.Thread(target=work) for _ in range(6)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert sorted(got) == sorted(cell.key for cell in chosen)
+    at_once(6, work)
+    assert sorted(leased_keys) == sorted(cell.key for cell in chosen)
     assert len(list(Ledger(tmp_path / "ledger").rows())) == 60
     assert not list((tmp_path / "ledger" / "leases").iterdir())
 
@@ -387,20 +341,7 @@ def test_many_drivers_may_make_the_same_ledger_at_once(tmp_path: Path) -> None:
     (tmp_path / "ledger" / "rows").mkdir(parents=True)
     (tmp_path / "ledger" / ".ledger.json.0123").write_text("")
     assert len(Driver(tmp_path / "ledger").ledger) == 0
-    failed: list[Exception] = []
-
-    def make() -> None:
-        try:
-            Driver(tmp_path / "new")
-        except ValueError as error:
-            failed.append(error)
-
-    threads = [threading.Thread(target=make) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not failed
+    at_once(8, lambda: Driver(tmp_path / "new"))
 
 
 def test_a_system_without_flock_reads_ledgers(tmp_path: Path) -> None:

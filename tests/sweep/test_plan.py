@@ -5,7 +5,7 @@ import re
 import sys
 import tracemalloc
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,6 +27,7 @@ from tests.cases import each
 from tests.effort import effort
 from tests.testing.planted import Holds
 
+SMALL = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
 PRODUCT: dict[str, Any] = {"methods": ["sapso@pca"], "motions": ["walk"]}
 
 
@@ -35,24 +36,19 @@ def planned(**tables: Any) -> Plan:
 
 
 def test_a_product_holds_every_combination_and_cells_come_beside_it() -> None:
-    plan = Plan.of(
-        {
-            "defaults": {"frames": 7, "evaluations": 100},
-            "product": {
-                "methods": ["sapso@pca", "cma@full"],
-                "motions": ["walk", {"motion": "run", "frames": 9}],
-                "views": [45, [0, 90]],
-                "corruptions": [{}, {"holes": 0.5}],
-                "instances": [1, 2],
-                "seeds": 3,
-            },
-            "cells": [{"method": "random@pca", "motion": "jump"}],
-        }
-    )
-    assert len(plan) == 2 * 2 * 2 * 2 * 2 * 3 + 1
-    assert len({cell.key for cell in plan}) == len(plan)
-    assert {cell.frames for cell in plan if cell.motion == "run"} == {9}
-    assert {cell.frames for cell in plan if cell.motion != "run"} == {7}
+    product = {
+        "methods": ["sapso", "cma@full"],
+        "motions": ["walk", {"motion": "run", "frames": 9}],
+        "views": [45, [0, 90]],
+        "corruptions": [{}, {"holes": 0.5}],
+        "instances": [1, 2],
+        "seeds": 3,
+    }
+    cells = [{"method": "random@pca", "motion": "jump"}]
+    plan = Plan.of({"defaults": {"frames": 7, "evaluations": 100}, "product": product, "cells": cells})
+    assert len(plan) == len({cell.key for cell in plan}) == 2 * 2 * 2 * 2 * 2 * 3 + 1
+    assert {cell.method for cell in plan} == {"sapso@pca", "cma@full", "random@pca"}
+    assert {(cell.motion, cell.frames) for cell in plan} == {("walk", 7), ("run", 9), ("jump", 7)}
     assert {cell.view_degrees for cell in plan} == {(45.0,), (0.0, 90.0)}
     assert {cell.seed for cell in plan} == {0, 1, 2}
     assert list(plan)[-1].train == built_in.other_styles("jump")
@@ -65,20 +61,10 @@ def test_methods_change_soonest_so_that_a_sweep_under_way_compares_them() -> Non
     ]
 
 
-def test_an_optimiser_alone_searches_the_default_prior() -> None:
-    assert [cell.method for cell in planned(product={"methods": ["sapso"], "motions": ["walk"]})] == ["sapso@pca"]
-
-
 def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
-    plan = Plan.of(
-        {
-            "defaults": {"settings": {"sapso": {"cooling": 0.9}, "tracker.floor": 0.1}},
-            "product": {
-                "methods": ["sapso@pca", "cma@pca", {"method": "sapso@pca", "settings": {"sapso": {"cooling": 0.8}}}],
-                "motions": ["walk"],
-            },
-        }
-    )
+    shared = {"sapso": {"cooling": 0.9}, "tracker.floor": 0.1}
+    own = {"method": "sapso@pca", "settings": {"sapso": {"cooling": 0.8}}}
+    plan = planned(defaults={"settings": shared}, product={**PRODUCT, "methods": ["sapso@pca", "cma@pca", own]})
     assert [dict(cell.settings) for cell in plan] == [
         {"sapso.cooling": 0.9, "tracker.floor": 0.1},
         {"tracker.floor": 0.1},
@@ -91,7 +77,6 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
     [
         ({"product": None}, "a plan must hold at least one cell, got none"),
         ({"product": {**PRODUCT, "seeds": []}}, "product.seeds must hold at least one, got none: an empty product"),
-        ({"product": {**PRODUCT, "seeds": 0}}, "product.seeds must hold at least one, got none: an empty product"),
         ({"product": {**PRODUCT, "seeds": "3"}}, "product.seeds must be a list, got '3'"),
         ({"product": {**PRODUCT, "colours": [1]}}, "product must hold methods, motions, .*, got 'colours'"),
         ({"product": {"motions": ["walk"]}}, "a cell must say its method, got none"),
@@ -107,20 +92,13 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
         ({"product": {**PRODUCT, "methods": ["sapzo@pca"]}}, "did you mean 'sapso'"),
         ({"product": {**PRODUCT, "methods": ["sapso@pcb"]}}, "did you mean 'pca'"),
         ({"product": {**PRODUCT, "methods": ["vsnm"]}}, "method must be OPTIMISER@PRIOR, .*, got 'vsnm'; did you mean 'vsmm'"),
-        ({"product": {**PRODUCT, "methods": [3]}}, "method must be a name, got 3"),
         ({"product": {**PRODUCT, "motions": ["wolk"]}}, "got 'wolk'; did you mean 'walk'"),
-        ({"product": {**PRODUCT, "motions": ["none.amc"]}}, "none.amc"),
         ({"product": {**PRODUCT, "views": [[]]}}, "view_degrees must be at least one angle, got none"),
-        ({"product": {**PRODUCT, "views": [float("nan")]}}, "view_degrees must be a finite number, got nan"),
         ({"product": {**PRODUCT, "corruptions": [{"hole": 1}]}}, "got 'hole'; did you mean 'holes'"),
         ({"product": {**PRODUCT, "corruptions": [{"holes": 2}]}}, "corruption holes must lie in 0 to 1, got 2"),
         ({"product": {**PRODUCT, "corruptions": [0.5]}}, "corruption must be a table of strengths .*, got 0.5"),
         ({"product": {**PRODUCT, "instances": [-1]}}, "instance must be 0 or more, got -1"),
         ({"defaults": {"frames": True}}, "frames must be a whole number of at least 1, got True"),
-        ({"defaults": {"fps": 0}}, "fps must be a positive number, got 0"),
-        ({"defaults": {"size": [320]}}, r"size must be \(width, height\), got \[320\]"),
-        ({"defaults": {"translation": "guessed"}}, "translation must be one of known, searched, aligned, got 'guessed'"),
-        ({"defaults": {"first_pose": "mine"}}, "first_pose must be one of searched, given, got 'mine'"),
         ({"defaults": {"evaluations": 30}}, "evaluations must hold one population of 40, got 30"),
         ({"defaults": {"train": "walk-a"}}, "train must be a list of motions, got 'walk-a'"),
         ({"defaults": {"train": ["walk"]}}, "train must not contain the motion itself, got walk"),
@@ -143,19 +121,17 @@ def test_a_method_whose_library_is_not_installed_says_what_to_install(monkeypatc
 
 
 def test_a_file_that_is_no_plan_is_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        ValueError, match=r"nowhere.toml: expected a plan \(.toml\) or default, got no file of that name"
-    ):
-        Plan.read("nowhere.toml")
-    with pytest.raises(ValueError, match="expected a plan .* got a folder"):
-        Plan.read(tmp_path)
     path = tmp_path / "plan.toml"
-    path.write_text("[product\n")
-    with pytest.raises(ValueError, match=r"plan.toml: .*line 1"):
-        Plan.read(path)
-    path.write_bytes(b"\xff")
-    with pytest.raises(ValueError, match="expected a plan in TOML"):
-        Plan.read(path)
+    for place, content, message in (
+        (Path("nowhere.toml"), None, r"nowhere.toml: expected a plan \(.toml\) or default, got no file of that name"),
+        (tmp_path, None, "expected a plan .* got a folder"),
+        (path, b"[product\n", r"plan.toml: .*line 1"),
+        (path, b"\xff", "expected a plan in TOML"),
+    ):
+        if content is not None:
+            place.write_bytes(content)
+        with pytest.raises(ValueError, match=message):
+            Plan.read(place)
 
 
 def test_the_default_plan_holds_the_papers_three_methods_at_one_budget() -> None:
@@ -165,10 +141,10 @@ def test_the_default_plan_holds_the_papers_three_methods_at_one_budget() -> None
 
 
 def test_a_key_follows_from_the_spec_and_the_version_alone() -> None:
-    one, same, other = (TrackCell("sapso@pca", "walk", ("walk-a",), seed=seed) for seed in (1, 1, 2))
-    assert one.key == same.key != other.key
-    assert len(one.key) == 64
-    assert TrackCell("sapso@pca", "walk", ("walk-a",), seed=1, version="posefit 0.0.9 a1").key != one.key
+    cell = TrackCell("sapso@pca", "walk", ("walk-a",), seed=1)
+    assert len(cell.key) == 64
+    assert replace(cell).key == cell.key
+    assert len({cell.key, replace(cell, seed=2).key, replace(cell, version="posefit 0.0.9 a1").key}) == 3
 
 
 def test_a_cells_version_has_digests_of_posefit_and_of_its_methods_plugins_and_no_others() -> None:
@@ -179,37 +155,29 @@ def test_a_cells_version_has_digests_of_posefit_and_of_its_methods_plugins_and_n
     assert all(re.fullmatch(r"\w+ [0-9a-f]{8}", part) for part in (*sapso[1:], *cma[1:]))
 
 
-def test_a_digest_changes_with_every_source_and_data_file_but_not_with_those_that_results_do_not_depend_on(
+def test_a_digest_changes_with_every_source_and_data_file_that_results_depend_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "package"
     (package / "report").mkdir(parents=True)
     (package / "__init__.py").write_text("")
     monkeypatch.setitem(sys.modules, "package", SimpleNamespace(__file__=str(package / "__init__.py")))  # type: ignore[arg-type]
-
-    def digest() -> str:
-        source_digest.cache_clear()
-        return source_digest("package", ("report",))
-
-    found = [digest()]
+    digests = [source_digest.__wrapped__("package", ("report",))]
     for name, counts in (("search.py", True), ("model.npz", True), ("notes.txt", False), ("report/page.py", False)):
         (package / name).write_text("1")
-        found.append(digest())
-        assert (found[-1] != found[-2]) == counts, name
-    source_digest.cache_clear()
+        digests.append(source_digest.__wrapped__("package", ("report",)))
+        assert (digests[-1] != digests[-2]) == counts, name
 
 
 def test_a_cell_has_so_many_hypotheses() -> None:
-    spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
-    one, three = (run_cell(cell_of({**spec, "hypotheses": count})).row for count in (1, 3))
+    one, three = (run_cell(cell_of({**SMALL, "hypotheses": count})).row for count in (1, 3))
     assert three["evaluations_used"] == 3 * one["evaluations_used"] == 3 * 2 * 80
     assert three["trace"]["evaluations"][-1] == 3 * one["trace"]["evaluations"][-1]
     assert three["spec"]["hypotheses"] == 3
 
 
 def test_a_cell_is_restored_from_its_rows_spec() -> None:
-    spec = {"method": "random@pca", "motion": "walk", "frames": 2, "size": [80, 60], "evaluations": 80}
-    (cell,) = Plan.of({"cells": [{**spec, "corruption": {"holes": 0.5}, "settings": {"pca.components": 4}}]})
+    (cell,) = Plan.of({"cells": [{**SMALL, "corruption": {"holes": 0.5}, "settings": {"pca.components": 4}}]})
     row = run_cell(cell).row
     again = TrackCell(**json.loads(json.dumps(row))["spec"])
     assert again.key == cell.key == row["key"]
@@ -217,24 +185,21 @@ def test_a_cell_is_restored_from_its_rows_spec() -> None:
 
 
 def test_instances_differ_and_a_number_is_the_same_for_every_method_and_seed() -> None:
-    def seen(**spec: Any) -> tuple[bytes, bytes]:
-        (cell,) = Plan.of({"cells": [{"method": "sapso@pca", "motion": "walk", "frames": 4, "size": [80, 60], **spec}]})
-        scene = cell_scene(cell)
+    def observed(**spec: Any) -> tuple[bytes, bytes]:
+        scene = cell_scene(cell_of({**SMALL, "frames": 4, **spec}))
         assert scene.truth is not None
         return scene.truth.poses.tobytes(), scene.observations[2].silhouettes[0].mask.tobytes()
 
-    assert seen(instance=0)[0] == built_in.motion("walk", frames=4).poses.tobytes()
-    assert seen(instance=1) == seen(instance=1, method="cma@full", seed=5)
-    assert seen(instance=1)[0] != seen(instance=2)[0] != seen(instance=0)[0]
-    spoilt = {"holes": 0.5}
-    assert seen(corruption=spoilt, seed=1) == seen(corruption=spoilt, seed=2)
-    assert seen(corruption=spoilt)[1] != seen()[1]
+    assert observed(instance=0)[0] == built_in.motion("walk", frames=4).poses.tobytes()
+    assert observed(instance=1) == observed(instance=1, method="cma@full", seed=5)
+    assert observed(instance=1)[0] != observed(instance=2)[0] != observed(instance=0)[0]
+    damaged = {"holes": 0.5}
+    assert observed(corruption=damaged, seed=1) == observed(corruption=damaged, seed=2)
+    assert observed(corruption=damaged)[1] != observed()[1]
 
 
 def test_a_share_of_the_frames_is_dropped() -> None:
-    (cell,) = Plan.of(
-        {"cells": [{"method": "sapso@pca", "motion": "walk", "size": [80, 60], "corruption": {"dropped": 0.5}}]}
-    )
+    cell = cell_of({**SMALL, "frames": 60, "corruption": {"dropped": 0.5}})
     usable = [observation.usable for observation in cell_scene(cell).observations]
     assert usable[0]
     assert 15 <= usable.count(False) <= 45  # of 60
@@ -245,12 +210,12 @@ def test_a_file_that_changed_after_it_was_planned_is_not_followed(tmp_path: Path
     write_asf(tmp_path / "one.asf", motion.skeleton)
     write_amc(tmp_path / "one.amc", motion)
     source = str(tmp_path / "one.amc")
-    spec = {"method": "random@pca", "motion": source, "frames": 1, "fps": 120, "size": [80, 60], "evaluations": 80}
-    (cell,) = Plan.of({"cells": [spec]})
+    spec = {**SMALL, "motion": source, "frames": 1, "fps": 120}
+    cell = cell_of(spec)
     assert cell.files == {str(path): digest_of(path) for path in (tmp_path / "one.amc", tmp_path / "one.asf")}
     assert run_cell(cell).row["status"] == "done"
     with pytest.raises(ValueError, match=r"frames must be at most \d+, the length of"):
-        Plan.of({"cells": [{**spec, "frames": 500}]})
+        cell_of({**spec, "frames": 500})
     (tmp_path / "one.amc").write_text((tmp_path / "one.amc").read_text() + "\n")
     with pytest.raises(ValueError, match="one.amc must be the file that was planned, "):
         run_cell(cell)
@@ -262,12 +227,12 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
     from posefit.fitting.tracker import Frame
 
     def frame(history: list[float], spent: list[int] | None, used: int) -> Frame:
-        told = None if spent is None else np.array(spent)
-        return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), used, 0.0, np.array(history), None, told)
+        counts = None if spent is None else np.array(spent)
+        return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), used, 0.0, np.array(history), None, counts)
 
     # by hand: after 20 evaluations the frames have 6 and 9, after 30: 4 and 9, after 40: 4 and 1
-    found = [frame([8.0, 6.0, 4.0], [10, 20, 30], 30), frame([9.0, 1.0], None, 40), frame([], None, 0)]
-    assert anytime_trace(found) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
+    frames = [frame([8.0, 6.0, 4.0], [10, 20, 30], 30), frame([9.0, 1.0], None, 40), frame([], None, 0)]
+    assert anytime_trace(frames) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
     assert anytime_trace([frame([], None, 0)]) == {"evaluations": [], "cost": []}
     long = anytime_trace([frame(list(range(500, 0, -1)), None, 500)])
     assert len(long["cost"]) <= 64
@@ -276,21 +241,23 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
 
 
 def test_a_worker_of_another_version_does_not_run_a_cell() -> None:
-    with pytest.raises(ValueError, match=rf"a worker must have posefit 0.0.9 a1, got posefit {posefit.__version__} "):
-        run_cell(TrackCell("random@pca", "walk", ("walk-a",), version="posefit 0.0.9 a1"))
-    with pytest.raises(ValueError, match="a worker must have posefit_swarm 00000000, got posefit_swarm "):
-        run_cell(TrackCell("random@pca", "walk", ("walk-a",), version=f"{posefit_build()}, posefit_swarm 00000000"))
+    installed = f"posefit {posefit.__version__} "
+    for version, message in (
+        ("posefit 0.0.9 a1", f"a worker must have posefit 0.0.9 a1, got {installed}"),
+        (f"{posefit_build()}, posefit_swarm 00000000", "must have posefit_swarm 00000000, got posefit_swarm "),
+    ):
+        with pytest.raises(ValueError, match=message):
+            run_cell(TrackCell("random@pca", "walk", ("walk-a",), version=version))
 
 
 def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_version(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     offer = Offer("tracker", "hold+still", Holds, "posefit-hold", "2.5")
-    found = Registry((Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),))
+    installed = Registry((Plugin("hold", "posefit-hold", "2.5", "loaded", offers=(offer,)),))
     for module in (check, method):
-        monkeypatch.setattr(module, "registry", lambda: found)
-    spec = {"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]}
-    (cell,) = Plan.of({"cells": [spec]})
+        monkeypatch.setattr(module, "registry", lambda: installed)
+    cell = cell_of({"method": "hold+still", "motion": "walk", "frames": 2, "size": [80, 60]})
     assert cell.version == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     row = run_cell(cell).row
     assert row["prior_floor_degrees"] is None
@@ -311,39 +278,31 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(t
         path.write_text(cells + line)
         with pytest.raises(ValueError, match=message):
             Plan.read(path)
-    path.write_text(cells + "view_degrees = 999999999999999999999")  # was a traceback; it is an angle like others
+    path.write_text(cells + "view_degrees = 999999999999999999999")
     assert next(iter(Plan.read(path))).view_degrees == (1e21,)
 
 
 def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> None:
-    lists = {
-        "seeds": [3, 1],
-        "methods": [
-            "sapso@pca",
-            {"method": "random@full", "evaluations": 300, "settings": {"full.limits": "training"}},
-        ],
-        "corruptions": [{}, {"dropped": 0.5, "holes": 0.25}],
-        "motions": ["walk", {"motion": "run", "train": ["walk-a"], "size": [80, 60]}],
-        "views": [45, [0, 90.5], {"view_degrees": 90, "hypotheses": 3}, {"view_degrees": 91, "hypotheses": 1}],
-        "instances": 2,
-    }
-    defaults = {"frames": 5, "hypotheses": 2, "translation": "searched", "settings": {"sapso.cooling": 0.9}}
-    plan = Plan.of({"defaults": defaults, "product": lists})
+    views = [{"view_degrees": 45}, {"view_degrees": [0, 90.5]}]
+    views += [{"view_degrees": 90, "hypotheses": 3}, {"view_degrees": 91, "hypotheses": 1}]
+    limits = {"full.limits": "training"}
+    lists: list[tuple[str, list[dict[str, Any]]]] = [
+        ("seeds", [{"seed": 3}, {"seed": 1}]),
+        ("corruptions", [{"corruption": {}}, {"corruption": {"dropped": 0.5, "holes": 0.25}}]),
+        ("motions", [{"motion": "walk"}, {"motion": "run", "train": ["walk-a"], "size": [80, 60]}]),
+        ("views", views),
+        ("instances", [{"instance": 0}, {"instance": 1}]),
+        ("methods", [{"method": "sapso@pca"}, {"method": "random@full", "evaluations": 300, "settings": limits}]),
+    ]
+    defaults = {"frames": 5, "hypotheses": 2, "translation": "searched"}
+    shared = {"settings": {"sapso.cooling": 0.9}}
+    # of a list of corruptions an entry is itself the table of one
+    product_lists = {name: [entry.get("corruption", entry) for entry in entries] for name, entries in lists}
+    plan = Plan.of({"defaults": {**defaults, **shared}, "product": product_lists})
     expected = []
-    for seed, damage, motion, view, instance, chosen in product(
-        lists["seeds"], lists["corruptions"], lists["motions"], lists["views"], range(2), lists["methods"]
-    ):
-        spec: dict[str, Any] = {
-            "frames": 5,
-            "hypotheses": 2,
-            "translation": "searched",
-            "seed": seed,
-            "instance": instance,
-        }
-        spec |= {"corruption": damage, **(view if isinstance(view, dict) else {"view_degrees": view})}
-        spec |= chosen if isinstance(chosen, dict) else {"method": chosen, "settings": {"sapso.cooling": 0.9}}
-        spec |= motion if isinstance(motion, dict) else {"motion": motion}
-        expected.append(cell_of(spec))
+    for entries in product(*(entries for _, entries in lists)):
+        spec = dict(chain.from_iterable(entry.items() for entry in (defaults, *entries)))
+        expected.append(cell_of({**(shared if spec["method"] == "sapso@pca" else {}), **spec}))
     assert list(plan) == expected
     assert [replace(cell).key for cell in plan] == list(plan.keys()) == [cell.key for cell in expected]
 

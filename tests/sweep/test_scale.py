@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from posefit.sweep.cell import CellResult, TrackCell
-from posefit.sweep.driver import Driver, Lease
+from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import ROWS, Ledger
 from posefit.sweep.log import Writer
 from tests.effort import Effort, effort
-from tests.sweep.fake import cells
+from tests.sweep.fake import cells, leased
 
 ROOT = Path(__file__).parents[2]
 COUNT = 100_000
@@ -57,42 +57,32 @@ def filled(folder: Path, count: int) -> Path:
     return folder
 
 
-def one_more(folder: Path, frames: int) -> Effort:
+def one_more(folder: Path) -> Effort:
     """Return the least that leasing and finishing a cell takes, of some."""
-    least = []
     with Driver(folder) as driver:
-        for seed in range(5):
-            cell = replace(cells(1)[0], seed=seed, frames=frames)
-            ended = real(cell)
-
-            def run(cell: TrackCell = cell, ended: CellResult = ended) -> None:
-                lease = driver.lease(cell)
-                assert isinstance(lease, Lease)
-                driver.finish(lease, ended)
-
-            least.append(effort(run))
-    return Effort(min(one.calls for one in least), min(one.read for one in least))
+        efforts = [effort(lambda cell=cell: driver.finish(leased(driver, cell), real(cell))) for cell in cells(5, 1)]  # type: ignore[misc]
+    return Effort(min(one.calls for one in efforts), min(one.read for one in efforts))
 
 
 @counted
 def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_twice(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
-    found = []
+    efforts = []
     for count in (100, 400, 800, 1600):  # the first imports what the others need
         folder = filled(tmp_path / f"{count}", count)
-        found.append(effort(lambda folder=folder: Ledger(folder).frame()))  # type: ignore[misc]
+        efforts.append(effort(lambda folder=folder: Ledger(folder).frame()))  # type: ignore[misc]
         size = sum(path.stat().st_size for path in (folder / ROWS).glob("*.jsonl"))
-        assert count == 100 or found[-1].read < 2.1 * size  # once to find the rows, once for the table
-    calls = [one.calls for one in found]
+        assert count == 100 or efforts[-1].read < 2.1 * size  # once to find the rows, once for the table
+    calls = [one.calls for one in efforts]
     assert calls[3] - calls[2] == pytest.approx(2.0 * (calls[2] - calls[1]), rel=0.1)
 
 
 @counted
 def test_a_row_more_takes_no_more_calls_and_reads_no_more_however_long_the_ledger(tmp_path: Path) -> None:
-    found = []
+    efforts = []
     for count in (4, 4, 2000):  # all in four logs; the first one warms up
-        found.append(one_more(filled(tmp_path / f"{len(found)}", count), 1))
-    _, at_first, later = found
+        efforts.append(one_more(filled(tmp_path / f"{len(efforts)}", count)))
+    _, at_first, later = efforts
     assert later.calls == at_first.calls
     assert later.read <= at_first.read + 100
 
@@ -102,8 +92,8 @@ def test_a_row_more_takes_no_more_calls_and_reads_no_more_however_long_the_ledge
 def test_100_000_rows_open_in_2_gigabytes(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     words = [sys.executable, "-c", OPEN, str(filled(tmp_path / "ledger", COUNT))]
-    told = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    rows, points, opened, taken, peak = json.loads(told)
+    printed = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    rows, points, opened, taken, peak = json.loads(printed)
     print(f"{rows} rows: opened in {opened:.1f} s, read in {taken:.1f} s, {peak / 1e9:.2f} GB")
     assert rows == COUNT
     assert points == 61 * rows
