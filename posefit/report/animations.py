@@ -61,8 +61,6 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
         "frames": len(truth),
         "step": step,
         "fps": place["fps"],
-        "cameras": [],
-        "radii": [],
     }
     try:
         for path, digest in place["files"].items():
@@ -71,7 +69,7 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
         more = {name: place[name] for name in ("instance", "frames", "fps", "size")}
         made = cell_scene(TrackCell("", place["motion"], (), {}, tuple(place["view_degrees"]), {}, **more))
     except (ValueError, OSError):  # a capture file is missing: the joints are shown without a camera
-        return scene
+        return {**scene, "cameras": [], "radii": []}
     cameras = [camera_from_origin(camera, origin) for camera in made.cameras]
     return {**scene, "cameras": cameras, "radii": np.round(made.body.radii, 4).tolist()}
 

@@ -1,7 +1,7 @@
 """The methods of a sweep compared on the runs that they share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
-from posefit.report.columns import COLUMNS, FIGURES
+from posefit.report.columns import COLUMNS
 from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
-from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, TRIMMED, Intervals, iqm_intervals
+from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, TRIMMED, iqm_intervals
 from posefit.statistics.means import mean_interval
-from posefit.statistics.pairing import Rows, gaps, most_shared
+from posefit.statistics.pairing import Shared, most_shared
 from posefit.statistics.ranks import LEVEL, compact_letters, friedman, wilcoxon
 from posefit.tracking.measures import BASELINES
 
@@ -24,20 +24,19 @@ MIN_SEEDS = 3  # for the interval of a probability of improvement
 RANDOM = "random"  # the method that is the baseline of single searches
 
 
-@dataclass(frozen=True, eq=False)
-class Contest:
-    """The runs that some methods share, paired by instance and seed."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Contest(Shared):
+    """The runs that some methods share, paired by instance and seed: `rows` and `blocks` are indices of `runs`."""
 
     runs: Runs
-    methods: tuple[int, ...]  # that take part
-    instances: tuple[int, ...]
-    rows: Array  # (methods, instances, seeds) rows of `runs` for means and intervals
-    blocks: Array  # (methods, blocks) rows of every instance and seed that all methods have finished, for tests
-    left_out: int  # runs of these methods that not all of them have
 
     def of(self, figure: str) -> Array:
         """Return a figure of all runs (methods, instances, seeds)."""
         return np.asarray(self.runs.figures[figure][self.rows])
+
+    def places(self) -> list[dict[str, Any]]:
+        """Return the fields of a plan that make each instance."""
+        return [self.runs.places[i] for i in self.instances]
 
     def tested_errors(self) -> Array:
         """Return the errors (methods, blocks, 1) that tests compare.
@@ -47,8 +46,7 @@ class Contest:
         """
         if not self.runs.is_search:
             return np.asarray(self.runs.figures["error"][self.blocks][:, :, None])
-        places = [self.runs.places[i] for i in self.instances]
-        poses = [(place["function"], place["instance"], place["suite"]) for place in places]
+        poses = [(place["function"], place["instance"], place["suite"]) for place in self.places()]
         index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
         block = np.array([index[pose] for pose in poses])
         sums = np.array([np.bincount(block, row) for row in self.of("reached").mean(axis=2)])
@@ -76,33 +74,13 @@ def contest_of(runs: Runs) -> Contest | None:
 
     A method that would leave less than half of the runs that the others share does not take part.
     """
-    shared = most_shared(_rows(runs))
-    if shared is None:
-        return None
-    return Contest(runs, shared.methods, shared.instances, shared.rows, shared.blocks, shared.left_out)
-
-
-def missing_instances(contest: Contest) -> list[dict[str, Any]]:
-    """Return the instances without a shared run, and the methods that have no run there.
-
-    The list of methods is empty where each has a run, but none with the same seed.
-    """
-    missing = gaps(_rows(contest.runs), contest.methods, contest.instances)
-    return [{"instance": instance, "missing": methods} for instance, methods in missing]
-
-
-def _rows(runs: Runs) -> Rows:
-    return Rows(runs.method, runs.instance, runs.seed, runs.figures["error"])
+    shared = most_shared(runs.method, runs.instance, runs.seed, runs.figures["error"])
+    return None if shared is None else Contest(**vars(shared), runs=runs)
 
 
 def resamples(numbers: int) -> int:
     """Return how many bootstrap resamples so many numbers may have."""
     return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
-
-
-def intervals(values: Array) -> Intervals:
-    """Return the interquartile mean of each method's runs (methods, instances, seeds), with its interval."""
-    return iqm_intervals(values, np.random.default_rng(BOOTSTRAP_SEED), resamples=resamples(values.size))
 
 
 def leaderboard(contest: Contest) -> list[dict[str, Any]]:
@@ -113,33 +91,30 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     and `above` a median. Methods that share one of their `letters` do not differ significantly.
     """
     runs = contest.runs
-    ends = None if runs.is_search else intervals(contest.of("error"))
+    ends = _search_intervals(contest) if runs.is_search else _error_intervals(contest)
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
-        place = contest.methods.index(m) if m in contest.methods else None
-        mine = shared_rows(contest, m)
+        own = shared_rows(contest, m)
         row: dict[str, Any] = {
             "method": m,
             "name": name,
-            "runs": len(mine),
+            "runs": len(own),
             "failed": runs.failed[m],
-            "taking_part": place is not None,
+            "taking_part": m in contest.methods,
             "low": None,
             "high": None,
         }
-        if ends is not None:
-            row |= {figure: interquartile_mean(runs.figures[figure][mine]) for figure in FIGURES}
-            row |= {figure: mean(runs.figures[figure][mine]) for figure, column in COLUMNS.items() if column.share}
-            if place is not None:
-                row |= {"low": ends.low[place], "high": ends.high[place]}
-        else:
+        if runs.is_search:
             row |= {
-                "reached": mean(runs.figures["reached"][mine]),
-                "above": float(np.median(runs.figures["above"][mine])),
+                "reached": mean(runs.figures["reached"][own]),
+                "above": float(np.median(runs.figures["above"][own])),
             }
-            if place is not None:
-                row |= _reached_interval(contest, place)
-        board.append(row)
+        else:
+            for share, average in ((False, interquartile_mean), (True, mean)):
+                row |= {
+                    name: average(runs.figures[name][own]) for name, column in COLUMNS.items() if column.share == share
+                }
+        board.append({**row, **ends.get(m, {})})
     board.sort(key=_rank)
     letters = _letters(contest, [row["method"] for row in board if row["taking_part"]])
     return [{**row, "letters": letters.get(row["method"], "")} for row in board]
@@ -152,12 +127,23 @@ def shared_rows(contest: Contest, method: int) -> NDArray[np.int64]:
     return np.flatnonzero(contest.runs.method == method).astype(np.int64)
 
 
-def _reached_interval(contest: Contest, place: int) -> dict[str, float]:
-    """Return the mean share of targets of a method, with the interval that other instances would give."""
-    places = [contest.runs.places[i] for i in contest.instances]
-    shares = contest.of("reached")[place].mean(axis=1)
-    found = mean_interval(shares, [one["function"] for one in places], [one["instance"] for one in places])
-    return {"reached": found.value, "low": max(found.low, 0.0), "high": min(found.high, 100.0)}
+def _error_intervals(contest: Contest) -> dict[int, dict[str, float]]:
+    """Return the ends of the interval of each method's interquartile mean."""
+    errors = contest.of("error")
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    intervals = iqm_intervals(errors, rng, resamples=resamples(errors.size))
+    ends = zip(contest.methods, intervals.low.tolist(), intervals.high.tolist(), strict=True)
+    return {m: {"low": low, "high": high} for m, low, high in ends}
+
+
+def _search_intervals(contest: Contest) -> dict[int, dict[str, float]]:
+    """Return each method's mean share of targets, with the interval that other instances would give."""
+    strata, clusters = ([place[name] for place in contest.places()] for name in ("function", "instance"))
+    ends = {}
+    for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2), strict=True):
+        share = mean_interval(shares, strata, clusters)
+        ends[m] = {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
+    return ends
 
 
 def _rank(row: dict[str, Any]) -> tuple[Any, ...]:
@@ -185,12 +171,11 @@ def baseline_rows(contest: Contest, board: Sequence[dict[str, Any]]) -> list[dic
         return [{"baseline": RANDOM, "reached": max(random)}] if random else []
     rows = []
     errors = {name: _means(contest.of(f"baseline_{name}")) for name in BASELINES}
-    for name, mine in errors.items():
-        row: dict[str, Any] = {"baseline": name, "error": interquartile_mean(mine.ravel())}
+    for name, own in errors.items():
+        row: dict[str, Any] = {"baseline": name, "error": interquartile_mean(own)}
         for other, theirs in errors.items():
-            with np.errstate(divide="ignore", invalid="ignore"):
-                skill = 1.0 - mine / theirs
-            row[f"skill_{other}"] = interquartile_mean(np.where(theirs > 0.0, skill, np.nan).ravel())
+            ratio = np.divide(own, theirs, out=np.full(own.shape, np.nan), where=theirs > 0.0)
+            row[f"skill_{other}"] = interquartile_mean(1.0 - ratio)
         rows.append(row)
     return rows
 
@@ -209,20 +194,20 @@ def paired_tests(contest: Contest) -> dict[str, Any]:
     probabilities equally many seeds of every instance.
     """
     tested = contest.tested_errors()
-    compared = wilcoxon(tested)
-    pairs = [[one.first, one.second, one.difference, one.p_value, one.adjusted] for one in compared]
+    pairs = [list(astuple(comparison)) for comparison in wilcoxon(tested)]
     tests = {"methods": contest.methods, "blocks": tested[0].size, "pairs": pairs}
     if contest.runs.is_search:
         return tests
     errors, rng = contest.of("error"), np.random.default_rng(BOOTSTRAP_SEED)
     ranking, better = friedman(tested), probability_of_improvement(errors)
-    count = int(min(WORK / (errors[0].size * errors.shape[2] * len(compared)), RESAMPLES))
+    count = int(min(WORK / (errors[0].size * errors.shape[2] * len(pairs)), RESAMPLES))
     bounded = errors.shape[2] >= MIN_SEEDS and count >= MIN_RESAMPLES
-    for pair, one in zip(pairs, compared, strict=True):
-        ends = (np.nan, np.nan)
+    for pair in pairs:
+        first, second = pair[:2]
+        ends: Sequence[float] = (np.nan, np.nan)
         if bounded:
-            ends = improvement_interval(errors[one.first], errors[one.second], rng, resamples=count)[1:]
-        pair += [better[one.first, one.second], *ends]
+            ends = improvement_interval(errors[first], errors[second], rng, resamples=count)[1:]
+        pair += [better[first, second], *ends]
     return {
         **tests,
         "ranks": ranking.mean_ranks,
@@ -247,5 +232,5 @@ def mean(values: Array) -> float | None:
 def _means(values: Array) -> Array:
     """Return the mean over methods (instances, seeds), of those that have a value."""
     known = np.isfinite(values)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
+    total, count = np.where(known, values, 0.0).sum(axis=0), known.sum(axis=0)
+    return np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)

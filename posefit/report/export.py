@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import ANGLES
+from posefit.report.runs import damage, views
 from posefit.statistics.profiles import Trace, trace
 from posefit.version import __version__
 
@@ -62,13 +63,20 @@ def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
         spec, trace = row["spec"], row["trace"]
         if not trace["evaluations"]:
             continue
-        views = " ".join(f"{view:g}" for view in spec["view_degrees"])
-        damage = "".join(f" {kind} {share:g}" for kind, share in sorted(spec["corruption"].items()))
-        more = {name: spec[name] for name in ("evaluations", "hypotheses", "version") if name in spec}
+        conditions = [
+            spec["motion"],
+            "view",
+            *views(spec),
+            *damage(spec),
+            "frames",
+            spec["frames"],
+            spec["translation"],
+        ]
+        more = {name: spec[name] for name in ("evaluations", "hypotheses", "version")}
         yield LoggedRun(
             spec["method"],
             {**spec["settings"], **more},
-            f"{spec['motion']} view {views}{damage} frames {spec['frames']} {spec['translation']}",
+            " ".join(map(str, conditions)),
             row.get("dimensions") or ANGLES,  # a tracker without a search space has the pose's dimension
             spec["instance"],
             spec["seed"],
@@ -87,58 +95,46 @@ def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:
     written.
     """
     algorithms = _grouped(runs)
-    numbers = {
-        name: k for k, name in enumerate(sorted({run.problem for runs in algorithms.values() for run in runs}), 1)
-    }
-    names = _algorithm_names(list(algorithms))
-    folders = _file_names([names[key] for key in algorithms])
-    problems = dict(zip(numbers, _file_names(list(numbers)), strict=True))
+    names = _algorithm_names([method for method, _ in algorithms])
+    problems = sorted({run.problem for runs in algorithms.values() for run in runs})
     with new_folder(path) as folder:
-        for (key, mine), place in zip(algorithms.items(), folders, strict=True):
-            algorithm = {"name": names[key], "info": key[1]}
-            for problem in sorted({run.problem for run in mine}):
-                where = f"f{numbers[problem]}_{problems[problem]}"
-                here = [run for run in mine if run.problem == problem]
-                _write_problem(folder / place, where, numbers[problem], algorithm, here)
+        for (_, info), name, place, own in zip(algorithms, names, _file_names(names), algorithms.values(), strict=True):
+            for number, (problem, file_name) in enumerate(zip(problems, _file_names(problems), strict=True), 1):
+                if here := [run for run in own if run.problem == problem]:
+                    _write_problem(folder / place, f"f{number}_{file_name}", number, {"name": name, "info": info}, here)
 
 
-def _write_problem(folder: Path, where: str, number: int, algorithm: Mapping[str, str], runs: list[LoggedRun]) -> None:
-    data = folder / f"data_{where}"
+def _write_problem(folder: Path, name: str, number: int, algorithm: Mapping[str, str], runs: list[LoggedRun]) -> None:
+    data = folder / f"data_{name}"
     data.mkdir(parents=True)
     scenarios = []
     for dimension in sorted({run.dimension for run in runs}):
-        mine = sorted((run for run in runs if run.dimension == dimension), key=lambda run: (run.instance, run.seed))
-        name = f"IOHprofiler_f{number}_DIM{dimension}.dat"
-        with (data / name).open("w", encoding="ascii", newline="\n") as file:
-            described = []
-            for run in mine:
+        path = data / f"IOHprofiler_f{number}_DIM{dimension}.dat"
+        entries = []
+        with path.open("w", encoding="ascii", newline="\n") as file:
+            for run in sorted(runs, key=lambda run: (run.instance, run.seed)):
+                if run.dimension != dimension:
+                    continue
                 used, best = _rows(trace(run.evaluations, run.costs))
                 file.write(_HEADER + "\n")
                 file.writelines(f"{e} {y!r}\n" for e, y in zip(used, best, strict=True))
-                first = best.index(best[-1])
-                described.append(
-                    {
-                        "instance": run.instance,
-                        "evals": used[-1],
-                        "best": {"evals": used[first], "y": best[-1], "x": []},
-                        "seed": run.seed,
-                    }
-                )
-        scenarios.append({"dimension": dimension, "path": f"data_{where}/{name}", "runs": described})
+                least = {"evals": used[best.index(best[-1])], "y": best[-1], "x": []}
+                entries.append({"instance": run.instance, "evals": used[-1], "best": least, "seed": run.seed})
+        scenarios.append({"dimension": dimension, "path": f"{data.name}/{path.name}", "runs": entries})
     summary = {
         "version": FORMAT,
         "suite": SUITE,
         "function_id": number,
         "function_name": runs[0].problem,
         "maximization": False,
-        "algorithm": dict(algorithm),
+        "algorithm": algorithm,
         # iohinspector evaluates what stands here as Python: nothing that a user or a plugin wrote
         "experiment_attributes": [{"posefit": __version__}],
         "attributes": _HEADER.split(),
         "run_attributes": ["seed"],
         "scenarios": scenarios,
     }
-    (folder / f"IOHprofiler_{where}.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    (folder / f"IOHprofiler_{name}.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
 
 def _rows(run: Trace) -> tuple[list[int], list[float]]:
@@ -146,59 +142,56 @@ def _rows(run: Trace) -> tuple[list[int], list[float]]:
     used, best = run
     if used[0] > 1.0:
         used, best = np.append(1.0, used), np.append(np.inf, best)
-    kept = np.append(True, np.diff(best) < 0.0)
-    kept[-1] = True
-    return [int(value) for value in used[kept]], [float(value) for value in best[kept]]
+    written = np.append(True, np.diff(best) < 0.0)
+    written[-1] = True
+    return used[written].astype(int).tolist(), best[written].tolist()
 
 
 def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]]:
     """Return the checked runs of each (method, settings as JSON), in the order of both."""
     groups: dict[tuple[str, str], list[LoggedRun]] = {}
-    names = set()
+    identities = set()
     for run in runs:
-        named = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"
-        for name, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
+        name = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"
+        for kind, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
             if not least <= value <= MAX_NUMBER:
-                raise InputError(f"{named}: {name} must lie in {least} to {MAX_NUMBER}, got {value}")
+                raise InputError(f"{name}: {kind} must lie in {least} to {MAX_NUMBER}, got {value}")
         try:
             used, _ = trace(run.evaluations, run.costs)
         except ValueError as error:
-            raise InputError(f"{named}: {error}") from None
+            raise InputError(f"{name}: {error}") from None
         if (used % 1.0).any():
-            raise InputError(f"{named}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
+            raise InputError(f"{name}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
         key = run.method, json.dumps(dict(run.settings), sort_keys=True, default=str)
-        one = (*key, run.problem, run.dimension, run.instance, run.seed)
-        if one in names:
-            raise InputError(f"runs must differ in method, settings, problem, instance or seed, got two of {named}")
-        names.add(one)
+        identity = (*key, run.problem, run.dimension, run.instance, run.seed)
+        if identity in identities:
+            raise InputError(f"runs must differ in method, settings, problem, instance or seed, got two of {name}")
+        identities.add(identity)
         groups.setdefault(key, []).append(run)
     if not groups:
         raise InputError("runs must be at least one, got none")
     return dict(sorted(groups.items()))
 
 
-def _algorithm_names(keys: list[tuple[str, str]]) -> dict[tuple[str, str], str]:
-    same: dict[str, list[tuple[str, str]]] = {}
-    for key in keys:
-        same.setdefault(key[0], []).append(key)
-    return {
-        key: method if len(several) == 1 else f"{method} #{k}"
-        for method, several in same.items()
-        for k, key in enumerate(several, 1)
-    }
+def _algorithm_names(methods: list[str]) -> list[str]:
+    """Return the methods' names, numbered where one has several settings."""
+    numbers = [methods[: k + 1].count(method) for k, method in enumerate(methods)]
+    return [
+        f"{method} #{number}" if methods.count(method) > 1 else method
+        for method, number in zip(methods, numbers, strict=True)
+    ]
 
 
 def _file_names(names: list[str]) -> list[str]:
     """Return distinct names that every file system accepts, even where case does not count."""
-    unique_names: list[str] = []
+    file_names: dict[str, str] = {}  # by their lower case
     for name in names:
-        plain = re.sub(r"[^A-Za-z0-9@+=#_-]+", "-", name).strip("-")[:80] or "unnamed"
-        taken = {one.lower() for one in unique_names}
-        k, unique = 2, plain
-        while unique.lower() in taken:
+        unique = plain = re.sub(r"[^A-Za-z0-9@+=#_-]+", "-", name).strip("-")[:80] or "unnamed"
+        k = 2
+        while unique.lower() in file_names:
             k, unique = k + 1, f"{plain}-{k}"
-        unique_names.append(unique)
-    return unique_names
+        file_names[unique.lower()] = unique
+    return list(file_names.values())
 
 
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
@@ -221,27 +214,29 @@ def latex(text: str) -> str:
     return "".join(_SPECIAL.get(letter, letter) for letter in " ".join(text.split()))
 
 
-def latex_table(header: Sequence[str], rows: Iterable[Sequence[str | float | None]], digits: int = 2) -> str:
-    """Return a tabular: text to the left, numbers to the right with that many digits, None and nan as dashes.
-
-    Raises ValueError where a row has more or fewer cells than the header.
-    """
-    table = [list(row) for row in rows]
-    for row in table:
-        if len(row) != len(header):
-            raise InputError(f"rows must have {len(header)} cells, as the header has, got {len(row)}")
-    numbers = [bool(table) and not any(isinstance(row[k], str) for row in table) for k in range(len(header))]
-    lines = [[latex(name) for name in header], *([_cell(cell, digits) for cell in row] for row in table)]
-    body = [" & ".join(cells) + r" \\" for cells in lines]
-    columns = "".join("r" if number else "l" for number in numbers)
+def latex_table(header: Sequence[str], rows: Sequence[Sequence[str | float | None]]) -> str:
+    """Return a tabular: text to the left, numbers to the right with two digits, None and nan as dashes."""
+    columns = "".join(
+        "l" if any(isinstance(cell, str) for cell in column) else "r" for column in zip(*rows, strict=True)
+    )
+    lines = [" & ".join(map(_cell, row)) + r" \\" for row in (header, *rows)]
     return "\n".join(
-        [f"\\begin{{tabular}}{{{columns}}}", r"\hline", body[0], r"\hline", *body[1:], r"\hline", r"\end{tabular}", ""]
+        [
+            f"\\begin{{tabular}}{{{columns}}}",
+            r"\hline",
+            lines[0],
+            r"\hline",
+            *lines[1:],
+            r"\hline",
+            r"\end{tabular}",
+            "",
+        ]
     )
 
 
-def _cell(value: str | float | None, digits: int) -> str:
+def _cell(value: str | float | None) -> str:
     if isinstance(value, str):
         return latex(value)
     if value is None or math.isnan(value):
         return "--"
-    return str(value) if isinstance(value, int) else f"{value:.{digits}f}"
+    return str(value) if isinstance(value, int) else f"{value:.2f}"

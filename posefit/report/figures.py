@@ -30,85 +30,66 @@ if TYPE_CHECKING:
 # Okabe and Ito, Color universal design, 2008, without their yellow; lines of the first seven methods, the next, ...
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES = ("-", "--", ":", "-.")
-FORMATS = (".png", ".pdf", ".svg")
+METADATA: dict[str, dict[str, Any]] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}  # of formats
 LEVELS = 200  # of a performance profile
 _SIZE = (6.4, 3.6)  # inches
+_SHARES = (-0.02, 1.02)  # ends of an axis
 # a critical-difference plot: inches a row; rows above the line, and from one bar to the next
 _ROW, _ABOVE, _BAR = 0.24, 3.1, 0.4
 
 
-def check_figure(path: str | Path) -> None:
-    """Raise ImportError without matplotlib, and ValueError where a figure of that name cannot be written."""
-    _library("figure")
-    if Path(path).suffix.lower() not in FORMATS:
-        raise InputError(f"{path}: expected a figure that ends in {', '.join(FORMATS)}, got {Path(path).suffix!r}")
-
-
 def save(figure: "Figure", path: str | Path) -> None:
-    """Write a figure as a new file; the same figure gives the same bytes. Raises as `check_figure` does."""
-    check_figure(path)
+    """Write a figure as a new file, whose suffix is its format; the same figure gives the same bytes."""
     kind = Path(path).suffix.lower()
-    # nothing that differs between runs
-    metadata: dict[str, Any] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}[kind]
-    with new_file(path) as building, _library("").rc_context({"svg.hashsalt": "posefit"}):
-        figure.savefig(building, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
+    if kind not in METADATA:
+        raise InputError(f"{path}: expected a figure that ends in {', '.join(METADATA)}, got {kind!r}")
+    with new_file(path) as building, library("").rc_context({"svg.hashsalt": "posefit"}):
+        figure.savefig(building, dpi=200, bbox_inches="tight", metadata=METADATA[kind])  # long names too
 
 
 def curves_figure(methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals]) -> "Figure":
     """Return the best costs over evaluations (p,), each with its band: of each method the intervals of p values."""
-    figure, axes = _figure()
+    figure, axes = _figure("evaluations", "best cost")
     for k, curve in enumerate(curves):
-        axes.plot(evaluations, curve.values, label=_plain(methods[k]), **_line(k))
-        axes.fill_between(evaluations, curve.low, curve.high, color=_line(k)["color"], alpha=0.18, linewidth=0)
-    _finish(axes, "evaluations", "best cost", methods)
+        axes.plot(evaluations, curve.values, **_line(methods, k))
+        axes.fill_between(evaluations, curve.low, curve.high, color=_colour(k), alpha=0.18, linewidth=0)
     axes.set_xscale("log")
-    return figure
+    return _with_legend(figure, methods)
 
 
-def attainment_figure(methods: Sequence[str], evaluations: Array, shares: Array) -> "Figure":
-    """Return the shares (methods, p) of runs and targets reached within evaluations (p,)."""
-    figure = _shares_figure(methods, evaluations, shares, "evaluations", "share of runs and targets reached")
-    figure.axes[0].set_xscale("log")
-    return figure
-
-
-def profile_figure(methods: Sequence[str], levels: Array, shares: Array) -> "Figure":
-    """Return the shares (methods, levels) of runs whose error is within each level."""
-    return _shares_figure(methods, levels, shares, "error, degrees", "share of runs within")
-
-
-def _shares_figure(methods: Sequence[str], x: Array, shares: Array, x_label: str, y_label: str) -> "Figure":
-    figure, axes = _figure()
+def shares_figure(
+    methods: Sequence[str], x: Array, shares: Array, x_label: str, y_label: str, *, log: bool = False
+) -> "Figure":
+    """Return the shares (methods, p) of runs, or of runs and targets, within values x (p,)."""
+    figure, axes = _figure(x_label, y_label)
     for k, share in enumerate(shares):
-        axes.step(x, share, where="post", label=_plain(methods[k]), **_line(k))
-    _finish(axes, x_label, y_label, methods)
-    axes.set_ylim(-0.02, 1.02)
-    return figure
+        axes.step(x, share, where="post", **_line(methods, k))
+    axes.set_xscale("log" if log else "linear")
+    axes.set_ylim(*_SHARES)
+    return _with_legend(figure, methods)
 
 
 def joint_errors_figure(methods: Sequence[str], joints: Sequence[str], errors: Sequence[Intervals]) -> "Figure":
     """Return bars, a group for each joint with one for each method; of each method the intervals of all joints."""
     thick = 0.8 / len(methods)
-    figure, axes = _figure((_SIZE[0], 1.1 + len(joints) * max(0.22, 0.09 * len(methods))))
+    figure, axes = _figure("error, mm", "", (_SIZE[0], 1.1 + len(joints) * max(0.22, 0.09 * len(methods))))
     places = np.arange(len(joints))
-    for k, one in enumerate(errors):
-        reach = np.nan_to_num([one.values - one.low, one.high - one.values])  # one seed has no interval
+    for k, error in enumerate(errors):
         axes.barh(
             places + (k - (len(methods) - 1) / 2) * thick,
-            one.values,
+            error.values,
             thick,
-            xerr=reach,
+            xerr=np.nan_to_num([error.values - error.low, error.high - error.values]),  # one seed has no interval
             label=_plain(methods[k]),
-            color=_line(k)["color"],
+            color=_colour(k),
             hatch=(None, "////", "....", "xxxx")[k // len(COLOURS) % 4],
             error_kw={"elinewidth": 0.8, "ecolor": "0.25"},
         )
-    axes.set_yticks(places, [_plain(joint) for joint in joints])
+    axes.set_yticks(places, map(_plain, joints))
     axes.set_ylim(len(joints) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
-    _finish(axes, "error, mm", "", methods)
     axes.set_xlim(left=0.0)
-    return figure
+    return _with_legend(figure, methods)
 
 
 def reliability_figure(methods: Sequence[str], bins: Sequence[Sequence[Sequence[float]]]) -> "Figure":
@@ -117,16 +98,15 @@ def reliability_figure(methods: Sequence[str], bins: Sequence[Sequence[Sequence[
     Each method has rows of the number of frames, their mean probability, and the share that is right; the area of a dot
     is the number.
     """
-    figure, axes = _figure((5.2, 3.6))
+    figure, axes = _figure("probability of the likeliest mode", "share of frames where it is right", (5.2, 3.6))
     axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
-    for k, one in enumerate(bins):
-        count, probability, right = np.array(one, dtype=float).T
-        axes.plot(probability, right, label=_plain(methods[k]), **_line(k))
-        axes.scatter(probability, right, 8 + 80 * count / count.sum(), color=_line(k)["color"])
-    _finish(axes, "probability of the likeliest mode", "share of frames where it is right", methods)
-    axes.set_xlim(-0.02, 1.02)
-    axes.set_ylim(-0.02, 1.02)
-    return figure
+    for k, rows in enumerate(bins):
+        count, probability, right = np.array(rows, dtype=float).T
+        axes.plot(probability, right, **_line(methods, k))
+        axes.scatter(probability, right, 8 + 80 * count / count.sum(), color=_colour(k))
+    axes.set_xlim(*_SHARES)
+    axes.set_ylim(*_SHARES)
+    return _with_legend(figure, methods)
 
 
 def coverage_figure(
@@ -139,16 +119,15 @@ def coverage_figure(
 
     Horizontal lines are the nominal shares.
     """
-    figure, axes = _figure()
+    figure, axes = _figure("radius of intervals, mm", "share of joints within")
     for level in levels:
         axes.axhline(level, color="0.8", linewidth=1)
     for k, (wide, share) in enumerate(zip(widths, shares, strict=True)):
-        axes.plot(wide, share, marker="o", label=_plain(methods[k]), **_line(k))
-    _finish(axes, "radius of intervals, mm", "share of joints within", methods)
+        axes.plot(wide, share, marker="o", **_line(methods, k))
     axes.set_yticks([0.0, *levels, 1.0])
     axes.set_xlim(left=0.0)
-    axes.set_ylim(-0.02, 1.02)
-    return figure
+    axes.set_ylim(*_SHARES)
+    return _with_legend(figure, methods)
 
 
 def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Figure":
@@ -156,7 +135,7 @@ def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Fig
     count, half = len(methods), (len(methods) + 1) // 2
     names = 0.9 + _BAR * len(ranking.cliques)  # rows from the line to the first name
     rows = names + half
-    figure: Figure = _library("figure").Figure(figsize=(7.2, _ROW * (_ABOVE + rows)))
+    figure: Figure = library("figure").Figure(figsize=(7.2, _ROW * (_ABOVE + rows)))
     axes = figure.add_axes((0.3, 0.0, 0.4, 1.0))
     beyond = 0.02 * (count - 1)
     axes.set_xlim(1.0 - beyond, count + beyond)
@@ -173,7 +152,7 @@ def critical_difference_figure(methods: Sequence[str], ranking: Ranking) -> "Fig
     for place, method in enumerate(np.argsort(ranking.mean_ranks, kind="stable")):
         best = place < half  # half of the names on either side
         rank, row = ranking.mean_ranks[method], names + (place if best else count - 1 - place)
-        line = _line(int(method)) | {"linewidth": 1}
+        line = _line(methods, int(method)) | {"linewidth": 1}
         axes.plot([rank, rank, axes.get_xlim()[0 if best else 1]], [0, row, row], **line)
         axes.plot([rank], [0], marker="o", markersize=4, color=line["color"])
         shown = [_plain(methods[method]), f"{rank:.2f}"]
@@ -195,33 +174,39 @@ def _ruler(axes: "Axes", difference: float, count: int) -> None:
     axes.text(1, y + 0.25, label, va="top", fontsize=8)
 
 
-def _library(name: str) -> Any:
+def library(name: str) -> Any:
+    """Return a module of matplotlib, or matplotlib itself. Raises ImportError without it."""
     try:
         return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
     except ImportError as error:
         raise ImportError("figures need the library matplotlib: pip install posefit[figures]") from error
 
 
-def _figure(size: tuple[float, float] = _SIZE) -> "tuple[Figure, Axes]":
-    figure: Figure = _library("figure").Figure(figsize=size, layout="constrained")
-    axes = figure.add_subplot()
+def _figure(x: str, y: str, size: tuple[float, float] = _SIZE) -> "tuple[Figure, Axes]":
+    figure: Figure = library("figure").Figure(figsize=size, layout="constrained")
+    axes = figure.add_subplot(xlabel=x, ylabel=y)
     axes.spines[["top", "right"]].set_visible(False)
     return figure, axes
 
 
-def _line(k: int) -> dict[str, Any]:
-    return {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[k // len(COLOURS) % len(STYLES)]}
+def _with_legend(figure: "Figure", methods: Sequence[str]) -> "Figure":
+    figure.legend(loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6)
+    return figure
+
+
+def _colour(k: int) -> str:
+    return COLOURS[k % len(COLOURS)]
+
+
+def _line(methods: Sequence[str], k: int) -> dict[str, Any]:
+    """Return the label and look of a method's line."""
+    style = STYLES[k // len(COLOURS) % len(STYLES)]
+    return {"label": _plain(methods[k]), "color": _colour(k), "linestyle": style}
 
 
 def _plain(text: str) -> str:
     """Return text that matplotlib does not interpret as mathematics."""
     return text.replace("$", r"\$")
-
-
-def _finish(axes: "Axes", x: str, y: str, methods: Sequence[str]) -> None:
-    axes.set_xlabel(_plain(x))
-    axes.set_ylabel(_plain(y))
-    axes.figure.legend(loc="outside right upper", frameon=False, fontsize=8 if len(methods) < 20 else 6)
 
 
 def write_figures(runs: Runs, path: str | Path) -> None:
@@ -236,27 +221,30 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     names = [runs.methods[m] for m in contest.methods]
     errors, evaluations = contest.of("error"), grid(contest)
     figures: dict[str, Figure] = {}
-    curves = {name: one for name, one in zip(names, convergence(contest, evaluations), strict=True) if one is not None}
-    if curves:
-        figures["convergence"] = curves_figure(list(curves), evaluations, list(curves.values()))
-        figures["attainment"] = attainment_figure(names, evaluations, reached(contest, evaluations))
+    curves = zip(names, convergence(contest, evaluations), strict=True)
+    if known := {name: curve for name, curve in curves if curve is not None}:
+        figures["convergence"] = curves_figure(list(known), evaluations, list(known.values()))
+        labels = ("evaluations", "share of runs and targets reached")
+        shares = reached(contest, evaluations)
+        figures["attainment"] = shares_figure(names, evaluations, shares, *labels, log=True)
     levels = np.linspace(0.0, float(errors.max()), LEVELS)
-    figures["profile"] = profile_figure(names, levels, performance_profile(errors, levels))
+    shares = performance_profile(errors, levels)
+    figures["profile"] = shares_figure(names, levels, shares, "error, degrees", "share of runs within")
     if joints := joint_errors(contest):
         figures["joints"] = joint_errors_figure(names, JOINTS, joints)
     if contest.testable:
         figures["critical-difference"] = critical_difference_figure(names, friedman(contest.tested_errors()))
-    if sure := certainty(contest):
-        methods = {name: one for name, one in zip(names, sure["methods"], strict=True) if one}
-        if bins := {name: one["reliability"] for name, one in methods.items() if one["reliability"]}:
+    if calibration := certainty(contest):
+        methods = {name: method for name, method in zip(names, calibration["methods"], strict=True) if method}
+        if bins := {name: method["reliability"] for name, method in methods.items() if method["reliability"]}:
             figures["reliability"] = reliability_figure(list(bins), list(bins.values()))
-        if covered := {name: one for name, one in methods.items() if None not in one["coverage"]}:
-            widths, shares = ([one[kind] for one in covered.values()] for kind in ("width", "coverage"))
-            figures["coverage"] = coverage_figure(list(covered), sure["levels"], widths, shares)
+        if covered := {name: method for name, method in methods.items() if None not in method["coverage"]}:
+            widths, covers = ([method[kind] for method in covered.values()] for kind in ("width", "coverage"))
+            figures["coverage"] = coverage_figure(list(covered), calibration["levels"], widths, covers)
     error, *others = runs.table_figures
     table = {"method": "name", COLUMNS[error].heading: error, "low": "low", "high": "high", "group": "letters"}
     table |= {**{COLUMNS[name].heading: name for name in others}, "runs": "runs"}
-    rows = [{title: _number(row[key]) for title, key in table.items()} for row in leaderboard(contest)]
+    rows = [{title: row[key] for title, key in table.items()} for row in leaderboard(contest)]
     with new_folder(path) as folder:
         for name, figure in figures.items():
             for kind in ("png", "pdf"):
@@ -264,7 +252,3 @@ def write_figures(runs: Runs, path: str | Path) -> None:
         latex = latex_table(list(table), [list(row.values()) for row in rows])
         (folder / "leaderboard.tex").write_text(latex, encoding="utf-8")
         write_csv(rows, folder / "leaderboard.csv")
-
-
-def _number(value: Any) -> Any:
-    return float(value) if isinstance(value, np.floating) else value

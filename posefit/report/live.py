@@ -4,12 +4,11 @@ The page is made again on request, but takes at most a quarter of the time: earl
 last failure. Nothing is written, neither to the ledger nor elsewhere.
 """
 
-import os
 import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from time import monotonic, sleep, time
@@ -62,23 +61,16 @@ def progress_of(ledger: Ledger, now: float | None = None) -> Progress:
 
 def _attempts(ledger: Ledger) -> tuple[int, int]:
     """Return how many cells live drivers have leased, and how many attempts at unsettled cells have failed."""
-    alive: dict[str, bool] = {}
-    running = failed = 0
-    for entry in os.scandir(ledger.path / LEASES):
-        if entry.name.startswith("."):
-            continue
+    drivers: list[str] = []
+    failed = 0
+    for path in (ledger.path / LEASES).glob("[!.]*"):
         with suppress(OSError):
-            lease = read_lease(Path(entry))
-            if lease is None:
-                continue
-            if "failed" in lease:
-                failed += 1
-                continue
-            name = lease["driver"]
-            if name not in alive:
-                alive[name] = is_locked(ledger.path / ROWS / f"{name}{SUFFIX}")
-            running += alive[name]
-    return running, failed
+            lease = read_lease(path) or {}
+            failed += "failed" in lease
+            if "driver" in lease and "failed" not in lease:
+                drivers.append(lease["driver"])
+    alive = {name: is_locked(ledger.path / ROWS / f"{name}{SUFFIX}") for name in set(drivers)}
+    return sum(alive[name] for name in drivers), failed
 
 
 class LivePage:
@@ -95,15 +87,13 @@ class LivePage:
     def page(self) -> str:
         """Return the page. Raises ValueError where the ledger cannot be read."""
         with self._lock:
-            if monotonic() >= self._ready:
-                began = monotonic()
+            if (began := monotonic()) >= self._ready:
                 try:
                     self._page, self._failure = self._make(began), ""
                 except (ValueError, OSError) as error:
                     self._failure = str(error)
-                finally:
-                    self._seconds = monotonic() - began
-                    self._ready = began + (1.0 + REST_FACTOR) * self._seconds
+                self._seconds = monotonic() - began
+                self._ready = began + (1.0 + REST_FACTOR) * self._seconds
             if self._failure:
                 raise InputError(self._failure)
             return self._page
@@ -119,7 +109,7 @@ class LivePage:
             self._data = data_of(self._ledger, runs_of(self._ledger, may_be_empty=True), self._warn)
             self._state = state
         reload = max(RELOAD_SECONDS, REST_FACTOR * self._seconds, REST_FACTOR * (monotonic() - began))
-        return document({**self._data, "live": {**asdict(progress), "reload": reload}})
+        return document({**self._data, "live": {**vars(progress), "reload": reload}})
 
 
 @contextmanager
@@ -157,7 +147,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer a request."""
-        status, text, kind = 200, "", "text/plain"
+        status, kind = 200, "text/plain"
         if not THIS_MACHINE.fullmatch(self.headers.get("Host", "")):
             status, text = 403, "this server answers requests from its own machine only"
         elif self.path.partition("?")[0] != "/":

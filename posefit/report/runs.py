@@ -2,9 +2,10 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,7 @@ _NAMED_FIELDS = ("motion", "view_degrees", "corruption", "instance")  # that the
 _PROBLEM_FIELDS = ("function", "dimension", "instance", "suite")  # of a search's spec
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Runs:
     """All rows of a ledger, sorted by instance, method and seed.
 
@@ -45,19 +46,19 @@ class Runs:
     seed: Array  # (n,)
     seeds: tuple[int, ...]  # rising
     keys: tuple[str, ...]
-    figures: dict[str, Array] = field(repr=False)  # name -> (n,), nan where a row has none; a lower `error` is better
-    warnings: Mapping[int, tuple[str, ...]] = field(repr=False)  # row -> its warnings, if any
-    failures: tuple[dict[str, Any], ...] = field(repr=False)  # quarantined cells: name, method, reasons, command
-    failed: tuple[int, ...] = field(repr=False)  # quarantined cells of each method
+    figures: dict[str, Array]  # name -> (n,), nan where a row has none; a lower `error` is better
+    warnings: Mapping[int, tuple[str, ...]]  # row -> its warnings, if any
+    failures: tuple[dict[str, Any], ...]  # quarantined cells: name, method, reasons, command
+    failed: tuple[int, ...]  # quarantined cells of each method
     unfinished: tuple[str, ...]  # methods whose every cell is in quarantine
-    is_search: bool = False
-    searches: tuple[SuiteRun, ...] = field(default=(), repr=False)
-    hits: Array = field(default_factory=lambda: np.empty((0, 0)), repr=False)  # (n, targets) evaluations, inf for never
-    heads: tuple[str, ...] = ()  # the beginnings of the commands that run rows again
-    head: Array = field(default_factory=lambda: np.empty(0, dtype=int), repr=False)  # (n,)
-    joint_errors: Array = field(default_factory=lambda: np.empty((0, len(JOINTS))), repr=False)  # (n, 27) mm
-    modes: Array = field(default_factory=lambda: np.empty((0, BINS, 3)), repr=False)  # (n, bins, 3): see `_binned`
-    traces: tuple[tuple[Array, Array], ...] = field(default=(), repr=False)  # evaluations and best costs (k,) of a row
+    is_search: bool
+    searches: tuple[SuiteRun, ...]
+    hits: Array  # (n, targets) evaluations, inf for never
+    heads: tuple[str, ...]  # the beginnings of the commands that run rows again
+    head: Array  # (n,)
+    joint_errors: Array  # (n, 27) mm
+    modes: Array  # (n, bins, 3): see `_binned`
+    traces: tuple[tuple[Array, Array], ...]  # evaluations and best costs (k,) of a row
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -70,6 +71,19 @@ class Runs:
         ]
 
 
+class _Row(NamedTuple):
+    """A finished row: its place, method and head as texts, and what `Runs` has of it."""
+
+    place: str
+    method: str
+    head: str
+    seed: int  # of any size
+    key: str
+    warnings: tuple[str, ...]
+    figures: list[float]
+    data: tuple[Any, ...]  # joint errors, modes and trace of a track; run and hits of a search
+
+
 def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
     """Return the finished rows of a ledger, in an order that does not depend on which of them finished first.
 
@@ -77,130 +91,92 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
     may be empty, and where it holds both tracks and single searches.
     """
     quarantined = ledger.quarantined()
-    table: _Table | None = None
-    for row in _checked(ledger, quarantined):
-        table = table or _Table(is_search(row["spec"]))
-        if row["status"] == "done":
-            table.add(row)
-    if table is None:
-        if not may_be_empty:
-            raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-        table = _Table(False)
-    return table.runs(ledger.version, quarantined)
-
-
-def _checked(ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]) -> Iterable[Mapping[str, Any]]:
-    """Yield all rows of a ledger and its quarantined cells, once it is known that they are of one kind."""
-    kinds = set()
-    for rows in (ledger.rows(), quarantined):
-        for row in rows:
-            kinds.add(is_search(row["spec"]))
-            if len(kinds) > 1:
-                raise InputError(
-                    f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one"
-                )
-            yield row
-
-
-class _Table:
-    """Collects rows of one kind."""
-
-    def __init__(self, searches: bool) -> None:
-        self.is_search = searches
-        self.variants: dict[str, int] = {}
-        self.places: dict[str, int] = {}
-        self.heads: dict[str, int] = {}
-        self.known: dict[str, tuple[int, int]] = {}  # variant and head of a spec without instance and seed
-        self.numbers: list[tuple[int, int, int]] = []  # variant, place and head of each row
-        self.seeds: list[int] = []  # of any size: an array could not hold them
-        self.keys: list[str] = []
-        self.figures: list[list[float]] = []
-        self.joints: list[Array] = []
-        self.modes: list[Array] = []
-        self.warnings: dict[int, tuple[str, ...]] = {}
-        self.traces: list[tuple[Array, Array]] = []
-        self.searches: list[SuiteRun] = []
-        self.hits: list[Array] = []
-
-    def add(self, row: Mapping[str, Any]) -> None:
+    rows: list[_Row] = []
+    kinds: set[bool] = set()
+    places: dict[str, str] = {}  # so that equal texts are one
+    heads: dict[str, tuple[str, str]] = {}  # method and head of a spec without instance and seed
+    for row in chain(ledger.rows(), quarantined):
         spec = row["spec"]
-        kind = _text({name: value for name, value in spec.items() if name not in LAST_FIELDS})
-        if kind not in self.known:
-            head = "" if self.is_search else command_head(spec)
-            self.known[kind] = _index(self.variants, _text(_variant(spec))), _index(self.heads, head)
-        variant, head_index = self.known[kind]
-        if row.get("warnings"):
-            self.warnings[len(self.keys)] = tuple(row["warnings"])
-        self.numbers.append((variant, _index(self.places, _text(_place(spec))), head_index))
-        self.seeds.append(spec["seed"])
-        self.keys.append(row["key"])
-        if self.is_search:
-            self._add_search(search_run(row))
-        else:
-            self._add_track(row)
+        kinds.add(searches := is_search(spec))
+        if len(kinds) > 1:
+            raise InputError(f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one")
+        if row["status"] != "done":
+            continue
+        fields = _text({name: value for name, value in spec.items() if name not in LAST_FIELDS})
+        if fields not in heads:
+            heads[fields] = _text(_variant(spec)), "" if searches else command_head(spec)
+        figures, *data = _search_data(row) if searches else _track_data(row)
+        texts = (places.setdefault(place := _text(_place(spec)), place), *heads[fields])
+        rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row.get("warnings", ())), figures, tuple(data)))
+    if not kinds and not may_be_empty:
+        raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+    return _sorted_runs(ledger.version, True in kinds, rows, quarantined)
 
-    def _add_track(self, row: Mapping[str, Any]) -> None:
-        self.figures.append([column.value(row) for column in COLUMNS.values()])
-        self.joints.append(np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32))
-        self.modes.append(_binned(row.get("mode_reliability") or []))
-        trace = row.get("trace") or {"evaluations": [], "cost": []}
-        self.traces.append((np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)))
 
-    def _add_search(self, run: SuiteRun) -> None:
-        self.searches.append(run)
-        self.hits.append(hits((run.evaluations, run.costs), run.targets))
-        reached = 100.0 * float(np.isfinite(self.hits[-1]).mean())
-        self.figures.append([100.0 - reached, reached, run.cost - run.best_known])
+def _track_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the figures of a track, its joints' errors, its modes, and its trace."""
+    joints = np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32)
+    trace = row.get("trace") or {"evaluations": [], "cost": []}
+    arrays = np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)
+    figures = [column.value(row) for column in COLUMNS.values()]
+    return figures, joints, _binned(row.get("mode_reliability") or []), arrays
 
-    def runs(self, version: str, quarantined: Sequence[Mapping[str, Any]]) -> Runs:
-        names = ("error", "reached", "above") if self.is_search else FIGURES
-        numbers = np.array(self.numbers, dtype=int).reshape(-1, 3)
-        figures = np.array(self.figures, dtype=float).reshape(-1, len(names))
-        variants, places = ([json.loads(text) for text in table] for table in (self.variants, self.places))
-        error = np.nan_to_num(figures[:, names.index("error")], nan=np.inf)
-        means = [float(np.mean(error[numbers[:, 0] == m])) for m in range(len(variants))]
-        best_first = sorted(range(len(variants)), key=lambda m: (means[m], list(self.variants)[m]))
-        place_texts, head_texts = list(self.places), list(self.heads)
-        sorted_places = sorted(range(len(places)), key=lambda i: (_rank(places[i]), place_texts[i]))
-        sorted_heads = sorted(range(len(head_texts)), key=head_texts.__getitem__)
-        for column, ranking in enumerate((best_first, sorted_places, sorted_heads)):
-            numbers[:, column] = np.argsort(ranking).astype(int)[numbers[:, column]]
-        seeds = tuple(sorted(set(self.seeds)))
-        seed_index = {seed: k for k, seed in enumerate(seeds)}
-        seed = np.array([seed_index[one] for one in self.seeds], dtype=int)
-        order = np.lexsort((seed, numbers[:, 0], numbers[:, 1]))
-        variants, places = [variants[m] for m in best_first], [places[i] for i in sorted_places]
-        method, instance, head = numbers[order].T
-        failed = Counter(_text(_variant(cell["spec"])) for cell in quarantined)
 
-        def sorted_rows(values: Sequence[Any]) -> tuple[Any, ...]:
-            return tuple(values[k] for k in order) if values else ()
+def _search_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the figures of a search, its run, and its hits."""
+    run = search_run(row)
+    evaluations = hits((run.evaluations, run.costs), run.targets)
+    reached = 100.0 * float(np.isfinite(evaluations).mean())
+    return [100.0 - reached, reached, run.cost - run.best_known], run, evaluations
 
-        return Runs(
-            version=version,
-            methods=distinct([one["method"] for one in variants], [_variation(one) for one in variants]),
-            variants=tuple({**one, "settings": ", ".join(settings_text(one["settings"]))} for one in variants),
-            instances=distinct([_place_name(one) for one in places], [_place_details(one) for one in places]),
-            places=tuple(places),
-            method=method,
-            instance=instance,
-            seed=seed[order],
-            seeds=seeds,
-            keys=sorted_rows(self.keys),
-            figures=dict(zip(names, figures[order].T, strict=True)),
-            warnings={row: self.warnings[k] for row, k in enumerate(order.tolist()) if k in self.warnings},
-            failures=tuple(_failure(cell) for cell in quarantined),
-            failed=tuple(failed[list(self.variants)[m]] for m in best_first),
-            unfinished=tuple(sorted({json.loads(text)["method"] for text in failed if text not in self.variants})),
-            is_search=self.is_search,
-            searches=sorted_rows(self.searches),
-            hits=np.array(sorted_rows(self.hits)),
-            heads=tuple(head_texts[k] for k in sorted_heads),
-            head=head,
-            joint_errors=np.array(sorted_rows(self.joints)).reshape(-1, len(JOINTS)),
-            modes=np.array(sorted_rows(self.modes)).reshape(-1, BINS, 3),
-            traces=sorted_rows(self.traces),
-        )
+
+def _sorted_runs(version: str, searches: bool, rows: list[_Row], quarantined: Sequence[Mapping[str, Any]]) -> Runs:
+    errors: dict[str, list[float]] = {}
+    for row in rows:
+        errors.setdefault(row.method, []).append(np.nan_to_num(row.figures[0], nan=np.inf))
+    methods = sorted(errors, key=lambda text: (np.mean(errors[text]), text))
+    variants = [json.loads(text) for text in methods]
+    places_of = {text: json.loads(text) for text in {row.place for row in rows}}
+    texts = sorted(places_of, key=lambda text: (_rank(places_of[text]), text))
+    places = [places_of[text] for text in texts]
+    heads, seeds = sorted({row.head for row in rows}), sorted({row.seed for row in rows})
+    rank = {value: k for values in (methods, texts, heads, seeds) for k, value in enumerate(values)}
+    rows.sort(key=lambda row: (rank[row.place], rank[row.method], row.seed))
+    method, instance, head, seed = (
+        np.array([[rank[name] for name in (row.method, row.place, row.head, row.seed)] for row in rows], dtype=int)
+        .reshape(-1, 4)
+        .T
+    )
+    names = ("error", "reached", "above") if searches else FIGURES
+    figures = np.array([row.figures for row in rows], dtype=float).reshape(-1, len(names))
+    first, second, *third = zip(*(row.data for row in rows), strict=True) if rows else ((), (), ())
+    joint_errors, modes = ((), ()) if searches else (first, second)
+    failed = Counter(_text(_variant(cell["spec"])) for cell in quarantined)
+    return Runs(
+        version=version,
+        methods=distinct([fields["method"] for fields in variants], [_variation(fields) for fields in variants]),
+        variants=tuple({**fields, "settings": ", ".join(settings_text(fields["settings"]))} for fields in variants),
+        instances=distinct([_place_name(place) for place in places], [_place_details(place) for place in places]),
+        places=tuple(places),
+        method=method,
+        instance=instance,
+        seed=seed,
+        seeds=tuple(seeds),
+        keys=tuple(row.key for row in rows),
+        figures=dict(zip(names, figures.T, strict=True)),
+        warnings={k: row.warnings for k, row in enumerate(rows) if row.warnings},
+        failures=tuple(_failure(cell) for cell in quarantined),
+        failed=tuple(failed[text] for text in methods),
+        unfinished=tuple(sorted({json.loads(text)["method"] for text in failed if text not in errors})),
+        is_search=searches,
+        searches=first if searches else (),
+        hits=np.array(second) if searches else np.empty((0, 0)),
+        heads=tuple(heads),
+        head=head,
+        joint_errors=np.array(joint_errors).reshape(-1, len(JOINTS)),
+        modes=np.array(modes).reshape(-1, BINS, 3),
+        traces=() if searches else third[0],
+    )
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
@@ -251,16 +227,25 @@ def _rank(place: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return what instances are sorted by: undamaged ones come before damaged ones."""
     if "suite" in place:
         return tuple(place[name] for name in _PROBLEM_FIELDS)
-    damage = sorted(place["corruption"].items())
-    return place["motion"], place["view_degrees"], len(damage), damage, place["instance"]
+    corruption = sorted(place["corruption"].items())
+    return place["motion"], place["view_degrees"], len(corruption), corruption, place["instance"]
+
+
+def views(place: Mapping[str, Any]) -> list[str]:
+    """Return the directions of an instance's cameras in degrees."""
+    return [f"{view:g}" for view in place["view_degrees"]]
+
+
+def damage(place: Mapping[str, Any]) -> list[str]:
+    """Return the kinds of damage of an instance with their strengths."""
+    return [f"{kind} {strength:g}" for kind, strength in sorted(place["corruption"].items())]
 
 
 def _place_name(place: Mapping[str, Any]) -> str:
     if "suite" in place:
         return f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
-    views = ", ".join(f"{view:g}°" for view in place["view_degrees"])
-    damage = "".join(f", {kind} {strength:g}" for kind, strength in sorted(place["corruption"].items()))
-    return f"{place['motion']}, view {views}{damage}, instance {place['instance']}"
+    directions = ", ".join(f"{view}°" for view in views(place))
+    return ", ".join([f"{place['motion']}, view {directions}", *damage(place), f"instance {place['instance']}"])
 
 
 def _place_details(place: Mapping[str, Any]) -> list[str]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.report.contest import Contest
-from posefit.report.runs import Runs
+from posefit.report.runs import Runs, damage, views
 
 DEPTHS = (0, 1, 2, 3, 5)  # of the trees that a selector is chosen from
 MIN_LEAF = 2  # instances in a leaf of a tree
@@ -93,38 +93,30 @@ def features_of(runs: Runs, instances: Sequence[int]) -> tuple[list[str], Array]
     Words, such as a motion's name, are a column each, of 0 and 1. Of several views the first counts, by its direction.
     """
     fields = [_fields(runs.places[i]) for i in instances]
-    values = {(name, value) for one in fields for name, value in one.items() if isinstance(value, str)}
-    words = sorted(values) if len(values) < len(instances) else []
-    numbers = sorted({name for one in fields for name, value in one.items() if not isinstance(value, str)})
-    rows = [
-        [*(float(one.get(name, 0.0)) for name in numbers), *(float(one.get(name) == value) for name, value in words)]
-        for one in fields
-    ]
-    table = np.array(rows, dtype=float).reshape(len(fields), -1)
-    varied = np.flatnonzero(np.ptp(table, axis=0) > 0.0) if len(table) else np.empty(0, dtype=int)
-    names = [*numbers, *(name for name, _ in words)]
-    return list(dict.fromkeys(names[k].partition(",")[0] for k in varied)), table[:, varied]
+    values = {(name, value) for place in fields for name, value in place.items()}
+    words = sorted((name, value) for name, value in values if isinstance(value, str))
+    numbers = sorted({name for name, value in values if not isinstance(value, str)})
+    columns = [(name, [float(place.get(name, 0.0)) for place in fields]) for name in numbers]
+    if len(words) < len(instances):
+        columns += [(name, [float(place.get(name) == value) for place in fields]) for name, value in words]
+    varied = [(name.partition(",")[0], column) for name, column in columns if len(set(column)) > 1]
+    table = np.array([column for _, column in varied]).reshape(len(varied), len(fields)).T
+    return list(dict.fromkeys(name for name, _ in varied)), table
 
 
 def _fields(place: Mapping[str, Any]) -> dict[str, float | str]:
     """Return the fields of a plan for one instance, as numbers and words."""
     view = np.deg2rad(place["view_degrees"][0])
-    fields: dict[str, float | str] = {
+    return {
         "view, sine": float(np.sin(view)),
         "view, cosine": float(np.cos(view)),
         "cameras": float(len(place["view_degrees"])),
-        **{str(kind): float(share) for kind, share in place["corruption"].items()},
+        "size": float(np.prod(place["size"])),
+        **place["corruption"],
+        **{
+            name: value for name, value in place.items() if name not in _UNUSED and isinstance(value, str | int | float)
+        },
     }
-    for name, value in place.items():
-        if name in (*_UNUSED, "view_degrees", "corruption"):
-            continue
-        if isinstance(value, bool | int | float):
-            fields[name] = float(value)
-        elif isinstance(value, str):
-            fields[name] = value
-        elif name == "size":
-            fields[name] = float(np.prod(value))
-    return fields
 
 
 def _why_not(instances: int, names: Sequence[str]) -> str:
@@ -170,20 +162,17 @@ def _oracle_apart(runs: Array) -> float:
 def _best_by_part(contest: Contest, errors: Array, best: int) -> list[dict[str, Any]]:
     """Return the best method of each part of the instances, by damage, view and motion: largest parts first."""
     parts: dict[tuple[str, str], list[int]] = {}
-    for k, i in enumerate(contest.instances):
-        place = contest.runs.places[i]
-        views = ", ".join(f"{view:g}" for view in place["view_degrees"])
-        parts.setdefault(("motion", str(place["motion"])), []).append(k)
-        parts.setdefault(("view", f"{views}°"), []).append(k)
-        for label in [f"{kind} {share:g}" for kind, share in sorted(place["corruption"].items())] or ["none"]:
-            parts.setdefault(("damage", label), []).append(k)
+    for k, place in enumerate(contest.places()):
+        labels = [("damage", label) for label in damage(place) or ["none"]]
+        for part in [*labels, ("view", f"{', '.join(views(place))}°"), ("motion", place["motion"])]:
+            parts.setdefault(part, []).append(k)
     kinds = Counter(kind for kind, _ in parts)
     order = ("damage", "view", "motion")
-    rows: list[dict[str, Any]] = []
-    for (kind, label), members in sorted(parts.items(), key=lambda part: (order.index(part[0][0]), -len(part[1]))):
-        if kinds[kind] > 1:
-            means = errors[members].mean(axis=0)
-            first = int(means.argmin())
-            row = {"part": f"{kind}: {label}", "instances": len(members), "method": contest.methods[first]}
-            rows.append({**row, "error": float(means[first]), "behind": float(means[best] - means[first])})
-    return rows[:MAX_PARTS]
+    sorted_parts = sorted(parts.items(), key=lambda part: (order.index(part[0][0]), -len(part[1])))
+    rows = []
+    for kind, label, members in [(*part, members) for part, members in sorted_parts if kinds[part[0]] > 1][:MAX_PARTS]:
+        means = errors[members].mean(axis=0)
+        first = int(means.argmin())
+        row = {"part": f"{kind}: {label}", "instances": len(members), "method": contest.methods[first]}
+        rows.append({**row, "error": float(means[first]), "behind": float(means[best] - means[first])})
+    return rows

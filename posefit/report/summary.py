@@ -11,7 +11,6 @@ from posefit.statistics.ranks import LEVEL, wilcoxon
 from posefit.tracking.measures import BASELINES
 
 NAMED = 4  # names that a sentence lists; of more it gives the number
-EXAMPLES = ("best", "median", "worst")  # tracks of the leader, in this order
 
 Rows = Sequence[Mapping[str, Any]]
 Tests = Mapping[str, Any] | None  # of `paired_tests`; None where there are too few methods or blocks
@@ -24,21 +23,19 @@ def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests
     shown to be worse* if Wilcoxon's signed ranks over paired runs have a p of at least 0.05 after Holm.
     """
     first, alone = board[0], len(contest.methods) == 1
-    unit, digits, name = (" %", 1, "reached") if contest.runs.is_search else ("°", 2, "error")
-    interval = ""
+    searches = contest.runs.is_search
+    unit, digits, name, paired = (" %", 1, "reached", "instances") if searches else ("°", 2, "error", "runs")
+    score = f"{first[name]:.{digits}f}{unit}"
+    score = f"{score} of all targets reached" if searches else f"an error of {score}"
     if first["low"] is not None and np.isfinite(first["low"]):
-        interval = f" (95 % interval {first['low']:.{digits}f}{unit} to {first['high']:.{digits}f}{unit})"
-    value = f"{first[name]:.{digits}f}{unit}"
-    score = f"{value} of all targets reached{interval}" if contest.runs.is_search else f"an error of {value}{interval}"
-    if contest.runs.is_search:
-        ahead, where, paired = "", _problems(contest), "instances"
-    else:
-        ahead, where, paired = "" if alone else _ahead(board), _motions(contest), "runs"
+        score += f" (95 % interval {first['low']:.{digits}f}{unit} to {first['high']:.{digits}f}{unit})"
+    ahead = "" if alone or searches else _ahead(board)
+    where = _problems(contest) if searches else _motions(contest)
     others = "; no other method shares its runs"
     if not alone:
         others = others_clause(contest.runs.methods, first["method"], tests, paired)
     sentence = f"{first['name']} {'has' if alone else 'leads with'} {score}{ahead} on {where}{others}."
-    if contest.runs.is_search:
+    if searches:
         return sentence + _random_sentence(contest, first, baselines)
     return (
         sentence + _lost_sentence(contest, board[: min(2, len(contest.methods))]) + _baseline_sentence(first, baselines)
@@ -47,23 +44,23 @@ def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests
 
 def _motions(contest: Contest) -> str:
     """Return the instances of tracks in words."""
-    _, instances, seeds = contest.rows.shape
-    motions = sorted({str(contest.runs.places[i]["motion"]) for i in contest.instances})
-    of = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
-    return f"{counted(instances, 'instance')} of {of} with {'one seed' if seeds == 1 else f'{seeds} seeds each'}"
+    motions = sorted({str(place["motion"]) for place in contest.places()})
+    names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
+    return f"{counted(len(contest.instances), 'instance')} of {names} with {_seeds(contest)}"
 
 
 def _problems(contest: Contest) -> str:
     """Return the problems of single searches in words."""
-    places = [contest.runs.places[i] for i in contest.instances]
+    places = contest.places()
     functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
-    instances = {(place["function"], place["instance"]) for place in places}
-    seeds = contest.rows.shape[2]
+    instances = counted(len({(place["function"], place["instance"]) for place in places}), "instance")
     noun = "function" if len(functions) == 1 else "functions"
-    return (
-        f"{noun} {_series(functions)} in {_series(dimensions)} dimensions, "
-        f"{counted(len(instances), 'instance')} in all with {'one seed' if seeds == 1 else f'{seeds} seeds each'}"
-    )
+    return f"{noun} {_series(functions)} in {_series(dimensions)} dimensions, {instances} in all with {_seeds(contest)}"
+
+
+def _seeds(contest: Contest) -> str:
+    seeds = contest.rows.shape[2]
+    return "one seed" if seeds == 1 else f"{seeds} seeds each"
 
 
 def _ahead(board: Rows) -> str:
@@ -75,11 +72,9 @@ def _ahead(board: Rows) -> str:
 def _lost_sentence(contest: Contest, rows: Rows) -> str:
     """Return how many of all compared tracks of the first methods lost frames; "" if none did."""
     lost = contest.runs.figures["lost"][contest.blocks] > 0.0
-    counts = [(row["name"], int(lost[contest.methods.index(row["method"])].sum())) for row in rows]
-    if not any(count for _, count in counts):
-        return ""
-    by = " and ".join(f"{name} in {count}" for name, count in counts)
-    return f" Frames are lost by {by} of {counted(lost[0].size, 'track')}."
+    counts = {row["name"]: int(lost[contest.methods.index(row["method"])].sum()) for row in rows}
+    by = " and ".join(f"{name} in {count}" for name, count in counts.items())
+    return f" Frames are lost by {by} of {counted(lost[0].size, 'track')}." if any(counts.values()) else ""
 
 
 def _baseline_sentence(first: Mapping[str, Any], baselines: Rows) -> str:
@@ -88,10 +83,8 @@ def _baseline_sentence(first: Mapping[str, Any], baselines: Rows) -> str:
     if not known:
         return ""
     best = min(known, key=lambda row: float(row["error"]))
-    text = f"the best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°"
-    if best["error"] > first["error"]:
-        return f" {text[0].upper()}{text[1:]}."
-    return f" It does not beat the baselines: {text}."
+    text = f"best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°."
+    return f" The {text}" if best["error"] > first["error"] else f" It does not beat the baselines: the {text}"
 
 
 def _random_sentence(contest: Contest, first: Mapping[str, Any], baselines: Rows) -> str:
@@ -108,11 +101,13 @@ def others_clause(names: Sequence[str], method: int, tests: Tests, paired: str) 
     if tests is None:
         return f"; one shared {paired[:-1]} is too few to distinguish it from any other method"
     same, worse, better = ([names[m] for m in side] for side in _sides(tests, method))
-    if too_few(tests):
-        pairs = counted(len(tests["pairs"]), "pair")
+    blocks = f"{tests['blocks']} paired {paired}"
+    # the least p, after Holm, that so few blocks can give the first of so many pairs: m 2 / 2^n
+    least_p = min(1.0, float(len(tests["pairs"]) * 2.0 ** (1 - tests["blocks"])))
+    if least_p >= LEVEL and all(adjusted >= LEVEL for _, _, _, _, adjusted, *_ in tests["pairs"]):
         return (
-            f"; too few {paired} to show any difference (over {tests['blocks']} paired {paired} Wilcoxon's p cannot be "
-            f"below {least_p(tests):.2g} after Holm over {pairs}, and must be below 0.05)"
+            f"; too few {paired} to show any difference (over {blocks} Wilcoxon's p cannot be below {least_p:.2g} "
+            f"after Holm over {counted(len(tests['pairs']), 'pair')}, and must be below 0.05)"
         )
     clause = "; all others differ"
     if same:
@@ -123,7 +118,7 @@ def others_clause(names: Sequence[str], method: int, tests: Tests, paired: str) 
         clause += f", and {counted(len(worse), 'other')} {_are(worse)} worse"
     elif worse:
         clause = "; every other method is worse"
-    return f"{clause} (Wilcoxon's signed ranks over {tests['blocks']} paired {paired}, after Holm, at 5 %)"
+    return f"{clause} (Wilcoxon's signed ranks over {blocks}, after Holm, at 5 %)"
 
 
 def not_worse(tests: Tests, method: int) -> list[int]:
@@ -131,28 +126,17 @@ def not_worse(tests: Tests, method: int) -> list[int]:
     return [] if tests is None else _sides(tests, method)[0]
 
 
-def least_p(tests: Mapping[str, Any]) -> float:
-    """Return the least p, after Holm, that so few blocks can give the first of so many pairs: m 2 / 2^n, at most 1."""
-    return min(1.0, float(len(tests["pairs"]) * 2.0 ** (1 - tests["blocks"])))
-
-
-def too_few(tests: Mapping[str, Any]) -> bool:
-    """Return whether there are too few blocks to show a difference between any two methods, however large."""
-    return least_p(tests) >= LEVEL and all(adjusted >= LEVEL for _, _, _, _, adjusted, *_ in tests["pairs"])
-
-
 def _sides(tests: Mapping[str, Any], method: int) -> tuple[list[int], list[int], list[int]]:
     """Return the methods that do not differ significantly from one, those that are worse, and those that are better."""
-    mine = tests["methods"].index(method)
+    place = tests["methods"].index(method)
     same: list[int] = []
     worse: list[int] = []
     better: list[int] = []
     for first, second, difference, _, adjusted, *_ in tests["pairs"]:
-        if mine not in (first, second):
-            continue
-        ahead = (difference if first == mine else -difference) < 0.0
-        side = same if adjusted >= LEVEL else worse if ahead else better
-        side.append(tests["methods"][second if first == mine else first])
+        if place in (first, second):
+            ahead = (difference if first == place else -difference) < 0.0
+            side = same if adjusted >= LEVEL else worse if ahead else better
+            side.append(tests["methods"][second if first == place else first])
     return same, worse, better
 
 
@@ -160,28 +144,28 @@ def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
     """Return the rows of a method's best, median and worst run by error, with these names; fewer of fewer runs."""
     rows = contest.rows[contest.methods.index(method)].ravel()
     ranked = rows[np.argsort(contest.runs.figures["error"][rows], kind="stable")].tolist()
-    places = dict.fromkeys((0, (len(ranked) - 1) // 2, len(ranked) - 1))
-    if len(places) == 2:  # two runs have no median
-        return list(zip(EXAMPLES[::2], ranked, strict=True))
-    return [(name, ranked[place]) for name, place in zip(EXAMPLES, places, strict=False)]
+    tracks = [("best", ranked[0]), ("median", ranked[(len(ranked) - 1) // 2]), ("worst", ranked[-1])]
+    return tracks[:1] if len(ranked) == 1 else tracks[::2] if len(ranked) == 2 else tracks  # two have no median
 
 
-def unpaired_sentence(unpaired: int, spare: int, seeds: int, *, tested: bool) -> str:
+def unpaired_sentence(contest: Contest) -> str:
     """Return how many finished runs are compared with nothing or count in no mean; "" if there are none.
 
-    Some method has not finished the instance and seed of `unpaired` runs. All methods have finished those of `spare`
-    runs, but means use only the `seeds` that every instance has; tests count them too where they are `tested`.
+    Some method has not finished the instance and seed of those left out. All methods have finished all `blocks`, but
+    means use only the seeds that every instance has; tests count the others too.
     """
+    spare, seeds = contest.blocks.size - contest.rows.size, contest.rows.shape[2]
     clauses = []
-    if unpaired:
-        has, them = ("run is", "it") if unpaired == 1 else ("runs are", "them")
+    if contest.left_out:
+        has, them = ("run is", "it") if contest.left_out == 1 else ("runs are", "them")
         clauses.append(
-            f"{unpaired} finished {has} left out of the comparison, as some method has no run to pair {them} with"
+            f"{contest.left_out} finished {has} left out of the comparison, "
+            f"as some method has no run to pair {them} with"
         )
     if spare:
-        where = "count in tests, but not in means and intervals" if tested else "count in no figure"
+        where = "count in no figure" if contest.runs.is_search else "count in tests, but not in means and intervals"
         each = "one seed" if seeds == 1 else f"{seeds} seeds"
-        clauses.append(f"{spare} {'more ' if unpaired else ''}{where}, which are of {each} of every instance")
+        clauses.append(f"{spare} {'more ' if clauses else ''}{where}, which are of {each} of every instance")
     return "; ".join(clauses)
 
 
@@ -195,29 +179,30 @@ def published_claims(contest: Contest, orders: Iterable[ClaimedOrder]) -> list[d
     known = [contest.runs.variants[m]["method"] for m in contest.methods]
     results = []
     for order in orders:
-        if not all(name in known for name in order.methods) or contest.blocks.shape[1] < 2:
+        if not set(order.methods) <= set(known) or contest.blocks.shape[1] < 2:
             continue
         chosen = [known.index(name) for name in order.methods]
         errors, tested = contest.of("error")[chosen], contest.tested_errors()[chosen]
-        steps = [(k, k + 1) for k in range(len(chosen) - 1)]
-        by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), steps)
+        pairs = [(k, k + 1) for k in range(len(chosen) - 1)]
+        by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), pairs)
+        steps = [
+            {
+                "difference": step.difference,
+                "p": step.p_value,
+                "adjusted": step.adjusted,
+                "by_instance": instances.adjusted,
+                "confirmed": step.difference > 0.0 and step.adjusted < LEVEL,
+            }
+            for step, instances in zip(wilcoxon(tested, pairs), by_instance, strict=True)
+        ]
         result = {
             "source": order.source,
             "said": order.statement,
             "methods": [contest.methods[m] for m in chosen],
-            "errors": [interquartile_mean(one.ravel()) for one in errors],
+            "errors": [interquartile_mean(values) for values in errors],
             "blocks": tested[0].size,
             "instances": errors.shape[1],
-            "steps": [
-                {
-                    "difference": step.difference,
-                    "p": step.p_value,
-                    "adjusted": step.adjusted,
-                    "by_instance": other.adjusted,
-                    "confirmed": step.difference > 0.0 and step.adjusted < LEVEL,
-                }
-                for step, other in zip(wilcoxon(tested, steps), by_instance, strict=True)
-            ],
+            "steps": steps,
         }
         results.append(result)
     return results

@@ -9,10 +9,12 @@ from posefit.errors import InputError
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.report.content import data_of
+from posefit.report.export import logged_runs, write_csv, write_iohprofiler
 from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.report.summary import counted
 from posefit.sweep.ledger import Ledger
+from posefit.sweep.table import flat
 
 MAX_MISSING = 20  # instances that are named if they are not compared
 PRINTED = ("header", "answer", "leaderboard", "baselines", "claims", "selection", "times")
@@ -38,36 +40,28 @@ def write_report(
     """
     _check_places(Path(path), out, [figures, iohprofiler, csv])
     if figures is not None:
-        from posefit.report.figures import check_figure
+        from posefit.report.figures import library, write_figures
 
-        check_figure("any.png")
+        library("figure")
     ledger = Ledger(path, warn)
     runs = runs_of(ledger)
-    if runs.is_search:
-        for name, place in (("figures", figures), ("iohprofiler", iohprofiler)):
-            if place is not None:
-                table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
-                raise InputError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
+    if runs.is_search and (figures is not None or iohprofiler is not None):
+        name = "iohprofiler" if figures is None else "figures"
+        table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
+        raise InputError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
     data = data_of(ledger, runs, warn)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
             building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
-        from posefit.report.figures import write_figures
-
         write_figures(runs, figures)
     if iohprofiler is not None:
-        from posefit.report.export import logged_runs, write_iohprofiler
-
         write_iohprofiler(logged_runs(ledger), iohprofiler)
     if csv is not None:
-        from posefit.report.export import write_csv
-        from posefit.sweep.table import flat
-
         write_csv(map(flat, ledger.all_rows()), csv)
     missing = [
-        {"instance": runs.instances[one["instance"]], "missing": [runs.methods[m] for m in one["missing"]]}
-        for one in data["header"]["dropped"]
+        {"instance": runs.instances[gap["instance"]], "missing": [runs.methods[m] for m in gap["missing"]]}
+        for gap in data["header"]["dropped"]
     ]
     return {"out": out, **dict(plain({name: data[name] for name in PRINTED if name in data})), "gaps": missing}
 
@@ -88,13 +82,10 @@ def _board_lines(board: list[dict[str, Any]]) -> list[str]:
     if not board:
         return []
     searches = "reached" in board[0]
-    (score, digits, head), (other, title) = (
-        (("reached", 1, "targets %"), ("above", "above"))
-        if searches
-        else (("error", 2, "error deg"), ("skill_mean_pose", "skill"))
-    )
-    letters = searches or any(row["letters"] for row in board)
-    lines = [f"{'':32} {head:>9} {'95 % interval':>15} {title:>7}" + ("  group" if letters else "")]
+    score, digits, head = ("reached", 1, "targets %") if searches else ("error", 2, "error deg")
+    other, title = ("above", "above") if searches else ("skill_mean_pose", "skill")
+    group = "  group" if searches or any(row["letters"] for row in board) else ""
+    lines = [f"{'':32} {head:>9} {'95 % interval':>15} {title:>7}{group}"]
     for row in board:
         ends = "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
         value = "-" if row[score] is None else f"{row[score]:.{digits}f}"
@@ -130,8 +121,7 @@ def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> No
     for place in places:
         if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:
             raise InputError(f"{place}: expected a place of its own for each of what is written, got it twice")
-    for other in others:
-        if other is not None:
-            check_new(other)
+        if place != out:
+            check_new(place)
     for place in places:
         check_place(place)

@@ -1,5 +1,7 @@
 """The probability that a run of one method beats a run of another on the same instance. Agarwal et al., 2021."""
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
@@ -18,18 +20,12 @@ def probability_of_improvement(errors: ArrayLike) -> Array:
     """
     array = finite("errors", errors, ("methods", "instances", "seeds"))
     methods, instances, seeds = array.shape
-    ordered = np.sort(array, axis=2)
-    wins = np.zeros((methods, methods))
-    for a in range(methods):
-        for b in range(a + 1, methods):
-            for i in range(instances):
-                beaten = np.searchsorted(ordered[b, i], array[a, i], side="right").sum()
-                below = np.searchsorted(ordered[b, i], array[a, i], side="left").sum()
-                wins[b, a] += (beaten + below) / 2.0
-    wins /= instances * seeds * seeds
-    np.fill_diagonal(wins, 0.5)
-    upper = np.triu_indices(methods, 1)
-    wins[upper] = 1.0 - wins.T[upper]
+    wins = np.full((methods, methods), 0.5)
+    for a, b in combinations(range(methods), 2):
+        ranks = stats.rankdata(np.concatenate([array[a], array[b]], axis=1), axis=1)
+        beaten = ranks[:, :seeds].sum() - instances * seeds * (seeds + 1) / 2.0
+        wins[b, a] = beaten / (instances * seeds * seeds)
+        wins[a, b] = 1.0 - wins[b, a]
     return wins
 
 
@@ -48,13 +44,13 @@ def improvement_interval(
     sqrt(n / (n - 1)), without which they are too narrow for few seeds n. Where a seed brings both methods the same
     luck, its own pair is unlike the others and shifts the value by the order of 1 / n. With one seed both ends are nan.
     """
-    one = finite("first", first, ("instances", "seeds"))
-    other = finite("second", second, ("instances", "seeds"))
-    if one.shape != other.shape:
-        raise InputError(f"second must have the shape of first, {one.shape}, got {other.shape}")
+    errors = finite("first", first, ("instances", "seeds"))
+    others = finite("second", second, ("instances", "seeds"))
+    if errors.shape != others.shape:
+        raise InputError(f"second must have the shape of first, {errors.shape}, got {others.shape}")
     check_bootstrap(resamples, level)
-    instances, seeds = one.shape
-    wins = (one[:, :, None] < other[:, None, :]) + 0.5 * (one[:, :, None] == other[:, None, :])
+    instances, seeds = errors.shape
+    wins = (errors[:, :, None] < others[:, None, :]) + 0.5 * (errors[:, :, None] == others[:, None, :])
     value = float(wins.mean())
     if seeds == 1:
         return value, np.nan, np.nan

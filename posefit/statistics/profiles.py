@@ -30,28 +30,6 @@ def trace(evaluations: ArrayLike, costs: ArrayLike) -> Trace:
     return used, best
 
 
-def costs_at(run: Trace, evaluations: ArrayLike) -> Array:
-    """Return the best cost (p,) that a run had after each of some numbers of evaluations (p,).
-
-    Raises ValueError where one of them is before the trace starts.
-    """
-    grid = finite("evaluations", evaluations, ("p",))
-    if grid.min() < run[0][0]:
-        raise InputError(f"evaluations must be at least {run[0][0]:g}, where the trace starts, got {grid.min():g}")
-    return np.asarray(run[1][np.searchsorted(run[0], grid, side="right") - 1])
-
-
-def common_grid(traces: Iterable[Trace], points: int = TARGETS) -> Array:
-    """Return numbers of evaluations (up to `points`,), evenly on a log scale, from which on every trace has a cost.
-
-    They end where the longest trace does.
-    """
-    ends = np.array([(used[0], used[-1]) for used, _ in traces])
-    if not len(ends) or points < 2:
-        raise InputError(f"traces must be at least one and points at least 2, got {len(ends)} and {points}")
-    return np.unique(np.rint(np.geomspace(ends[:, 0].max(), max(ends[:, 1].max(), ends[:, 0].max()), points)))
-
-
 def targets(traces: Iterable[Trace], count: int = TARGETS) -> Array:
     """Return costs (count,) to be reached, falling evenly on a log scale; traces are of one instance.
 
@@ -108,23 +86,11 @@ def expected_running_time(hits: ArrayLike, evaluations: ArrayLike) -> Array:
 def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
     """Return the share (methods, levels) of each method's runs with an error of at most each level.
 
-    `errors` (methods, instances, seeds). Of `ratios` it is the profile of Dolan and Moré, 2002; of errors that mean
-    the same on every instance, that of Agarwal et al., 2021.
+    `errors` (methods, instances, seeds), which mean the same on every instance: Agarwal et al., 2021.
     """
     array, edges = finite("errors", errors, ("methods", "instances", "seeds")), finite("levels", levels, ("levels",))
     runs = np.sort(array.reshape(len(array), -1), axis=1)
     return np.array([np.searchsorted(row, edges, side="right") / len(row) for row in runs])
-
-
-def ratios(errors: ArrayLike) -> Array:
-    """Return errors (methods, instances, seeds) over the least of any method on the same instance and seed.
-
-    Raises ValueError where an error is not above 0.
-    """
-    array = finite("errors", errors, ("methods", "instances", "seeds"))
-    if array.min() <= 0.0:
-        raise InputError(f"errors must be above 0 to be compared by ratio, got {array.min():g}")
-    return np.asarray(array / array.min(axis=0))
 
 
 def _listed(values: Sequence[float] | Array) -> str:

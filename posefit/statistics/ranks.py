@@ -46,15 +46,14 @@ class Comparison:
     adjusted: float  # Holm's, for all comparisons made together
 
 
-def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
+def friedman(errors: ArrayLike) -> Ranking:
     """Return the ranking of errors (methods, instances, seeds), ties sharing their mean rank.
 
     Friedman's test with its correction for ties, and Nemenyi's critical difference: Demšar, Statistical comparisons
-    of classifiers over multiple data sets, 2006. Cliques mean little where `p_value` is above `level`. Raises
-    ValueError for fewer than 2 methods or 2 blocks.
+    of classifiers over multiple data sets, 2006. Cliques mean little where `p_value` is above 0.05.
+    Raises ValueError for fewer than 2 methods or 2 blocks.
     """
     array = finite("errors", errors, _SHAPE, (2, 1, 1))
-    _check(level)
     blocks = array.reshape(len(array), -1).T
     n, k = blocks.shape
     if n < 2:
@@ -64,13 +63,13 @@ def friedman(errors: ArrayLike, level: float = LEVEL) -> Ranking:
     # Conover's form, in which ties lessen the spread of the ranks that the statistic is measured by.
     spread = float(((ranks - (k + 1) / 2.0) ** 2).sum())
     statistic = (k - 1) * n * n * float(((mean - (k + 1) / 2.0) ** 2).sum()) / spread if spread > 0.0 else 0.0
-    difference = nemenyi_difference(k, n, level)
+    difference = nemenyi_difference(k, n)
     return Ranking(mean, statistic, float(stats.chi2.sf(statistic, k - 1)), difference, _cliques(mean, difference))
 
 
-def nemenyi_difference(methods: int, blocks: int, level: float = LEVEL) -> float:
-    """Return the difference of mean ranks from which on two methods differ. Nemenyi; Demšar, 2006."""
-    quantile = float(stats.studentized_range.ppf(1.0 - level, methods, np.inf))
+def nemenyi_difference(methods: int, blocks: int) -> float:
+    """Return the difference of mean ranks from which on two methods differ at 5 %. Nemenyi; Demšar, 2006."""
+    quantile = float(stats.studentized_range.ppf(1.0 - LEVEL, methods, np.inf))
     return quantile / math.sqrt(2.0) * math.sqrt(methods * (methods + 1) / (6.0 * blocks))
 
 
@@ -98,10 +97,11 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
         if len({*pair}) != 2 or not all(0 <= m < len(array) for m in pair):
             raise InputError(f"pairs must be of two different methods of 0 to {len(array) - 1}, got {pair}")
     differences = [(array[first] - array[second]).ravel() for first, second in chosen]
-    p_values = np.array([_signed_rank(one) for one in differences])
+    p_values = [_signed_rank(values) for values in differences]
+    medians = np.median(differences, axis=1).tolist() if chosen else []
     return [
-        Comparison(first, second, float(np.median(one)), float(p), float(adjusted))
-        for (first, second), one, p, adjusted in zip(chosen, differences, p_values, holm(p_values), strict=True)
+        Comparison(*pair, median, p_value, adjusted)
+        for pair, median, p_value, adjusted in zip(chosen, medians, p_values, holm(p_values).tolist(), strict=True)
     ]
 
 
@@ -138,13 +138,8 @@ def compact_letters(count: int, apart: Iterable[tuple[int, int]]) -> list[str]:
             for group in groups
             for part in ((group - {first}, group - {second}) if {first, second} <= group else (group,))
         }
-        groups = [one for one in split if not any(one < other for other in split)]
+        groups = [group for group in split if not any(group < other for other in split)]
         if len(groups) > len(LETTERS):
             return [""] * count
     named = dict(zip(LETTERS, sorted(groups, key=sorted), strict=False))
     return ["".join(letter for letter, group in named.items() if method in group) for method in range(count)]
-
-
-def _check(level: float) -> None:
-    if not 0.0 < level < 1.0:
-        raise InputError(f"level must lie between 0 and 1, got {level}")

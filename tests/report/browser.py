@@ -1,5 +1,6 @@
 """A headless Chromium for tests of pages, and ledgers to show in it."""
 
+import json
 import os
 import shutil
 from collections.abc import Iterable, Iterator
@@ -35,11 +36,11 @@ class Watched:
 def browser() -> Iterator[Any]:
     """Give a browser; the test is skipped where there is none. POSEFIT_BROWSER names one that is elsewhere."""
     library = pytest.importorskip("playwright.sync_api", reason="pages need playwright: pip install posefit[browser]")
-    found = os.environ.get("POSEFIT_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None:
+    program = os.environ.get("POSEFIT_BROWSER") or next(filter(None, map(shutil.which, NAMES)), None)
+    if program is None:
         pytest.skip(f"pages need a browser: none of {', '.join(NAMES)} is installed")
     with library.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        chromium = driver.chromium.launch(executable_path=program, args=["--no-sandbox"])
         try:
             yield chromium
         finally:
@@ -48,7 +49,7 @@ def browser() -> Iterator[Any]:
 
 @contextmanager
 def opened(chromium: Any, path: Path | str, width: int = 1280, **how: Any) -> Iterator[Watched]:
-    """Give a file's page, or that of an address, in a window so many pixels wide; offline if nothing else is said."""
+    """Give a file's page, or that of an address, in a window so many pixels wide; offline by default."""
     context = chromium.new_context(viewport={"width": width, "height": 900}, **{"offline": True, **how})
     watched = Watched(context.new_page())
     watched.page.on("console", lambda message: watched.complaints.append(message.text))
@@ -89,8 +90,14 @@ def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
     } | more
 
 
+def data_in(page: str) -> dict[str, Any]:
+    """Return the data that a page holds."""
+    data: dict[str, Any] = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+    return data
+
+
 def sure(coverage: float, width: float, modes: list[list[float]], unknown: float = 0.0) -> dict[str, Any]:
-    """Return what a row says of how sure its method is: about its 80 % intervals, narrower and wider ones in step."""
+    """Return the uncertainty of a row: its 80 % intervals, and narrower and wider ones in step."""
     return {
         "coverage": {"50": coverage - 0.3, "80": coverage, "95": coverage + 0.15},
         "interval_mm": {"50": 0.5 * width, "80": width, "95": 2.0 * width},
@@ -106,8 +113,8 @@ def ledger(
     with Driver(path):
         pass
     writer = Writer(path / ROWS)
-    for one in results:
-        writer.append(one.row["key"], one.row, one.joints)
+    for result in results:
+        writer.append(result.row["key"], result.row, result.joints)
     writer.close()
     for cell, reasons in failures or []:
         content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}

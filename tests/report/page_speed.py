@@ -1,8 +1,7 @@
 """How fast a report is made and opened: `python -m tests.report.page_speed` prints a line a size.
 
-The same command tells of any version of the report, so that two can be held against each other. Times of making are CPU
-seconds of a process of its own, which a busy machine lengthens little; a page is opened three times, and the quickest
-counts, until its script has drawn everything.
+Times of making are CPU seconds of a process of its own; a page is opened three times, and the quickest counts, until
+its script has drawn everything.
 """
 
 import json
@@ -33,17 +32,17 @@ def main(sizes: list[int]) -> None:
             page = Path(folder) / "report.html"
             made = ledger(Path(folder) / "ledger", rows(*SIZES[size]))
             words = [sys.executable, "-c", MADE, str(made), str(page)]
-            told = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
-            taken = json.loads(told.splitlines()[-1])[0]
+            printed = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+            taken = json.loads(printed.splitlines()[-1])[0]
             shown = min(_opened(page) for _ in range(TIMES))
             print(f"{size:>7,} {taken:>12.1f} {page.stat().st_size / 1e6:>9.2f} {shown:>10.2f}", flush=True)
 
 
 def _opened(page: Path) -> float:
     """Return the seconds until a page is loaded."""
-    with browser() as chromium, opened(chromium, page) as seen:
-        seen.page.wait_for_function(f"{_LOADED} > 0")
-        return float(seen.page.evaluate(_LOADED)) / 1000.0
+    with browser() as chromium, opened(chromium, page) as watched:
+        watched.page.wait_for_function(f"{_LOADED} > 0")
+        return float(watched.page.evaluate(_LOADED)) / 1000.0
 
 
 if __name__ == "__main__":

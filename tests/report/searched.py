@@ -1,4 +1,4 @@
-"""Ledgers of single searches that took no work: what a method reaches is what its name is given."""
+"""Ledgers of single searches that took no work."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,15 +15,15 @@ def cell(method: str, function: int = 1, dimension: int = 9, instance: int = 10_
     return SearchCell(method, suite, function, dimension, instance, more.pop("budget", BUDGET) * dimension, **more)
 
 
-def search_result(one: SearchCell, targets: int) -> CellResult:
+def search_result(cell: SearchCell, targets: int) -> CellResult:
     """Return the result of a search that reaches so many of 29 targets above 0: one each ten evaluations."""
     costs = [40.0, *(2.0 ** (5.0 - k / 4.0) for k in range(targets))]
     used = [1, *(10 * (k + 1) for k in range(targets))]
-    if used[-1] < one.evaluations:
-        used, costs = [*used, one.evaluations], [*costs, costs[-1]]
+    if used[-1] < cell.evaluations:
+        used, costs = [*used, cell.evaluations], [*costs, costs[-1]]
     row = {
-        **{"key": one.key, "spec": one.spec, "status": "done", "cost": costs[-1], "best_known": 0.0},
-        **{"evaluations_used": one.evaluations, "dimensions": one.dimension, "seconds": 0.1, "warnings": []},
+        **{"key": cell.key, "spec": cell.spec, "status": "done", "cost": costs[-1], "best_known": 0.0},
+        **{"evaluations_used": cell.evaluations, "dimensions": cell.dimension, "seconds": 0.1, "warnings": []},
         "trace": {"evaluations": used, "cost": costs},
     }
     return CellResult(row, b"")

@@ -5,33 +5,34 @@ from dataclasses import replace
 
 import pytest
 
-from posefit.report.columns import COLUMNS, FIGURES, TABLE_FIGURES
+from posefit.report.columns import COLUMNS, TABLE_FIGURES
 from posefit.sweep.cell import run_cell
 from posefit.tracking.measures import BASELINES, MEASURES
-from tests.sweep.fake import cells
+from tests.report.contests import FIRST
+
+CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=80)
 
 
 @pytest.fixture(scope="module")
 def row():
-    settings = {"tracker.modes": 4}  # searches, which make a posterior
-    return run_cell(
-        replace(cells(1)[0], method="random@pca", frames=3, size=(80, 60), evaluations=80, settings=settings)
-    ).row
+    return run_cell(replace(CELL, settings={"tracker.modes": 4})).row  # of searches, which make a posterior
 
 
 def test_every_figure_has_its_place_in_a_row(row):
-    for column in COLUMNS.values():
-        assert math.isfinite(column.value(row)), column.name
-    assert COLUMNS["coverage_80"].value(row) == row["coverage"]["80"]
-    assert COLUMNS["interval_95"].value(row) == row["interval_mm"]["95"]
-    assert COLUMNS["unknown"].value(row) == row["unknown_rate"]
-    assert COLUMNS["error"].value(row) == row["error_degrees"]["mean"]
-    assert COLUMNS["ms"].value(row) == 1e3 * row["seconds_per_frame"]
-    assert COLUMNS["cpu_ms"].value(row) == 1e3 * row["cpu_seconds_per_frame"]
-    assert COLUMNS["evaluations"].value(row) == row["evaluations_used"] / 3
-    for name in BASELINES:
-        assert COLUMNS[f"skill_{name}"].value(row) == row["skill"][name]
-        assert COLUMNS[f"baseline_{name}"].value(row) == row["baselines_degrees"][name]
+    values = {name: column.value(row) for name, column in COLUMNS.items()}
+    assert all(map(math.isfinite, values.values()))
+    expected = {
+        "coverage_80": row["coverage"]["80"],
+        "interval_95": row["interval_mm"]["95"],
+        "unknown": row["unknown_rate"],
+        "error": row["error_degrees"]["mean"],
+        "ms": 1e3 * row["seconds_per_frame"],
+        "cpu_ms": 1e3 * row["cpu_seconds_per_frame"],
+        "evaluations": row["evaluations_used"] / 3,
+        **{f"skill_{name}": row["skill"][name] for name in BASELINES},
+        **{f"baseline_{name}": row["baselines_degrees"][name] for name in BASELINES},
+    }
+    assert {name: values[name] for name in expected} == expected
 
 
 def test_a_row_that_lacks_a_figure_has_nan(row):
@@ -42,38 +43,36 @@ def test_a_row_that_lacks_a_figure_has_nan(row):
     assert math.isnan(COLUMNS["skill_nearest"].value({**row, "skill": {"nearest": None}}))
 
 
-def test_a_row_says_how_often_the_likeliest_mode_was_right(row):
-    counts, told, right = zip(*row["mode_reliability"], strict=True)
+def test_a_row_has_how_often_the_likeliest_mode_was_right(row):
+    counts, probabilities, right = zip(*row["mode_reliability"], strict=True)
     assert sum(counts) == 3
-    assert all(0.0 < one <= 1.0 for one in told)
-    assert all(0.0 <= one <= 1.0 for one in right)
-    silent = run_cell(replace(cells(1)[0], method="random@pca", frames=2, size=(80, 60), evaluations=80)).row
-    assert silent["mode_reliability"] == []
-    assert silent["interval_mm"] is None
+    assert all(0.0 < probability <= 1.0 for probability in probabilities)
+    assert all(0.0 <= share <= 1.0 for share in right)
+    without = run_cell(replace(CELL, frames=2)).row
+    assert (without["mode_reliability"], without["interval_mm"]) == ([], None)
 
 
-def test_labels_and_meanings_are_those_of_the_measures():
+def test_titles_meanings_and_digits_are_those_of_the_measures():
     about = {name: COLUMNS[name].as_dict() for name in TABLE_FIGURES}
     for name, measure in {"error": "error_degrees", "lost": "lost_rate", "iou": "iou", "mpjpe": "mpjpe_mm"}.items():
-        assert about[name]["label"] == MEASURES[measure].label
-        assert about[name]["about"] == MEASURES[measure].meaning
-    assert about["error"]["title"] == "error °"
-    assert about["lost"] | {"title": "lost %", "factor": 100.0, "digits": 1} == about["lost"]
-    assert about["coverage_80"]["title"] == "80 % interval holds %"
-    assert about["interval_80"]["title"] == "80 % interval mm"
-    assert about["unknown"]["title"] == "said unknown %"
-    assert about["ms"] | {"title": "time ms a frame", "factor": 1.0, "digits": 1} == about["ms"]
-    for name, label in BASELINES.items():
-        assert about[f"skill_{name}"]["title"] == f"skill: {label}"
-    assert all(one["about"] for one in about.values())
-    assert COLUMNS["mpjpe"].heading == "MPJPE (mm)"
-    assert COLUMNS["lost"].heading == "lost"  # a share in files
-
-
-def test_a_page_is_given_a_digit_more_than_it_shows():
-    kept = {name: COLUMNS[name].stored_digits for name in TABLE_FIGURES}
-    assert kept == {
-        "error": 3, "skill_mean_pose": 3, "skill_persistence": 3, "skill_nearest": 3, "lost": 4, "swapped": 4,
-        "unknown": 4, "coverage_80": 4, "interval_80": 1, "mpjpe": 1, "iou": 4, "ms": 2, "cpu_ms": 2, "evaluations": 1,
-    }  # fmt: skip
-    assert set(TABLE_FIGURES) < set(FIGURES)
+        assert (about[name]["label"], about[name]["about"]) == (MEASURES[measure].label, MEASURES[measure].meaning)
+    assert all(column["about"] for column in about.values())
+    assert (about["lost"]["factor"], about["lost"]["digits"], about["ms"]["factor"], about["ms"]["digits"]) == (
+        100.0, 1, 1.0, 1,
+    )  # fmt: skip
+    # a title of each figure in tables, and its digits in the page's data: one more than the page shows
+    assert {name: (about[name]["title"], COLUMNS[name].stored_digits) for name in TABLE_FIGURES} == {
+        "error": ("error °", 3),
+        **{f"skill_{name}": (f"skill: {label}", 3) for name, label in BASELINES.items()},
+        "lost": ("lost %", 4),
+        "swapped": ("left/right swapped %", 4),
+        "unknown": ("said unknown %", 4),
+        "coverage_80": ("80 % interval holds %", 4),
+        "interval_80": ("80 % interval mm", 1),
+        "mpjpe": ("MPJPE mm", 1),
+        "iou": ("IoU", 4),
+        "ms": ("time ms a frame", 2),
+        "cpu_ms": ("CPU time ms a frame", 2),
+        "evaluations": ("evaluations a frame", 1),
+    }
+    assert [COLUMNS[name].heading for name in ("mpjpe", "lost")] == ["MPJPE (mm)", "lost"]  # a share in files

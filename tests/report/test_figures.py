@@ -15,34 +15,27 @@ pytest.importorskip("matplotlib")
 METHODS = ("sapso@pca", "cma_$x$@full", "vsmm")
 BINS = [[30, 0.55, 0.4], [90, 0.95, 0.9]]
 WIDTHS = [[20.0, 40.0, 80.0], [10.0, 20.0, 30.0], [50.0, 90.0, 160.0]]
+SHARES = np.array([[0.1, 0.5, 1.0], [0.0, 0.3, 0.9], [0.0, 0.0, 0.2]])
 GRID = np.array([40.0, 400.0, 2440.0])
 
 
-def band(values):
-    values = np.asarray(values, dtype=float)
-    return Intervals(values, values - 0.5, values + 1.0)
+def bands(*rows):
+    return [Intervals(values, values - 0.5, values + 1.0) for values in np.array(rows, dtype=float)]
 
 
-def ranking(means, cliques, difference=0.8):
-    return Ranking(np.array(means), 5.0, 0.04, difference, cliques)
-
-
-def texts(figure):
-    return [text.get_text() for axes in figure.axes for text in axes.texts]
+def ranking(means, cliques):
+    return Ranking(np.array(means), 5.0, 0.04, 0.8, cliques)
 
 
 def every():
     """Return one figure of each kind."""
-    shares = np.array([[0.1, 0.5, 1.0], [0.0, 0.3, 0.9], [0.0, 0.0, 0.2]])
+    joints = ["head", "l_foot"]
     return {
-        "convergence": figures.curves_figure(METHODS, GRID, [band([9, 5, 3]), band([9, 8, 7]), band([9, 9, 9])]),
-        "attainment": figures.attainment_figure(METHODS, GRID, shares),
-        "profile": figures.profile_figure(METHODS, np.array([1.0, 2.0, 3.0]), shares),
-        "joint_errors": figures.joint_errors_figure(
-            METHODS, ["head", "l_foot"], [band([30, 60]), band([40, 50]), band([9, 9])]
-        ),
+        "convergence": figures.curves_figure(METHODS, GRID, bands([9, 5, 3], [9, 8, 7], [9, 9, 9])),
+        "attainment": figures.shares_figure(METHODS, GRID, SHARES, "evaluations", "share", log=True),
+        "joint_errors": figures.joint_errors_figure(METHODS, joints, bands([30, 60], [40, 50], [9, 9])),
         "reliability": figures.reliability_figure(METHODS, [BINS, BINS[:1], BINS[1:]]),
-        "coverage": figures.coverage_figure(METHODS, (0.5, 0.8, 0.95), WIDTHS, shares),
+        "coverage": figures.coverage_figure(METHODS, (0.5, 0.8, 0.95), WIDTHS, SHARES),
         "critical_difference": figures.critical_difference_figure(METHODS, ranking([1.2, 1.8, 3.0], ((0, 1),))),
     }
 
@@ -51,97 +44,67 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
     starts = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
     once, again = every(), every()
     for name, figure in once.items():
-        for suffix in figures.FORMATS if name in ("coverage", "critical_difference") else (".png",):
-            figures.save(figure, tmp_path / f"{name}{suffix}")
-            figures.save(again[name], tmp_path / f"{name}-again{suffix}")
-            first, second = ((tmp_path / f"{name}{part}{suffix}").read_bytes() for part in ("", "-again"))
+        for suffix in starts if name in ("coverage", "critical_difference") else (".png",):
+            paths = [tmp_path / f"{name}{k}{suffix}" for k in range(2)]
+            for path, drawn in zip(paths, (figure, again[name]), strict=True):
+                figures.save(drawn, path)
+            first, second = (path.read_bytes() for path in paths)
             assert first == second, name
             assert first.startswith(starts[suffix])
-        image = cv2.imread(str(tmp_path / f"{name}.png"))[:, :, ::-1].reshape(-1, 3).astype(int)
+        image = cv2.imread(str(tmp_path / f"{name}0.png"))[:, :, ::-1].reshape(-1, 3).astype(int)
         for colour in figures.COLOURS[:3]:
-            wanted = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
-            assert (np.abs(image - wanted).max(axis=1) < 3).sum() > 50, (name, colour)
+            pixel = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+            assert (np.abs(image - pixel).max(axis=1) < 3).sum() > 50, (name, colour)
 
 
-def test_a_curve_has_its_values_and_its_band():
-    axes = every()["convergence"].axes[0]
-    assert axes.lines[0].get_ydata().tolist() == [9, 5, 3]
-    reach = axes.collections[0].get_paths()[0].vertices
-    assert (reach[:, 1].min(), reach[:, 1].max()) == (2.5, 10.0)
-
-
-def test_a_reliability_diagram_has_its_diagonal_and_dots_as_large_as_there_are_frames():
-    axes = every()["reliability"].axes[0]
-    assert axes.lines[0].get_xdata().tolist() == axes.lines[0].get_ydata().tolist() == [0, 1]
-    assert axes.lines[1].get_xdata().tolist() == [0.55, 0.95]
-    assert axes.lines[1].get_ydata().tolist() == [0.4, 0.9]
-    small, large = axes.collections[0].get_sizes()
-    assert (small, large) == pytest.approx((8 + 20, 8 + 60))
-
-
-def test_coverage_stands_over_width_among_the_levels():
-    axes = every()["coverage"].axes[0]
-    assert [line.get_ydata()[0] for line in axes.lines[:3]] == [0.5, 0.8, 0.95]
-    assert axes.lines[4].get_xdata().tolist() == WIDTHS[1]
-    assert axes.lines[4].get_ydata().tolist() == [0.0, 0.3, 0.9]
-
-
-def test_bars_have_their_intervals_and_one_seed_has_none():
-    errors = Intervals(np.array([3.0]), np.array([np.nan]), np.array([np.nan]))
-    axes = figures.joint_errors_figure(("a", "b"), ["head"], [band([30]), errors]).axes[0]
-    assert [bar.get_width() for bar in axes.patches] == [30, 3]
-    whiskers = [one.get_segments()[0][:, 0].tolist() for one in axes.collections]
+def test_lines_bands_dots_and_bars_have_their_values():
+    axes = {name: figure.axes[0] for name, figure in every().items()}
+    assert axes["convergence"].lines[0].get_ydata().tolist() == [9, 5, 3]
+    band = axes["convergence"].collections[0].get_paths()[0].vertices
+    assert (band[:, 1].min(), band[:, 1].max()) == (2.5, 10.0)
+    diagonal, line, *_ = axes["reliability"].lines
+    assert diagonal.get_xdata().tolist() == diagonal.get_ydata().tolist() == [0, 1]
+    assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == ([0.55, 0.95], [0.4, 0.9])
+    # the area of a dot is the number of frames
+    assert axes["reliability"].collections[0].get_sizes().tolist() == pytest.approx([8 + 20, 8 + 60])
+    lines = axes["coverage"].lines
+    assert [level.get_ydata()[0] for level in lines[:3]] == [0.5, 0.8, 0.95]
+    assert (lines[4].get_xdata().tolist(), lines[4].get_ydata().tolist()) == (WIDTHS[1], [0.0, 0.3, 0.9])
+    without = Intervals(np.array([3.0]), np.array([np.nan]), np.array([np.nan]))  # one seed
+    bars = figures.joint_errors_figure(("a", "b"), ["head"], [*bands([30]), without]).axes[0]
+    assert [bar.get_width() for bar in bars.patches] == [30, 3]
+    whiskers = [whisker.get_segments()[0][:, 0].tolist() for whisker in bars.collections]
     assert whiskers == [[29.5, 31.0], [3.0, 3.0]]
 
 
-def test_a_critical_difference_plot_names_methods_best_first_with_their_ranks():
-    drawn = every()["critical_difference"]
-    assert texts(drawn) == [
-        "1",
-        "2",
-        "3",
-        "sapso@pca  1.20",
-        r"cma_\$x\$@full  1.80",
-        "3.00  vsmm",
-        "critical difference 0.80",
-    ]
-
-
-def test_a_bar_joins_what_is_not_told_apart():
-    axes = figures.critical_difference_figure(
-        ("a", "b", "c", "d"), ranking([1.0, 2.0, 3.2, 3.8], ((0, 1), (2, 3)))
-    ).axes[0]
-    bars = [line.get_xdata() for line in axes.lines if line.get_linewidth() == 3.5]
-    assert [
-        (min(ends) <= low, max(ends) >= high) for ends, (low, high) in zip(bars, ((1, 2), (3.2, 3.8)), strict=True)
-    ] == [
-        (True, True),
-        (True, True),
-    ]
-    assert max(bars[0]) < 3.2
-
-
-def test_a_critical_difference_longer_than_the_line_is_said_to_be():
-    drawn = figures.critical_difference_figure(("a", "b"), friedman([[[1.0, 2.0]], [[2.0, 1.0]]]))
+def test_a_critical_difference_plot_names_methods_best_first_and_joins_those_that_do_not_differ():
+    texts = [text.get_text() for text in every()["critical_difference"].axes[0].texts]
+    names = ["sapso@pca  1.20", r"cma_\$x\$@full  1.80", "3.00  vsmm"]
+    assert texts == ["1", "2", "3", *names, "critical difference 0.80"]
+    drawn = figures.critical_difference_figure(tuple("abcd"), ranking([1.0, 2.0, 3.2, 3.8], ((0, 1), (2, 3))))
+    first, second = (line.get_xdata() for line in drawn.axes[0].lines if line.get_linewidth() == 3.5)
+    assert min(first) <= 1 < 2 <= max(first) < 3.2
+    assert min(second) <= 3.2 < 3.8 <= max(second)
     # sqrt(2 * 3 / (6 * 2)) * 1.960 = 1.39, and the line is 1 long
-    assert texts(drawn)[-1] == "critical difference 1.39, longer than the line"
+    short = figures.critical_difference_figure(("a", "b"), friedman([[[1.0, 2.0]], [[2.0, 1.0]]]))
+    assert short.axes[0].texts[-1].get_text() == "critical difference 1.39, longer than the line"
 
 
-def test_thirty_methods_are_drawn_and_no_two_lines_look_alike(tmp_path):
+def test_28_methods_are_drawn_and_no_two_lines_are_equal(tmp_path):
     names = [f"method-{k}-with-a-rather-long-name-for-a-figure" for k in range(28)]
-    found = friedman(np.random.default_rng(0).gamma(2.0, size=(28, 5, 5)))
-    figures.save(figures.critical_difference_figure(names, found), tmp_path / "cd.png")
-    drawn = figures.profile_figure(names, np.array([0.0, 1.0]), np.tile([0.0, 1.0], (28, 1)))
+    ranks = friedman(np.random.default_rng(0).gamma(2.0, size=(28, 5, 5)))
+    figures.save(figures.critical_difference_figure(names, ranks), tmp_path / "cd.png")
+    drawn = figures.shares_figure(names, np.array([0.0, 1.0]), np.tile([0.0, 1.0], (28, 1)), "x", "y")
     assert len({(line.get_color(), line.get_linestyle()) for line in drawn.axes[0].lines}) == 28
 
 
 def test_another_format_is_refused_and_nothing_is_written(tmp_path):
     with pytest.raises(ValueError, match=r"a.bmp: expected a figure that ends in .png, .pdf, .svg, got '.bmp'"):
-        figures.save(every()["profile"], tmp_path / "a.bmp")
+        figures.save(every()["attainment"], tmp_path / "a.bmp")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_matplotlib_it_is_said_what_to_install(monkeypatch):
+def test_without_matplotlib_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(ImportError, match=r"figures need the library matplotlib: pip install posefit\[figures\]"):
-        figures.check_figure("a.png")
+        figures.library("figure")

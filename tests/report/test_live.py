@@ -1,7 +1,6 @@
-"""A report while the sweep goes on: how far it is, what failed, and the report so far, on this machine alone."""
+"""The report of a running sweep: its progress, failures and results so far, served to this machine alone."""
 
 import io
-import json
 import os
 import re
 import signal
@@ -11,13 +10,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from email.message import Message
 from http.client import HTTPConnection
 from http.server import ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -25,7 +23,7 @@ from posefit.report.live import LOOPBACK, Handler, LivePage, Progress, address_o
 from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import PLANS, Ledger
 from tests.cli.test_command_line import fails, run
-from tests.report.browser import browser, ledger, opened, result
+from tests.report.browser import browser, data_in, ledger, opened, result
 from tests.sweep.fake import cells
 
 PLAN = [replace(cell, frames=4) for cell in cells(6)]
@@ -37,38 +35,37 @@ def begun(tmp_path: Path) -> Path:
     path = ledger(tmp_path / "results", [result(PLAN[0], 1.0)])
     with Driver(path) as driver:
         driver.ledger.begin(cell.key for cell in PLAN)
-    more = ledger(path, [result(cell, 2.0) for cell in PLAN[1:3]], [(PLAN[3], ["ValueError: it had to"])])
-    return more
+    return ledger(path, [result(cell, 2.0) for cell in PLAN[1:3]], [(PLAN[3], ["ValueError: it had to"])])
 
 
-def page_of(folder: str | Path, **more: str) -> tuple[int, str]:
-    """Return the status and the text of a server's page."""
-    with serving(folder, 0, lambda _: None) as server:
+@contextmanager
+def served(path: str | Path) -> Iterator[ThreadingHTTPServer]:
+    with serving(path, 0, lambda _: None) as server:
         thread = threading.Thread(target=server.serve_forever, daemon=True)
         thread.start()
         try:
-            connection = HTTPConnection(LOOPBACK, server.server_address[1], timeout=60)
-            connection.request("GET", more.pop("path", "/"), headers=more)
-            answer = connection.getresponse()
-            return answer.status, answer.read().decode()
+            yield server
         finally:
-            connection.close()
             server.shutdown()
             thread.join()
 
 
-def data_in(page: str) -> dict[str, Any]:
-    found = re.search(r'id="data">(.*?)</script>', page, re.DOTALL)
-    assert found is not None
-    data: dict[str, Any] = json.loads(found[1])
-    return data
+def page_of(folder: str | Path, path: str = "/", **headers: str) -> tuple[int, str]:
+    """Return the status and the text of a server's page."""
+    with (
+        served(folder) as server,
+        closing(HTTPConnection(LOOPBACK, server.server_address[1], timeout=60)) as connection,
+    ):
+        connection.request("GET", path, headers=headers)
+        response = connection.getresponse()
+        return response.status, response.read().decode()
 
 
 def test_progress_is_of_the_plan_that_was_begun_last(begun: Path) -> None:
     (plan,) = Ledger(begun).plans()
     assert (plan.cells, plan.settled) == (6, 1)
-    found = progress_of(Ledger(begun), now=plan.begun + 30.0)
-    assert found == Progress(6, 3, 1, 2, 0, 0, None)  # nobody works on it
+    idle = progress_of(Ledger(begun), now=plan.begun + 30.0)
+    assert idle == Progress(6, 3, 1, 2, 0, 0, None)  # no driver works on it
     with Driver(begun) as driver:
         assert isinstance(driver.lease(PLAN[4]), Lease)
         # three cells were settled in half a minute, so the two that are left take twenty seconds
@@ -88,7 +85,7 @@ def test_attempts_that_failed_are_counted_until_their_cell_is_settled(begun: Pat
         assert progress_of(Ledger(begun)).failed == 0
 
 
-def test_a_plan_that_is_gone_on_with_is_one_plan_and_a_later_one_comes_first(begun: Path) -> None:
+def test_a_continued_plan_is_one_plan_and_a_later_one_comes_first(begun: Path) -> None:
     with Driver(begun) as driver:
         driver.ledger.begin(cell.key for cell in PLAN)
         assert [(plan.cells, plan.settled) for plan in driver.ledger.plans()] == [(6, 4)]
@@ -116,15 +113,9 @@ def test_the_page_is_the_report_with_the_progress_and_reasons(begun: Path) -> No
     assert data["failures"][0]["reasons"] == ["ValueError: it had to"]
 
 
-def test_before_the_first_cell_is_done_there_is_a_page_too(tmp_path: Path) -> None:
+def test_requests_of_this_machine_get_one_page_even_before_the_first_cell_is_done(tmp_path: Path) -> None:
     path = ledger(tmp_path / "results", [])
-    status, text = page_of(path)
-    assert status == 200
-    assert data_in(text)["rows"]["key"] == []
-
-
-def test_it_answers_to_this_machine_and_with_one_page(tmp_path: Path) -> None:
-    path = ledger(tmp_path / "results", [])
+    assert data_in(page_of(path)[1])["rows"]["key"] == []
     for host in ("evil.example", "localhost.evil.example", "localhost:80@evil.example", ""):
         assert page_of(path, Host=host)[0] == 403, host
     for host in ("localhost", "LocalHost:1", "127.0.0.1"):
@@ -155,7 +146,7 @@ def test_early_requests_get_the_last_page_or_the_last_failure(begun: Path, monke
     assert showing.page() == "page 3"
 
 
-def test_a_reader_who_has_gone_away_is_no_fault(capsys: pytest.CaptureFixture[str], begun: Path) -> None:
+def test_a_closed_connection_is_no_error(capsys: pytest.CaptureFixture[str], begun: Path) -> None:
     class Gone(Handler):
         def __init__(self) -> None:
             self.path, self.request_version, self.requestline, self.command = "/", "HTTP/1.1", "GET / HTTP/1.1", "GET"
@@ -174,14 +165,9 @@ def test_a_reader_who_has_gone_away_is_no_fault(capsys: pytest.CaptureFixture[st
     assert capsys.readouterr().err == ""
 
 
-def test_a_file_is_no_ledger_and_that_is_said_once(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text("[product]\n")
-    said = fails("report", tmp_path / "plan.toml", "--serve")
-    assert said.strip().endswith("plan.toml: expected a ledger, a folder that posefit sweep wrote, got a file")
-    assert said.count("plan.toml") == 1
-
-
-def test_a_ledger_that_a_sweep_is_about_to_begin_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_serving_waits_for_a_ledger_that_a_sweep_is_about_to_begin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def begin(seconds: float) -> None:
         ledger(tmp_path / "results", [])
 
@@ -190,7 +176,7 @@ def test_a_ledger_that_a_sweep_is_about_to_begin_is_waited_for(tmp_path: Path, m
         assert address_of(server).startswith("http://127.0.0.1:")
 
 
-def test_a_port_that_is_taken_is_told_in_one_line(begun: Path) -> None:
+def test_a_taken_port_is_refused(begun: Path) -> None:
     with socket.create_server((LOOPBACK, 0)) as taken:
         port = taken.getsockname()[1]
         assert f"--port must be one that is free, got {port}: " in fails("report", begun, "--serve", "--port", port)
@@ -229,27 +215,17 @@ def test_ctrl_c_ends_it_with_status_0_before_and_after_it_answers_too(
     assert run("report", begun, "--serve").exit_code == 0
 
 
-@contextmanager
-def shown(path: Path) -> Iterator[str]:
-    with serving(path, 0, lambda _: None) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
-        yield address_of(server)
-        server.shutdown()
-        thread.join()
-
-
 @pytest.mark.slow
-def test_a_browser_shows_how_far_it_is_and_loads_the_page_anew(begun: Path) -> None:
-    with browser() as chromium, shown(begun) as address, Driver(begun) as driver:
+def test_a_browser_shows_the_progress_and_loads_the_page_again(begun: Path) -> None:
+    with browser() as chromium, served(begun) as server, Driver(begun) as driver:
         driver.lease(PLAN[4])
-        with opened(chromium, address, offline=False) as seen:
-            said = seen.page.locator("#live-text")
-            assert said.inner_text().startswith("4 of 6 cells: 3 done, 1 quarantined; 1 running, about ")
-            assert "ValueError: it had to" in seen.page.inner_text("#trouble")
+        with opened(chromium, address_of(server), offline=False) as watched:
+            text = watched.page.locator("#live-text").inner_text()
+            assert text.startswith("4 of 6 cells: 3 done, 1 quarantined; 1 running, about ")
+            assert "ValueError: it had to" in watched.page.inner_text("#trouble")
             lease = driver.lease(PLAN[5])
             assert isinstance(lease, Lease)
             driver.finish(lease, result(PLAN[5], 3.0))
-            seen.page.get_by_text("5 of 6 cells").wait_for(timeout=60_000)
-            seen.page.locator("#live-stop").check()
-            assert seen.complaints == []
+            watched.page.get_by_text("5 of 6 cells").wait_for(timeout=60_000)
+            watched.page.locator("#live-stop").check()
+            assert watched.complaints == []

@@ -48,14 +48,14 @@ def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellRes
 @counted
 @pytest.mark.slow
 def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(tmp_path: Path) -> None:
-    found = []
+    efforts = []
     for instances, seeds in ((3, 5), (5, 5), (10, 5), (20, 5)):  # the first imports what the others need
         made = ledger(tmp_path / f"{instances}", rows(instances, seeds))
         page = tmp_path / f"{instances}.html"
-        found.append(effort(lambda made=made, page=page: write_report(made, page, warn=lambda _: None)))  # type: ignore[misc]
+        efforts.append(effort(lambda made=made, page=page: write_report(made, page, warn=lambda _: None)))  # type: ignore[misc]
         size = sum(path.stat().st_size for path in (made / "rows").glob("*.jsonl"))
-        assert instances == 3 or found[-1].read < 6.0 * size
-    calls = [one.calls for one in found]
+        assert instances == 3 or efforts[-1].read < 6.0 * size
+    calls = [taken.calls for taken in efforts]
     assert calls[3] - calls[2] < 1.2 * 2.0 * (calls[2] - calls[1])
 
 
@@ -65,8 +65,8 @@ def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(t
 def test_100_000_rows_are_reported_in_2_gigabytes(tmp_path: Path, instances: int, seeds: int) -> None:
     made = ledger(tmp_path / "ledger", rows(instances, seeds))
     words = [sys.executable, "-c", REPORT, str(made), str(tmp_path / "report.html")]
-    told = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    done, taken, peak = json.loads(told.splitlines()[-1])
+    printed = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    done, taken, peak = json.loads(printed.splitlines()[-1])
     size = (tmp_path / "report.html").stat().st_size
     print(f"{done} rows in {taken:.1f} s, {peak / 1e9:.2f} GB, a page of {size / 1e6:.1f} MB")
     assert done == METHODS * instances * seeds

@@ -1,130 +1,113 @@
-"""The rows of a ledger as numbers: named apart, in an order of their own, and with gaps where a row has none."""
+"""The rows of a ledger as numbers: distinct names, a stable order, and nan where a row has no figure."""
 
 import json
 import random
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from posefit.report.columns import FIGURES
 from posefit.report.runs import Runs, runs_of
-from posefit.sweep.cell import TrackCell
+from posefit.sweep.cell import CellResult, TrackCell
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
-from tests.sweep.fake import cells
+from tests.report.contests import FIRST
 
-FIRST = cells(1)[0]
 SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
 
 
-def read(path: Path, cells: list[tuple[TrackCell, float]]) -> Runs:
-    return runs_of(Ledger(ledger(path / "results", [result(cell, error) for cell, error in cells])))
+def read(path: Path, *results: CellResult, lost: list[tuple[TrackCell, list[str]]] | None = None) -> Runs:
+    return runs_of(Ledger(ledger(path / "results", results, lost)))
 
 
-def test_methods_are_told_apart_by_what_they_differ_in_and_come_best_first(tmp_path: Path) -> None:
-    found = read(
+def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_first(tmp_path: Path) -> None:
+    runs = read(
         tmp_path,
-        [
-            (SAPSO, 3.0),
-            (COOLER, 2.0),
-            (replace(COOLER, evaluations=400), 5.0),
-            (FIRST, 1.0),
-            (replace(FIRST, version=f"{FIRST.version}, posefit-spiral 1.2"), 4.0),
-        ],
+        result(SAPSO, 3.0),
+        result(COOLER, 2.0),
+        result(replace(COOLER, evaluations=400), 5.0),
+        result(FIRST, 1.0),
+        result(replace(FIRST, version=f"{FIRST.version}, posefit-spiral 1.2"), 4.0),
     )
-    assert found.methods == (
+    assert runs.methods == (
         "random@pca",
         "sapso@pca, sapso.cooling=0.9, 2440 evaluations",
         "sapso@pca, 2440 evaluations",
         "random@pca, posefit-spiral 1.2",
         "sapso@pca, sapso.cooling=0.9, 400 evaluations",
     )
-    assert [one["settings"] for one in found.variants][1] == "sapso.cooling=0.9"
+    assert runs.variants[1]["settings"] == "sapso.cooling=0.9"
 
 
-def test_instances_are_told_apart_by_all_that_a_method_does_not_choose(tmp_path: Path) -> None:
-    found = read(
-        tmp_path,
-        [
-            (replace(FIRST, corruption={"holes": 0.5}), 1.0),
-            (replace(FIRST, instance=2), 1.0),
-            (replace(FIRST, frames=30), 1.0),
-            (FIRST, 1.0),
-            (replace(FIRST, seed=1), 1.0),
-        ],
-    )
-    assert found.instances == (
+def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -> None:
+    changes: list[dict[str, Any]] = [{"corruption": {"holes": 0.5}}, {"instance": 2}, {"frames": 30}, {}, {"seed": 1}]
+    runs = read(tmp_path, *(result(replace(FIRST, **change), 1.0) for change in changes))
+    assert runs.instances == (
         "walk, view 45°, instance 0, frames 30",
         "walk, view 45°, instance 0, frames 60",
         "walk, view 45°, instance 2",
         "walk, view 45°, holes 0.5, instance 0",
     )
-    assert np.bincount(found.instance).tolist() == [1, 2, 1, 1]
+    assert np.bincount(runs.instance).tolist() == [1, 2, 1, 1]
 
 
-def test_the_order_is_that_of_the_specs_whoever_finished_first(tmp_path: Path) -> None:
-    chosen = [(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i) for m in "ab" for i in range(3) for s in range(2)]
-    mixed = random.Random(0).sample(chosen, len(chosen))
-    one, other = read(tmp_path / "one", chosen), read(tmp_path / "other", mixed)
-    assert one.keys == other.keys
-    assert (one.figures["error"] == other.figures["error"]).all()
-    assert one.heads == other.heads
-    assert (one.head == other.head).all()
+def test_the_order_is_that_of_the_specs_in_whatever_order_cells_finished(tmp_path: Path) -> None:
+    made = [
+        result(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i) for m in "ab" for i in range(3) for s in range(2)
+    ]
+    runs, mixed = read(tmp_path / "a", *made), read(tmp_path / "b", *random.Random(0).sample(made, len(made)))
+    assert runs.keys == mixed.keys
+    assert (runs.figures["error"] == mixed.figures["error"]).all()
+    assert runs.heads == mixed.heads
+    assert (runs.head == mixed.head).all()
 
 
-def test_a_row_without_a_figure_has_none(tmp_path: Path) -> None:
+def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
     skill = {"mean_pose": None, "persistence": 0.5, "nearest": 0.25}
-    bare = result(
-        FIRST, 1.0, error_degrees=None, skill=skill, baselines_degrees=None, trace={"evaluations": [], "cost": []}
-    )
-    found = runs_of(Ledger(ledger(tmp_path / "results", [bare])))
-    assert {name for name in FIGURES if np.isnan(found.figures[name][0])} == {
+    empty = {"evaluations": [], "cost": []}
+    runs = read(tmp_path, result(FIRST, 1.0, error_degrees=None, skill=skill, baselines_degrees=None, trace=empty))
+    assert {name for name in FIGURES if np.isnan(runs.figures[name][0])} == {
         "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest", "unknown",
         *(f"{kind}_{level}" for kind in ("coverage", "interval") for level in (50, 80, 95)),
     }  # fmt: skip
-    assert found.figures["skill_nearest"].tolist() == [0.25]
-    assert found.figures["evaluations"].tolist() == [FIRST.evaluations]
-    assert found.figures["ms"].tolist() == [10.0]
-    assert len(found.traces[0][0]) == 0
+    figures = [runs.figures[name].item() for name in ("skill_nearest", "evaluations", "ms")]
+    assert figures == [0.25, FIRST.evaluations, 10.0]
+    assert len(runs.traces[0][0]) == 0
 
 
-def test_what_only_some_methods_say_is_shown_where_one_does(tmp_path: Path) -> None:
-    said = {"unknown_rate": 0.25, "coverage": {"50": 0.4, "80": 0.7, "95": 0.9}, "interval_mm": None}
-    silent = result(replace(FIRST, seed=1), 1.0)  # of a ledger from before there were posteriors
-    older = runs_of(Ledger(ledger(tmp_path / "older", [silent])))
-    newer = runs_of(Ledger(ledger(tmp_path / "newer", [silent, result(FIRST, 1.0, **said)])))
-    assert [name for name in newer.table_figures if name not in older.table_figures] == ["unknown", "coverage_80"]
-    assert newer.figures["coverage_80"][newer.seed == 0].tolist() == [0.7]
+def test_optional_figures_are_in_tables_if_a_row_has_them(tmp_path: Path) -> None:
+    uncertainty = {"unknown_rate": 0.25, "coverage": {"50": 0.4, "80": 0.7, "95": 0.9}, "interval_mm": None}
+    plain = result(replace(FIRST, seed=1), 1.0)
+    without, runs = read(tmp_path / "a", plain), read(tmp_path / "b", plain, result(FIRST, 1.0, **uncertainty))
+    assert [name for name in runs.table_figures if name not in without.table_figures] == ["unknown", "coverage_80"]
+    assert runs.figures["coverage_80"][runs.seed == 0].tolist() == [0.7]
 
 
-def test_modes_are_counted_by_how_likely_they_are(tmp_path: Path) -> None:
-    made = result(FIRST, 1.0, mode_reliability=[[4, 0.55, 0.25], [2, 1.0, 0.5]])
-    (bins,) = runs_of(Ledger(ledger(tmp_path / "results", [made]))).modes
+def test_modes_are_binned_by_their_probability(tmp_path: Path) -> None:
+    (bins,) = read(tmp_path, result(FIRST, 1.0, mode_reliability=[[4, 0.55, 0.25], [2, 1.0, 0.5]])).modes
     np.testing.assert_allclose(bins[[5, 9]], [[4, 2.2, 1], [2, 2, 1]], rtol=1e-6)
     assert not np.delete(bins, [5, 9], axis=0).any()
 
 
 def test_seeds_of_any_size_keep_every_digit(tmp_path: Path) -> None:
-    found = read(tmp_path, [(replace(FIRST, seed=2**70 + 1), 1.0), (replace(FIRST, seed=2**70), 2.0)])
-    assert [found.seeds[k] for k in found.seed] == [2**70, 2**70 + 1]
+    runs = read(tmp_path, *(result(replace(FIRST, seed=seed), 1.0) for seed in (2**70 + 1, 2**70)))
+    assert [runs.seeds[k] for k in runs.seed] == [2**70, 2**70 + 1]
 
 
 def test_a_ledger_without_rows_is_refused(tmp_path: Path) -> None:
-    empty = ledger(tmp_path / "results", [])
     with pytest.raises(ValueError, match="results: expected a ledger with finished rows, got one with none"):
-        runs_of(Ledger(empty))
+        read(tmp_path)
 
 
-def test_failures_keep_their_reasons_and_their_command(tmp_path: Path) -> None:
-    made = ledger(tmp_path / "results", [result(FIRST, 1.0)], [(SAPSO, ["slow", "slow", "dead"])])
-    found = runs_of(Ledger(made))
-    other = ledger(tmp_path / "other", [result(SAPSO, 1.0), result(COOLER, 2.0)], [(replace(COOLER, seed=1), ["slow"])])
-    assert runs_of(Ledger(other)).failed == (0, 1)
-    assert found.failed == (0,)
-    assert found.unfinished == ("sapso@pca",)
-    assert found.failures[0]["name"] == str(SAPSO)
-    assert found.failures[0]["reasons"] == ["slow", "dead"]
-    assert 'method = "sapso@pca"' in found.failures[0]["command"]
-    assert json.dumps(found.failures)
+def test_failures_have_their_reasons_and_their_command(tmp_path: Path) -> None:
+    runs = read(tmp_path / "a", result(FIRST, 1.0), lost=[(SAPSO, ["slow", "slow", "dead"])])
+    (failure,) = runs.failures
+    assert (runs.failed, runs.unfinished) == ((0,), ("sapso@pca",))
+    assert (failure["name"], failure["reasons"]) == (str(SAPSO), ["slow", "dead"])
+    assert 'method = "sapso@pca"' in failure["command"]
+    assert json.dumps(runs.failures)
+    lost = [(replace(COOLER, seed=1), ["slow"])]
+    assert read(tmp_path / "b", result(SAPSO, 1.0), result(COOLER, 2.0), lost=lost).failed == (0, 1)

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,72 +11,59 @@ import pytest
 
 from posefit.reading import parsed_toml
 from posefit.report.content import data_of
-from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, missing_instances, paired_tests
+from posefit.report.contest import baseline_rows, leaderboard
 from posefit.report.repeat import repeat_command
 from posefit.report.runs import runs_of
-from posefit.report.summary import leader_sentence
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import search_cells
 from tests.cli.test_command_line import fails, run
-from tests.report.browser import ledger, result
+from tests.report.browser import data_in, ledger, result
+from tests.report.contests import FIRST, contest_in, sentence
 from tests.report.searched import cell, problems, search_result, searched
-from tests.report.test_live import data_in, page_of
-from tests.sweep.fake import cells
+from tests.report.test_live import page_of
 
 LOST = (cell("pso", instance=10_001, settings={"population_size": 20}, seed=3), ["ValueError: it had to"])
 
 
-def contest(path: Path) -> Contest:
-    made = contest_of(runs_of(Ledger(path)))
-    assert made is not None
-    return made
-
-
-def sentence(made: Contest) -> str:
-    board = leaderboard(made)
-    tests = paired_tests(made) if made.testable else None
-    return leader_sentence(made, board, baseline_rows(made, board), tests)
-
-
 def test_the_leader_and_its_certainty_are_one_sentence(tmp_path: Path) -> None:
     # of 29 targets 10, 11 or 12 in turn, by function and instance: 11 on average, 37.9 %
-    made = contest(searched(tmp_path / "r", {"cma": 10, "random": 2}, problems([1, 5], [9, 24], 3)))
-    board = leaderboard(made)
+    contest = contest_in(searched(tmp_path / "r", {"cma": 10, "random": 2}, problems([1, 5], [9, 24], 3)))
+    board = leaderboard(contest)
     assert [(row["name"], row["runs"], row["letters"]) for row in board] == [("cma", 12, "a"), ("random", 12, "b")]
     assert [row["reached"] for row in board] == pytest.approx([1100.0 / 29.0, 300.0 / 29.0])
-    assert sentence(made) == (
+    assert sentence(contest) == (
         f"cma leads with 37.9 % of all targets reached (95 % interval {board[0]['low']:.1f} % to "
-        f"{board[0]['high']:.1f} %) on functions 1 and 5 in 9 and 24 dimensions, 6 instances in all with one seed; every "
-        "other method is worse (Wilcoxon's signed ranks over 6 paired instances, after Holm, at 5 %). "
+        f"{board[0]['high']:.1f} %) on functions 1 and 5 in 9 and 24 dimensions, 6 instances in all with one seed; "
+        "every other method is worse (Wilcoxon's signed ranks over 6 paired instances, after Holm, at 5 %). "
         "Random search reached 10.3 %."
     )
 
 
-def test_the_interval_is_that_of_instances_whatever_their_dimensions(tmp_path: Path) -> None:
+def test_the_interval_is_that_of_instances_in_any_number_of_dimensions(tmp_path: Path) -> None:
     flat, both = (searched(tmp_path / str(len(d)), {"cma": 10}, problems([1], d, 3)) for d in ([9], [9, 24]))
-    rows = [leaderboard(contest(path))[0] for path in (flat, both)]
+    rows = [leaderboard(contest_in(path))[0] for path in (flat, both)]
     # 10, 11 and 12 of 29: a standard deviation of 1, so t of 2 degrees of freedom, 4.302653, over the root of 3
     assert rows[0]["high"] - rows[0]["reached"] == pytest.approx(4.302653 / math.sqrt(3.0) * 100.0 / 29.0)
     assert rows[1]["high"] == pytest.approx(rows[0]["high"])
 
 
 def test_random_search_is_the_baseline_unless_it_leads_or_is_missing(tmp_path: Path) -> None:
-    text = sentence(contest(searched(tmp_path / "a", {"cma": 3, "random": 6}, problems([1], [9], 6))))
+    text = sentence(contest_in(searched(tmp_path / "a", {"cma": 3, "random": 6}, problems([1], [9], 6))))
     assert text.startswith("random leads with ")
     assert text.endswith(" That is random search: no method does better.")
-    alone = contest(searched(tmp_path / "b", {"cma": 3}, problems([1], [9], 1)))
+    alone = contest_in(searched(tmp_path / "b", {"cma": 3}, problems([1], [9], 1)))
     assert sentence(alone) == (
         "cma has 17.2 % of all targets reached on function 1 in 9 dimensions, 1 instance in all with one seed; "
         "no other method shares its runs."
     )
     assert baseline_rows(alone, leaderboard(alone)) == []
-    once = contest(searched(tmp_path / "c", {"cma": 3, "pso": 2}, problems([1], [9, 24], 1)))
+    once = contest_in(searched(tmp_path / "c", {"cma": 3, "pso": 2}, problems([1], [9, 24], 1)))
     assert "; one shared instance is too few to distinguish it from any other method" in sentence(once)
 
 
 def test_methods_differ_in_settings_budget_and_infeasible_proposals(tmp_path: Path) -> None:
     more: list[dict[str, Any]] = [{}, {"settings": {"population_size": 20}}, {"budget": 30}, {"infeasible": "reject"}]
-    made = [search_result(cell("pso", instance=10_000 + i, **dict(one)), 5) for one in more for i in range(2)]
+    made = [search_result(cell("pso", instance=10_000 + i, **dict(fields)), 5) for fields in more for i in range(2)]
     assert sorted(runs_of(Ledger(ledger(tmp_path / "r", made))).methods) == [
         "pso, 100 evaluations for each dimension, infeasible: reject",
         "pso, 100 evaluations for each dimension, infeasible: repair",
@@ -88,16 +74,16 @@ def test_methods_differ_in_settings_budget_and_infeasible_proposals(tmp_path: Pa
 
 def test_instances_that_one_method_lacks_are_named(tmp_path: Path) -> None:
     pairs = [(m, i) for m in ("cma", "pso") for i in range(3) if (m, i) != ("pso", 1)]
-    made = contest(ledger(tmp_path / "r", [search_result(cell(m, instance=10_000 + i), 5) for m, i in pairs]))
-    (gap,) = missing_instances(made)
-    assert made.runs.instances[gap["instance"]] == "f1 in 9D, instance 10001"
-    assert [made.runs.methods[m] for m in gap["missing"]] == ["pso"]
-    assert len(made.instances) == 2
+    contest = contest_in(ledger(tmp_path / "r", [search_result(cell(m, instance=10_000 + i), 5) for m, i in pairs]))
+    ((instance, methods),) = contest.missing
+    assert contest.runs.instances[instance] == "f1 in 9D, instance 10001"
+    assert [contest.runs.methods[m] for m in methods] == ["pso"]
+    assert len(contest.instances) == 2
 
 
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
-    book = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))  # 9 + 2 and 9; 9 and 9 + 1
-    data = data_of(book, runs_of(book), print)
+    results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))  # 9 + 2 and 9; 9 and 9 + 1
+    data = data_of(results, runs_of(results), print)
     assert [chart["title"] for chart in data["charts"]] == ["All functions", "1 single image", "5 mismatched body"]
     together, first, _ = (chart["series"][0]["values"] for chart in data["charts"])
     assert (data["evaluations"][0], data["evaluations"][-1]) == pytest.approx((1.0, 100.0))
@@ -133,29 +119,27 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     assert printed["times"][0]["times"][0] == 50.0
     assert printed["answer"].startswith("cma leads")
     status, text = page_of(results)  # of a sweep that is still running
-    assert status == 200
-    assert data_in(text)["live"]["done"] == 12
+    assert (status, data_in(text)["live"]["done"]) == (200, 12)
     for name, message in (("figures", "got one of single searches"), ("iohprofiler", "posefit suite table ")):
-        said = fails("report", results, f"--{name}", tmp_path / "new")
-        assert f"--{name} must be given with a sweep of tracks" in said
-        assert message in said
+        mistake = fails("report", results, f"--{name}", tmp_path / "new")
+        assert f"--{name} must be given with a sweep of tracks" in mistake
+        assert message in mistake
     assert not (tmp_path / "new").exists()
 
 
 def test_the_command_of_a_search_is_a_plan_of_that_one_cell() -> None:
-    one = cell("pso", 7, 24, 3, seed=5, budget=30, infeasible="reject", settings={"population_size": 20})
-    plan = repeat_command(one.spec).partition("<<'END'\n")[2].removesuffix("END")
+    search = cell("pso", 7, 24, 3, seed=5, budget=30, infeasible="reject", settings={"population_size": 20})
+    plan = repeat_command(search.spec).partition("<<'END'\n")[2].removesuffix("END")
     (other,) = search_cells(parsed_toml(plan))
-    assert other.spec == {**one.spec, "version": other.version}
+    assert other.spec == {**search.spec, "version": other.version}
 
 
-def test_a_ledger_of_tracks_and_searches_is_refused_in_one_line(tmp_path: Path) -> None:
-    track, search = replace(cells(1)[0], frames=4), cell("cma")
-    made = [
-        ledger(tmp_path / "a", [result(track, 1.0)], [(search, ["no"])]),
-        ledger(tmp_path / "b", [search_result(search, 3)], [(track, ["no"])]),
-    ]
-    for path in made:
+def test_a_ledger_of_tracks_and_searches_is_refused(tmp_path: Path) -> None:
+    search = cell("cma")
+    for path in (
+        ledger(tmp_path / "a", [result(FIRST, 1.0)], [(search, ["no"])]),
+        ledger(tmp_path / "b", [search_result(search, 3)], [(FIRST, ["no"])]),
+    ):
         message = fails("report", path, "--out", tmp_path / "page.html")
         assert "expected a ledger of tracks or one of single searches, got both in one" in message
         assert not (tmp_path / "page.html").exists()

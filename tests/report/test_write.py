@@ -1,14 +1,12 @@
 """What `posefit report` writes and prints, and one line for every mistake."""
 
 import csv
-import html.parser
 import json
 import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,65 +17,47 @@ from posefit.report.page import MARK
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.cli.test_command_line import fails, run
-from tests.report.browser import ledger, result, sure
-from tests.sweep.fake import cells
+from tests.report.browser import data_in, ledger, result, sure
+from tests.report.contests import FIRST, full
 
-FIRST = cells(1)[0]
-LOST = replace(FIRST, seed=9)
+LOST = [(replace(FIRST, seed=9), ["its process died", "ValueError: it had to", "its process died"])]
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
     """Return a ledger of two methods on two instances with two seeds, and one failure."""
-    found = [
-        result(replace(FIRST, method=m, instance=i, seed=s, frames=4), error + 0.1 * i + 0.02 * s)
-        for m, error in (("random@pca", 2.0), ("sapso@pca", 1.0))
-        for i in range(2)
-        for s in range(2)
+    made = [
+        result(replace(FIRST, method=method, instance=i, seed=s, frames=4), error + 0.01 * s)
+        for (method, i, s), error in full({"random@pca": 2.0, "sapso@pca": 1.0}).items()
     ]
-    return ledger(tmp_path / "results", found, [(LOST, ["its process died", "its process died"])])
+    return ledger(tmp_path / "results", made, LOST)
 
 
-class Page(html.parser.HTMLParser):
-    """Collects the data of a page, and everything in it that would be fetched."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.links: list[str] = []
-        self.tags: list[str] = []
-        self._scripts: list[str] = []
-        self.feed(path.read_text(encoding="utf-8"))
-        self.data: dict[str, Any] = json.loads(self._scripts[0])
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.links += [value or "" for name, value in attrs if name in ("src", "href", "action")]
-
-    def handle_data(self, data: str) -> None:
-        if self.tags and self.tags[-1] == "script" and data.strip():
-            self._scripts.append(data)
+def written(made: Path, *words: object) -> tuple[list[str], str]:
+    """Return the lines that the command prints, and the page that it writes."""
+    out = made.with_name("report.html")
+    done = run("report", made, "--out", out, *words)
+    assert done.exit_code == 0, done.stderr
+    return done.stdout.splitlines(), out.read_text("utf-8")
 
 
 def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, tmp_path: Path) -> None:
-    out = tmp_path / "report.html"
-    done = run("report", results, "--out", out)
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == f"written to {out}: open it in any browser"
-    assert done.stdout.startswith(
+    lines, page = written(results)
+    assert lines[-1] == f"written to {tmp_path / 'report.html'}: open it in any browser"
+    assert lines[0].startswith(
         "sapso@pca leads with an error of 1.06°, 1.00° ahead of random@pca, on 2 instances of walk with 2 seeds each; "
     )
-    assert done.stdout.splitlines()[1] == "1 cell failed, left out of all figures: random@pca 1"
-    assert [line.split()[:2] for line in done.stdout.splitlines()[4:-2]] == [
-        ["sapso@pca", "1.06"],
-        ["random@pca", "2.06"],
-    ]
-    page = Page(out)
-    assert page.links
-    assert all(link.startswith("#") for link in page.links)
-    assert not {"link", "img", "iframe", "object"} & set(page.tags)
-    assert page.data["header"]["done"] == 8
-    assert page.data["failures"][0]["reasons"] == ["its process died"]
-    assert len(page.data["animations"]["tracks"]) == 8
+    assert lines[1] == "1 cell failed, left out of all figures: random@pca 1"
+    assert [line.split()[:2] for line in lines[5:-2]] == [["sapso@pca", "1.06"], ["random@pca", "2.06"]]
+    links = re.findall(r'\s(?:src|href|action)="([^"]*)"', page)
+    assert links
+    assert all(link.startswith("#") for link in links)
+    assert not re.search(r"<(link|img|iframe|object)\b", page)
+    data = data_in(page)
+    assert data["header"]["done"] == len(data["animations"]["tracks"]) == 8
+    assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
+    assert data["certainty"] is None
+    assert not [name for name in (*data["columns"], *data["rows"]) if re.match("coverage|interval|unknown", name)]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results"]
 
 
@@ -89,7 +69,8 @@ def test_the_same_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_r
     assert done.exit_code == 0, done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results"]
     assert json.loads(run("report", results, "--json").stdout)["out"] is None
-    assert run("report", results, "--out", out).stdout.splitlines()[:-1] == done.stdout.splitlines()
+    lines, _ = written(results)
+    assert lines[:-1] == done.stdout.splitlines()
     first = out.read_bytes()
     out.write_text(MARK + "of another day")
     printed = json.loads(run("report", results, "--out", out, "--json").stdout)
@@ -100,10 +81,8 @@ def test_the_same_ledger_gives_the_same_text_and_bytes_and_replaces_an_earlier_r
     assert printed["header"]["failed"] == 1
 
 
-def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_above_the_leaderboard(
-    tmp_path: Path,
-) -> None:
-    found = [
+def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_path: Path) -> None:
+    made = [
         result(replace(FIRST, method=m, instance=i, seed=s), 1.0 + i)
         for m in ("random@pca", "sapso@pca")
         for i in range(3)
@@ -111,8 +90,8 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
         if (m, i) != ("sapso@pca", 1)
     ]
     lost = [(replace(FIRST, method="sapso@pca", instance=1, seed=s), ["its process died of SIGSEGV"]) for s in range(2)]
-    done = run("report", ledger(tmp_path / "results", found, lost), "--out", tmp_path / "report.html")
-    assert done.stdout.splitlines()[1:7] == [
+    lines, page = written(ledger(tmp_path / "results", made, lost))
+    assert lines[1:7] == [
         "2 cells failed, left out of all figures: sapso@pca 2",
         "  2 x its process died of SIGSEGV",
         "2 finished runs are left out of the comparison, as some method has no run to pair them with",
@@ -120,91 +99,76 @@ def test_failures_and_the_instances_that_one_method_takes_from_all_are_named_abo
         "  walk, view 45°, instance 1: no run of sapso@pca",
         f"{'':32} error deg   95 % interval   skill  group",
     ]
-    header = Page(tmp_path / "report.html").data["header"]
+    header = data_in(page)["header"]
     assert header["failed_by"] == {"sapso@pca": 2}
-    assert [(one["instance"], len(one["missing"])) for one in header["dropped"]] == [(1, 1)]
+    assert [(gap["instance"], len(gap["missing"])) for gap in header["dropped"]] == [(1, 1)]
 
 
 def test_a_ledger_whose_every_cell_failed_has_a_page_with_the_reasons(tmp_path: Path) -> None:
-    made = ledger(tmp_path / "results", [], [(LOST, ["ValueError: it had to", "its process died of SIGSEGV"])])
-    done = run("report", made, "--out", tmp_path / "report.html")
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.splitlines()[:3] == [
+    lines, page = written(ledger(tmp_path / "results", [], LOST))
+    assert lines[:3] == [
         "1 cell failed, left out of all figures: random@pca 1",
+        "  1 x its process died",
         "  1 x ValueError: it had to",
-        "  1 x its process died of SIGSEGV",
     ]
-    page = Page(tmp_path / "report.html")
-    assert page.data["failures"][0]["reasons"] == ["ValueError: it had to", "its process died of SIGSEGV"]
-    assert page.data["header"]["unfinished"] == ["random@pca"]
+    data = data_in(page)
+    assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
+    assert data["header"]["unfinished"] == ["random@pca"]
 
 
 def test_figures_tables_rows_and_iohprofiler_on_demand(results: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    places = {name: tmp_path / name for name in ("figures", "iohprofiler", "rows.csv")}
-    words = [
-        word for name, place in places.items() for word in (f"--{name.split('.')[0]}".replace("rows", "csv"), place)
-    ]
-    done = run("report", results, "--out", tmp_path / "report.html", *words)
-    assert done.exit_code == 0, done.stderr
+    figures, ioh, rows = (tmp_path / name for name in ("figures", "ioh", "rows.csv"))
+    written(results, "--figures", figures, "--iohprofiler", ioh, "--csv", rows)
     names = ("attainment", "convergence", "critical-difference", "joints", "profile")
     drawn = {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
-    assert {path.name for path in places["figures"].iterdir()} == drawn | {"leaderboard.tex", "leaderboard.csv"}
-    assert "sapso@pca & 1.06" in (places["figures"] / "leaderboard.tex").read_text()
-    with places["rows.csv"].open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 8 + 1
-    assert {row["status"] for row in rows} == {"done", "quarantined"}
-    assert sorted(path.name for path in places["iohprofiler"].iterdir()) == ["random@pca", "sapso@pca"]
-    dimensions = [path.name.rpartition("DIM")[2] for path in places["iohprofiler"].rglob("*.dat")]
-    assert set(dimensions) == {"9.dat"}  # three of the root and six components
+    assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.tex", "leaderboard.csv"}
+    assert "sapso@pca & 1.06" in (figures / "leaderboard.tex").read_text()
+    with rows.open(newline="", encoding="utf-8") as file:
+        statuses = [row["status"] for row in csv.DictReader(file)]
+    assert sorted(statuses) == ["done"] * 8 + ["quarantined"]
+    assert sorted(path.name for path in ioh.iterdir()) == ["random@pca", "sapso@pca"]
+    dimensions = {path.name.rpartition("DIM")[2] for path in ioh.rglob("*.dat")}
+    assert dimensions == {"9.dat"}  # three of the root and six components
 
 
-def test_methods_that_say_how_sure_they_are_have_figures_of_it(tmp_path: Path) -> None:
+def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    says = sure(0.8, 60.0, [[4, 0.9, 0.5]])
-    made = [result(replace(FIRST, method=m, seed=s), 1.0 + s, **says) for m in "ab" for s in (0, 1)]
-    made += [result(replace(FIRST, method="silent", seed=s), 3.0) for s in (0, 1)]
-    words = ["--figures", tmp_path / "figures", "--csv", tmp_path / "rows.csv"]
-    done = run("report", ledger(tmp_path / "results", made), "--out", tmp_path / "report.html", *words)
-    assert done.exit_code == 0, done.stderr
-    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
+    uncertainty = sure(0.8, 60.0, [[4, 0.9, 0.5]])
+    made = [result(replace(FIRST, method=m, seed=s), 1.0 + s, **uncertainty) for m in "ab" for s in (0, 1)]
+    made += [result(replace(FIRST, method="without", seed=s), 3.0) for s in (0, 1)]
+    figures, rows = tmp_path / "figures", tmp_path / "rows.csv"
+    _, page = written(ledger(tmp_path / "results", made), "--figures", figures, "--csv", rows)
+    drawn = {path.name for path in figures.iterdir()}
     assert drawn >= {f"{name}.{kind}" for name in ("reliability", "coverage") for kind in ("png", "pdf")}
-    head, *rows = (tmp_path / "figures" / "leaderboard.csv").read_text().splitlines()
+    head, first, *_ = (figures / "leaderboard.csv").read_text().splitlines()
     assert "said unknown,80 % interval holds,80 % interval (mm)" in head
-    assert ",0.8,60.0," in rows[0]
-    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
-        first = next(csv.DictReader(file))
-    assert (first["interval_mm.80"], first["coverage.80"]) == ("60.0", "0.8")
-    assert "mode_reliability" not in first
-    data = Page(tmp_path / "report.html").data
-    assert [one is None for one in data["certainty"]["methods"]] == [False, False, True]
+    assert ",0.8,60.0," in first
+    with rows.open(newline="", encoding="utf-8") as file:
+        row = next(csv.DictReader(file))
+    assert (row["interval_mm.80"], row["coverage.80"]) == ("60.0", "0.8")
+    assert "mode_reliability" not in row
+    data = data_in(page)
+    assert [method is None for method in data["certainty"]["methods"]] == [False, False, True]
     assert data["rows"]["coverage_80"] == [0.8] * 4 + [None] * 2
 
 
-def test_methods_without_uncertainty_have_no_such_columns(results: Path, tmp_path: Path) -> None:
-    assert run("report", results, "--out", tmp_path / "report.html").exit_code == 0
-    data = Page(tmp_path / "report.html").data
-    assert data["certainty"] is None
-    assert not [name for name in (*data["columns"], *data["rows"]) if re.match("coverage|interval|unknown", name)]
-
-
 MISTAKES = [
-    (["NONE", "--out", "OUT.html"], "expected a ledger, a folder that posefit sweep wrote, got none"),
-    (["EMPTY", "--out", "OUT.html"], "expected a ledger with finished rows, got one with none"),
-    (["NONE"], "expected a ledger, a folder that posefit sweep wrote, got none"),
-    (["RESULTS", "--out", "OUT.html", "--port", "1"], "--port must be given with --serve, got it without"),
-    (["RESULTS", "--serve", "--out", "OUT.html"], "--serve must be given without --out, which it does not write"),
-    (["RESULTS", "--serve", "--json"], "--serve must be given without --json, which it does not write"),
-    (["NONE", "--serve"], "expected a ledger, a folder that posefit sweep wrote, got none"),
-    (["RESULTS", "--serve", "--port", "70000"], "--port must be 0 to 65535, got 70000"),
-    (["RESULTS", "--out", "OUT.txt"], "--out must be a file that ends in .html, got "),
-    (["RESULTS", "--out", "OTHER.html"], "expected a new name or an earlier report, got something else"),
-    (["RESULTS", "--out", "DIR.html"], "expected a new name or an earlier report, got something else"),
-    (["RESULTS", "--out", "none/OUT.html"], "expected a place to write to, got one in "),
-    (["RESULTS", "--out", "OUT.html", "--csv", "OTHER.html"], "expected a new name to write to, got one that exists"),
-    (["RESULTS", "--out", "OUT.html", "--figures", "RESULTS"], "expected a place of its own for each"),
-    (["RESULTS", "--out", "OUT.html", "--iohprofiler", "none/OUT"], "expected a place to write to, got one in "),
+    ("NONE", "expected a ledger, a folder that posefit sweep wrote, got none"),
+    ("EMPTY --out OUT.html", "expected a ledger with finished rows, got one with none"),
+    ("results --out OUT.html --port 1", "--port must be given with --serve, got it without"),
+    ("results --serve --out OUT.html", "--serve must be given without --out, which it does not write"),
+    ("results --serve --json", "--serve must be given without --json, which it does not write"),
+    ("NONE --serve", "expected a ledger, a folder that posefit sweep wrote, got none"),
+    ("results --serve --port 70000", "--port must be 0 to 65535, got 70000"),
+    ("OTHER.html --serve", "OTHER.html: expected a ledger, a folder that posefit sweep wrote, got a file"),
+    ("results --out OUT.txt", "--out must be a file that ends in .html, got "),
+    ("results --out OTHER.html", "expected a new name or an earlier report, got something else"),
+    ("results --out DIR.html", "expected a new name or an earlier report, got something else"),
+    ("results --out none/OUT.html", "expected a place to write to, got one in "),
+    ("results --out OUT.html --csv OTHER.html", "expected a new name to write to, got one that exists"),
+    ("results --out OUT.html --figures results", "expected a place of its own for each"),
+    ("results --out OUT.html --iohprofiler none/OUT", "expected a place to write to, got one in "),
 ]
 
 
@@ -217,11 +181,8 @@ def test_mistakes_are_one_line_and_write_nothing(
     (tmp_path / "DIR.html").mkdir()
     before = sorted(tmp_path.rglob("*"))
     for words, message in MISTAKES:
-        places = [
-            word if word.startswith("--") or word.isdigit() else tmp_path / word.replace("RESULTS", "results")
-            for word in words
-        ]
-        assert message in fails("report", *places), words
+        arguments = [word if re.match(r"--|\d", word) else tmp_path / word for word in words.split()]
+        assert message in fails("report", *arguments), words
         assert sorted(tmp_path.rglob("*")) == before, words
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 
@@ -241,21 +202,20 @@ main(sys.argv[1:])
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert "posefit[figures]" in done.stderr
+    assert "figures need the library matplotlib: pip install posefit[figures]" in done.stderr
     assert not (tmp_path / "b.html").exists()
 
 
-def test_a_damaged_picture_is_left_out_and_said(results: Path) -> None:
+def test_damaged_joints_are_left_out_with_a_warning(results: Path) -> None:
     (joints,) = (results / "rows").glob("*.joints")
     data = bytearray(joints.read_bytes())
     data[10] ^= 255
     joints.write_bytes(bytes(data))
-    said: list[str] = []
-    book = Ledger(results)
-    found = data_of(book, runs_of(book), said.append)
-    assert len(found["animations"]["tracks"]) == 7
-    assert len(said) == 1
-    assert "must be whole, got damaged ones; this run has no animation" in said[0]
+    warnings: list[str] = []
+    content = data_of(Ledger(results), runs_of(Ledger(results)), warnings.append)
+    assert len(content["animations"]["tracks"]) == 7
+    (warning,) = warnings
+    assert "must be whole, got damaged ones; this run has no animation" in warning
 
 
 def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:

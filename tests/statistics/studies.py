@@ -20,13 +20,12 @@ DRAWS: dict[str, Callable[[np.random.Generator, tuple[int, ...]], Array]] = {
     "with lost runs": lambda rng, shape: rng.gamma(4.0, 0.25, size=shape) + 4.0 * (rng.random(shape) < LOST),
 }
 _EVEN = (np.arange(20000) + 0.5) / 20000
+_GAMMA = stats.gamma.ppf(_EVEN, 4.0, scale=0.25)
 QUANTILES = {
     "normal": stats.norm.ppf(_EVEN),
     "skewed": stats.lognorm.ppf(_EVEN, 1.0),
     "heavy-tailed": stats.t.ppf(_EVEN, 3),
-    "with lost runs": np.concatenate(
-        [np.repeat(found := stats.gamma.ppf(_EVEN, 4.0, scale=0.25), 17), np.repeat(found + 4.0, 3)]
-    ),
+    "with lost runs": np.concatenate([np.repeat(_GAMMA, 17), np.repeat(_GAMMA + 4.0, 3)]),
 }
 
 

@@ -13,20 +13,15 @@ from tests.cases import each
 
 def test_improvement_by_hand_with_a_tie():
     # 1 and 3 against 2 and 3: better in (1, 2), (1, 3), worse in (3, 2), equal in (3, 3)
-    found = probability_of_improvement([[[1.0, 3.0]], [[2.0, 3.0]]])
-    assert found.tolist() == [[0.5, 0.625], [0.375, 0.5]]
+    assert probability_of_improvement([[[1.0, 3.0]], [[2.0, 3.0]]]).tolist() == [[0.5, 0.625], [0.375, 0.5]]
 
 
 def test_improvement_is_mann_whitneys_u_averaged_over_instances():
     errors = np.random.default_rng(0).integers(0, 9, (3, 4, 6)).astype(float)
-    found = probability_of_improvement(errors)
-    for a in range(3):
-        for b in range(3):
-            u = [stats.mannwhitneyu(errors[b, i], errors[a, i]).statistic / 36 for i in range(4)]
-            assert found[a, b] == pytest.approx(np.mean(u))
-
-
-def test_instances_are_never_held_against_each_other():
+    probabilities = probability_of_improvement(errors)
+    for a, b in product(range(3), repeat=2):
+        u = [stats.mannwhitneyu(errors[b, i], errors[a, i]).statistic / 36 for i in range(4)]
+        assert probabilities[a, b] == pytest.approx(np.mean(u))
     # the first method is better on both instances, though its runs on the second are worse than all on the first
     assert probability_of_improvement([[[1.0, 1.0], [8.0, 8.0]], [[2.0, 2.0], [9.0, 9.0]]])[0, 1] == 1.0
 
@@ -43,13 +38,13 @@ def test_the_interval_has_the_same_value_and_holds_it():
 def test_intervals_hold_the_truth_in_93_to_98_percent_of_1000_studies(seeds: int):
     # normal runs, the second method worse by d: P = Phi(d / sqrt(2)) on each of eight instances
     rng, worse = np.random.default_rng(6), np.linspace(0.0, 1.2, 8)[:, None]
-    truth, held = stats.norm.cdf(worse / np.sqrt(2.0)).mean(), 0
+    truth, inside = stats.norm.cdf(worse / np.sqrt(2.0)).mean(), 0
     for _ in range(1000):
         _, low, high = improvement_interval(
             rng.normal(size=(8, seeds)), rng.normal(size=(8, seeds)) + worse, rng, resamples=500
         )
-        held += low <= truth <= high
-    assert 0.93 <= held / 1000 <= 0.98
+        inside += low <= truth <= high
+    assert 0.93 <= inside / 1000 <= 0.98
 
 
 def test_the_interval_of_three_seeds_by_going_through_all_27_resamples():
@@ -64,16 +59,13 @@ def test_the_interval_of_three_seeds_by_going_through_all_27_resamples():
     assert shares.count(7 / 9) + sum(share < 7 / 9 for share in shares) == 22
     low, high = (shares[math.ceil(stats.norm.cdf(end) * 27) - 1] for end in (-1.0, 1.0))
     assert (low, high) == (6 / 9, 7.5 / 9)
-    found = improvement_interval([first], [second], np.random.default_rng(0), resamples=100_000, level=0.5)
-    assert found == pytest.approx((6 / 9, low, high))
+    interval = improvement_interval([first], [second], np.random.default_rng(0), resamples=100_000, level=0.5)
+    assert interval == pytest.approx((6 / 9, low, high))
 
 
-def test_one_seed_gives_no_interval():
+def test_one_seed_gives_no_interval_and_different_shapes_are_refused():
     value, low, high = improvement_interval([[1.0], [1.0]], [[2.0], [0.0]], np.random.default_rng(0))
     assert value == 0.5
     assert np.isnan([low, high]).all()
-
-
-def test_different_shapes_are_refused():
     with pytest.raises(ValueError, match=r"second must have the shape of first, \(1, 2\), got \(1, 1\)"):
         improvement_interval([[1.0, 2.0]], [[1.0]], np.random.default_rng(0))

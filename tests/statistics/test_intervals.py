@@ -1,4 +1,4 @@
-"""The interquartile mean and its interval: does it hold the truth as often as it says?"""
+"""The interquartile mean, and how often its interval holds the truth."""
 
 import numpy as np
 import pytest
@@ -16,17 +16,17 @@ RESAMPLES = 399  # of 399 pivots ten lie beyond each end of a 95 % interval; mor
 def coverage(kind: str, seeds: int, count: int) -> float:
     """Return the share of studies whose interval holds the truth."""
     true, rng = truth(kind), np.random.default_rng(12)
-    held = 0
+    inside = 0
     for errors in studies(kind, seeds, count, rng):
-        found = iqm_intervals(errors, rng, resamples=RESAMPLES)
-        held += found.low[0] <= true <= found.high[0]
-    return held / count
+        interval = iqm_intervals(errors, rng, resamples=RESAMPLES)
+        inside += interval.low[0] <= true <= interval.high[0]
+    return inside / count
 
 
 @pytest.mark.slow
 @each("seeds", [5, 10, 20])
 @each("kind", DRAWS)
-def test_intervals_hold_the_truth_whatever_the_noise_and_the_number_of_seeds(kind, seeds):
+def test_intervals_hold_the_truth_for_every_noise_and_number_of_seeds(kind, seeds):
     share = coverage(kind, seeds, 2 * COUNT)  # so that chance moves the share by 0.5 % only
     print(f"{kind}, {seeds} seeds: {100 * share:.1f} %")
     assert 0.93 <= share <= 0.97
@@ -34,20 +34,17 @@ def test_intervals_hold_the_truth_whatever_the_noise_and_the_number_of_seeds(kin
 
 def test_plain_percentiles_would_be_too_narrow_for_five_seeds():
     true, rng = truth("normal"), np.random.default_rng(3)
-    strata, held = np.arange(INSTANCES)[:, None], 0
+    strata, inside = np.arange(INSTANCES)[:, None], 0
     for errors in studies("normal", 5, COUNT, rng):
         drawn = errors[0][strata, rng.integers(5, size=(500, INSTANCES, 5))]
         low, high = np.quantile(stats.trim_mean(drawn.reshape(500, -1), 0.25, axis=1), [0.025, 0.975])
-        held += low <= true <= high
-    assert held / COUNT < 0.92
+        inside += low <= true <= high
+    assert inside / COUNT < 0.92
 
 
 def test_iqm_is_the_mean_of_the_middle_half():
     # eight runs: two at either end are left out, and 3, 4, 5, 9 are not
     assert iqm([[[100.0, 5.0, 1.0, 4.0], [3.0, 9.0, 50.0, 2.0]]])[0] == 5.25
-
-
-def test_iqm_is_scipys_trimmed_mean():
     errors = np.random.default_rng(0).gamma(2.0, size=(3, 5, 7))
     assert np.allclose(iqm(errors), [stats.trim_mean(runs.ravel(), 0.25) for runs in errors])
 
@@ -61,19 +58,19 @@ def test_the_standard_error_is_scipys_of_a_trimmed_mean_for_one_instance():
 
 def test_the_interval_is_near_that_of_students_t_for_many_normal_runs():
     runs = np.random.default_rng(1).normal(size=(1, 10, 200))
-    found = iqm_intervals(runs, np.random.default_rng(2))
+    interval = iqm_intervals(runs, np.random.default_rng(2))
     mean, error = intervals._estimate(runs)
-    assert found.low[0] == pytest.approx(mean[0] - 1.96 * error[0], abs=0.1 * error[0])
-    assert found.high[0] == pytest.approx(mean[0] + 1.96 * error[0], abs=0.1 * error[0])
+    assert interval.low[0] == pytest.approx(mean[0] - 1.96 * error[0], abs=0.1 * error[0])
+    assert interval.high[0] == pytest.approx(mean[0] + 1.96 * error[0], abs=0.1 * error[0])
 
 
-def test_instances_do_not_widen_the_interval_for_being_different():
+def test_differences_between_instances_do_not_widen_the_interval():
     noise = np.random.default_rng(1).normal(size=(1, 8, 10))
     apart = noise + 1000.0 * np.arange(8)[:, None]
-    found = iqm_intervals(apart, np.random.default_rng(2))
-    # the middle four of eight instances, told apart with certainty
-    assert found.values[0] == pytest.approx(apart[0, 2:6].mean())
-    assert found.high[0] - found.low[0] < 1.0
+    interval = iqm_intervals(apart, np.random.default_rng(2))
+    # the middle four of eight instances
+    assert interval.values[0] == pytest.approx(apart[0, 2:6].mean())
+    assert interval.high[0] - interval.low[0] < 1.0
 
 
 def test_the_same_generator_gives_the_same_interval_whatever_other_methods_there_are():
@@ -83,27 +80,22 @@ def test_the_same_generator_gives_the_same_interval_whatever_other_methods_there
 
 
 def test_a_method_without_chance_has_an_interval_of_no_width():
-    found = iqm_intervals(np.full((1, 3, 4), 0.1), np.random.default_rng(0))
-    assert found.low[0] == found.values[0] == found.high[0] == pytest.approx(0.1)
+    interval = iqm_intervals(np.full((1, 3, 4), 0.1), np.random.default_rng(0))
+    assert interval.low[0] == interval.values[0] == interval.high[0] == pytest.approx(0.1)
 
 
 def test_few_runs_give_a_finite_interval_within_the_runs():
-    found = iqm_intervals([[[1.0, 2.0, 1.5, 3.0, 2.5, 1.0, 2.0, 8.0]]], np.random.default_rng(0))
-    assert found.values[0] == 2.0  # the mean of 1.5, 2, 2, 2.5
-    assert 1.0 <= found.low[0] < 2.0 < found.high[0] <= 8.0
+    interval = iqm_intervals([[[1.0, 2.0, 1.5, 3.0, 2.5, 1.0, 2.0, 8.0]]], np.random.default_rng(0))
+    assert interval.values[0] == 2.0  # the mean of 1.5, 2, 2, 2.5
+    assert 1.0 <= interval.low[0] < 2.0 < interval.high[0] <= 8.0
 
 
-def test_fewer_than_eight_runs_give_no_interval():
+def test_one_seed_or_fewer_than_eight_runs_give_no_interval():
     # by the formula the middle half, 0.88 and 1.1, would have no spread within its instances, and the interval no width
-    found = iqm_intervals([[[0.84, 0.88], [1.1, 1.17]]], np.random.default_rng(0))
-    assert found.values[0] == pytest.approx(0.99)
-    assert np.isnan([found.low[0], found.high[0]]).all()
-
-
-def test_one_seed_gives_no_interval():
-    found = iqm_intervals([[[1.0], [3.0]]], np.random.default_rng(0))
-    assert found.values[0] == 2.0
-    assert np.isnan([found.low[0], found.high[0]]).all()
+    for errors, value in ([[0.84, 0.88], [1.1, 1.17]], 0.99), ([[1.0], [3.0]], 2.0):
+        interval = iqm_intervals([errors], np.random.default_rng(0))
+        assert interval.values[0] == pytest.approx(value)
+        assert np.isnan([interval.low[0], interval.high[0]]).all()
 
 
 def test_a_higher_level_gives_a_wider_interval():
@@ -122,6 +114,6 @@ def test_a_higher_level_gives_a_wider_interval():
         (np.ones((1, 2, 2)), {"level": 95}, "level must lie between 0 and 1, got 95"),
     ],
 )
-def test_what_makes_no_interval_is_refused(errors, settings, message):
+def test_invalid_errors_and_settings_are_refused(errors, settings, message):
     with pytest.raises(ValueError, match=message):
         iqm_intervals(errors, np.random.default_rng(0), **settings)

@@ -1,78 +1,63 @@
-"""Runs side by side, and what is wrong with those that cannot be."""
+"""Runs side by side, of sweeps with and without gaps."""
 
 import numpy as np
-import pytest
 
-from posefit.statistics.pairing import complete, paired, shared
+from posefit.statistics.pairing import Shared, most_shared
 from tests.cases import each
 
-ROWS = [
-    (method, instance, seed, 100.0 * (method == "b") + 10.0 * instance + seed)
-    for method in ("b", "a")
-    for instance in (7, 2)
-    for seed in (1, 0)
-]
+ALL = [(method, instance, seed) for method in range(2) for instance in (2, 7) for seed in range(2)]
 
 
-def test_runs_are_put_side_by_side_whatever_order_they_come_in():
-    found = paired(ROWS)
-    assert (found.methods, found.instances, found.seeds) == (("b", "a"), (7, 2), ((0, 1), (0, 1)))
-    assert np.array_equal(found.errors, [[[170.0, 171.0], [120.0, 121.0]], [[70.0, 71.0], [20.0, 21.0]]])
+def of(runs: list[tuple[int, int, int]], errors: list[float] | None = None) -> Shared | None:
+    table = np.array(runs, dtype=int).reshape(-1, 3)
+    return most_shared(*table.T, np.array(errors if errors is not None else [1.0] * len(runs)))
 
 
-def test_instances_may_have_seeds_of_their_own():
-    found = paired([("a", 0, 5, 1.0), ("a", 1, 6, 2.0)])
-    assert found.seeds == ((5,), (6,))
-    assert found.errors.tolist() == [[[1.0], [2.0]]]
+def test_runs_are_paired_in_whatever_order_they_come() -> None:
+    order = np.random.default_rng(0).permutation(len(ALL))
+    shared = of([ALL[k] for k in order])
+    assert shared is not None
+    assert (shared.methods, shared.instances, shared.left_out, shared.missing) == ((0, 1), (2, 7), 0, ())
+    assert [ALL[order[k]] for k in shared.rows.ravel()] == ALL
+    assert shared.blocks.tolist() == shared.rows.reshape(2, -1).tolist()
 
 
-def test_a_sweep_with_gaps_keeps_what_all_methods_share():
-    gaps = [row for row in ROWS if row[:3] != ("a", 2, 0)]
-    kept, left_out = shared(gaps)
-    found = paired(kept)
-    assert found.seeds == ((0,), (1,))  # of instance 7 the lowest seed, as many as instance 2 has left
-    assert found.errors.tolist() == [[[170.0], [121.0]], [[70.0], [21.0]]]
-    assert left_out == 3
+def test_instances_may_have_seeds_of_their_own_but_as_many() -> None:
+    shared = of([(0, 0, 5), (0, 1, 6)])
+    assert shared is not None
+    assert shared.rows.tolist() == [[[0], [1]]]
 
 
-def test_a_sweep_without_gaps_is_kept_whole():
-    kept, left_out = shared(ROWS)
-    assert (sorted(kept), left_out) == (sorted(ROWS), 0)
+def test_means_have_the_lowest_shared_seeds_of_every_instance_and_tests_all_blocks() -> None:
+    runs = [run for run in ALL if run != (1, 2, 0)]
+    shared = of(runs)
+    assert shared is not None
+    assert [runs[k] for k in shared.rows.ravel()] == [(0, 2, 1), (0, 7, 0), (1, 2, 1), (1, 7, 0)]
+    assert [runs[k] for k in shared.blocks[1]] == [(1, 2, 1), (1, 7, 0), (1, 7, 1)]
+    assert shared.left_out == 1
 
 
-def test_an_error_that_is_nan_is_a_gap_and_an_instance_nobody_shares_is_left_out():
-    kept, left_out = shared([*ROWS, ("a", 9, 0, 1.0), ("b", 9, 0, np.nan)])
-    assert paired(kept).instances == (7, 2)
-    assert left_out == 2
+def test_an_error_that_is_nan_is_a_gap_and_an_instance_without_a_shared_run_is_missing() -> None:
+    runs = [*ALL, (0, 9, 0), (1, 9, 0), (0, 11, 0), (1, 11, 1)]
+    shared = of(runs, [1.0] * len(ALL) + [1.0, np.nan, 1.0, 1.0])
+    assert shared is not None
+    assert shared.instances == (2, 7)
+    assert shared.left_out == 3
+    assert shared.missing == ((9, (1,)), (11, ()))  # the last has a run of each, but none with the same seed
 
 
-@each(
-    ("rows", "message"),
-    [
-        ([], "runs must be at least one, got none"),
-        ([*ROWS, ROWS[0]], "runs must differ in method, instance or seed, got two of b on 7, seed 1"),
-        (ROWS[1:], r"runs must be there of every method, instance and seed, got none of b on 7, seed 1 \(1 missing"),
-        ([*ROWS[1:], (*ROWS[0][:3], np.nan)], "errors must be finite, got nan of b on 7, seed 1"),
-        ([*ROWS[1:], (*ROWS[0][:3], -np.inf)], "errors must be finite, got -inf of b on 7, seed 1"),
-        (
-            [row for row in ROWS if row[1:3] != (2, 0)],
-            "instances must have the same number of seeds, got 1 of 2 and 2 of 7",
-        ),
-    ],
-)
-def test_runs_that_do_not_pair_are_refused(rows, message):
-    with pytest.raises(ValueError, match=message):
-        paired(rows)
+@each(("late", "methods"), [(1, (0, 1)), (2, (0, 1, 2))])
+def test_a_method_that_shares_less_than_half_of_the_runs_does_not_take_part(
+    late: int, methods: tuple[int, ...]
+) -> None:
+    shared = of([*ALL, *((2, 7, seed) for seed in range(late))])
+    assert shared is not None
+    assert shared.methods == methods
 
 
-def test_methods_that_share_nothing_are_refused():
-    with pytest.raises(ValueError, match="methods must share an instance and a seed to be compared, got none of a, b"):
-        shared([("a", 0, 0, 1.0), ("b", 0, 1, 1.0)])
-
-
-def test_every_block_that_all_have_finished_is_complete_whatever_others_lack():
-    gaps = [row for row in ROWS if row[:3] != ("a", 2, 0)]
-    assert sorted(complete(gaps)) == [(2, 1), (7, 0), (7, 1)]
-    assert sorted(complete([*ROWS, ("a", 9, 0, 1.0), ("b", 9, 0, np.nan)])) == [(2, 0), (2, 1), (7, 0), (7, 1)]
-    with pytest.raises(ValueError, match="methods must share an instance and a seed to be compared, got none of a, b"):
-        complete([("a", 0, 0, 1.0), ("b", 0, 1, 1.0)])
+def test_nothing_is_shared_where_no_run_has_an_error() -> None:
+    assert of([]) is None
+    assert of(ALL, [np.nan] * len(ALL)) is None
+    alone = of([(0, 0, 0), (1, 0, 1)])
+    assert alone is not None
+    assert alone.methods == (0,)

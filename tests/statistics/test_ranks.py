@@ -43,28 +43,24 @@ def tied(methods, blocks, seed):
 
 
 def test_friedman_of_a_textbook_example():
-    found = friedman(block(FIRST_BASE))
-    assert found.statistic == pytest.approx(11.1429, abs=5e-5)
-    assert found.p_value == pytest.approx(0.003805, abs=5e-7)
+    ranking = friedman(block(FIRST_BASE))
+    assert ranking.statistic == pytest.approx(11.1429, abs=5e-5)
+    assert ranking.p_value == pytest.approx(0.003805, abs=5e-7)
 
 
 @each("seed", range(5))
 def test_friedman_is_scipys_with_ties(seed):
     errors = np.random.default_rng(seed).integers(0, 4, (5, 6, 2)).astype(float)
     expected = stats.friedmanchisquare(*errors.reshape(5, -1))
-    found = friedman(errors)
-    assert (found.statistic, found.p_value) == (pytest.approx(expected.statistic), pytest.approx(expected.pvalue))
+    ranking = friedman(errors)
+    assert (ranking.statistic, ranking.p_value) == (pytest.approx(expected.statistic), pytest.approx(expected.pvalue))
 
 
-def test_mean_ranks_by_hand_with_a_tie():
+def test_mean_ranks_by_hand_with_ties():
     # ranks 1, 2.5, 2.5 and 1, 2, 3
-    found = friedman(block([[1.0, 5.0, 5.0], [2.0, 3.0, 4.0]]))
-    assert found.mean_ranks.tolist() == [1.0, 2.25, 2.75]
-
-
-def test_methods_that_are_always_equal_are_one_clique():
-    found = friedman(np.ones((3, 4, 2)))
-    assert (found.statistic, found.p_value, found.cliques) == (0.0, 1.0, ((0, 1, 2),))
+    assert friedman(block([[1.0, 5.0, 5.0], [2.0, 3.0, 4.0]])).mean_ranks.tolist() == [1.0, 2.25, 2.75]
+    equal = friedman(np.ones((3, 4, 2)))
+    assert (equal.statistic, equal.p_value, equal.cliques) == (0.0, 1.0, ((0, 1, 2),))
 
 
 @each(("methods", "quantile"), [(2, 1.960), (3, 2.343), (4, 2.569), (5, 2.728), (10, 3.164)])
@@ -72,77 +68,61 @@ def test_the_critical_difference_has_the_quantiles_of_demsars_table_5a(methods, 
     blocks = 30
     expected = quantile * (methods * (methods + 1) / (6 * blocks)) ** 0.5
     assert nemenyi_difference(methods, blocks) == pytest.approx(expected, rel=3e-4)
-
-
-def test_the_critical_difference_of_demsars_example():
-    # 3.2.4: four classifiers on 14 data sets, CD = 2.569 sqrt(4 * 5 / (6 * 14)) = 1.25
+    # example 3.2.4: four classifiers on 14 data sets, CD = 2.569 sqrt(4 * 5 / (6 * 14)) = 1.25
     assert nemenyi_difference(4, 14) == pytest.approx(1.25, abs=0.005)
 
 
 @each("seed", range(4))
-def test_methods_are_told_apart_where_scikit_posthocs_does(seed):
+def test_methods_differ_where_scikit_posthocs_says_so(seed):
     errors = tied(5, 12, seed)
     expected = scikit_posthocs.posthoc_nemenyi_friedman(errors.reshape(5, -1).T).to_numpy()
-    found = friedman(errors)
-    apart = np.abs(np.subtract.outer(found.mean_ranks, found.mean_ranks)) >= found.critical_difference
-    assert np.array_equal(apart, expected <= 0.05)
-    assert apart.any()
+    ranking = friedman(errors)
+    different = np.abs(np.subtract.outer(ranking.mean_ranks, ranking.mean_ranks)) >= ranking.critical_difference
+    assert np.array_equal(different, expected <= 0.05)
+    assert different.any()
 
 
 def test_cliques_are_as_large_as_they_can_be_and_none_is_part_of_another():
-    # 1 and 2 are alike, 2 to 3.4 too, 9 is alone
+    # 1 and 2 do not differ, nor do 2 to 3.4; 9 is alone
     assert _cliques(np.array([2.0, 9.0, 1.0, 3.4, 2.9]), 1.5) == ((2, 0), (0, 4, 3))
+    assert _cliques(np.array([1.0, 2.5]), 1.5) == ()  # methods differ from the critical difference on
 
 
 @each("seed", range(10))
 def test_cliques_are_those_of_a_slow_twin(seed):
     mean = np.random.default_rng(seed).uniform(1.0, 8.0, 8)
-    alike = [
-        {int(m) for m in np.flatnonzero((mean >= low) & (mean < low + 1.5))} for low in mean
-    ]  # all that start at one method
-    expected = {frozenset(one) for one in alike if len(one) > 1 and not any(one < other for other in alike)}
-    assert {frozenset(one) for one in _cliques(mean, 1.5)} == expected
-
-
-def test_a_critical_difference_is_one_from_which_on_methods_are_told_apart():
-    assert _cliques(np.array([1.0, 2.5]), 1.5) == ()
+    groups = [{int(m) for m in np.flatnonzero((mean >= low) & (mean < low + 1.5))} for low in mean]  # from one on
+    largest = [group for group in groups if len(group) > 1 and not any(group < other for other in groups)]
+    assert {frozenset(clique) for clique in _cliques(mean, 1.5)} == set(map(frozenset, largest))
 
 
 def test_wilcoxon_by_hand():
     # differences -1 to -5: the signed rank is 0, as extreme as it gets, 2 / 2**5
-    (found,) = wilcoxon(block([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0], [4.0, 8.0], [5.0, 10.0]]))
-    assert (found.first, found.second, found.difference) == (0, 1, -3.0)
-    assert found.p_value == found.adjusted == pytest.approx(0.0625)
+    (pair,) = wilcoxon(block([[1.0, 2.0], [2.0, 4.0], [3.0, 6.0], [4.0, 8.0], [5.0, 10.0]]))
+    assert (pair.first, pair.second, pair.difference) == (0, 1, -3.0)
+    assert pair.p_value == pair.adjusted == pytest.approx(0.0625)
 
 
 def test_wilcoxon_is_scipys_and_its_adjustment_holms():
     errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5)) * np.array([1.0, 1.2, 2.0, 3.0])[:, None, None]
-    found = wilcoxon(errors)
-    assert [(one.first, one.second) for one in found] == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
-    p_values = [stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a in range(4) for b in range(a + 1, 4)]
-    assert [one.p_value for one in found] == pytest.approx(p_values)
-    assert [one.adjusted for one in found] == pytest.approx(holm(p_values).tolist())
+    pairs = wilcoxon(errors)
+    assert [(pair.first, pair.second) for pair in pairs] == list(combinations(range(4), 2))
+    p_values = [stats.wilcoxon(errors[a].ravel(), errors[b].ravel()).pvalue for a, b in combinations(range(4), 2)]
+    assert [pair.p_value for pair in pairs] == pytest.approx(p_values)
+    assert [pair.adjusted for pair in pairs] == pytest.approx(holm(p_values).tolist())
+    some = wilcoxon(errors, [(0, 3), (2, 3)])  # adjusted for these two alone
+    assert [pair.p_value for pair in some] == [pairs[2].p_value, pairs[5].p_value]
+    assert [pair.adjusted for pair in some] == holm([pairs[2].p_value, pairs[5].p_value]).tolist()
 
 
-def test_only_the_pairs_asked_for_are_adjusted_for():
-    errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5))
-    every = {(one.first, one.second): one.p_value for one in wilcoxon(errors)}
-    some = wilcoxon(errors, [(0, 3), (2, 3)])
-    assert [one.p_value for one in some] == [every[0, 3], every[2, 3]]
-    assert [one.adjusted for one in some] == holm([every[0, 3], every[2, 3]]).tolist()
-
-
-def test_methods_that_are_always_equal_are_not_told_apart():
-    (found,) = wilcoxon(np.ones((2, 3, 3)))
-    assert (found.difference, found.p_value) == (0.0, 1.0)
-
-
-def test_blocks_without_a_difference_speak_against_one():
-    some = np.zeros((2, 20, 1))
-    some[1, :6, 0] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    (found,), (without,) = wilcoxon(some), wilcoxon(some[:, :6])
-    assert found.difference == 0.0
-    assert found.p_value != without.p_value
+def test_blocks_without_a_difference_count_against_one():
+    (equal,) = wilcoxon(np.ones((2, 3, 3)))
+    assert (equal.difference, equal.p_value) == (0.0, 1.0)
+    errors = np.zeros((2, 20, 1))
+    errors[1, :6, 0] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    (pair,), (without,) = wilcoxon(errors), wilcoxon(errors[:, :6])
+    assert pair.difference == 0.0
+    assert pair.p_value != without.p_value
 
 
 def test_holm_by_hand():
@@ -167,7 +147,6 @@ def test_an_instance_is_one_block_where_its_seeds_are_averaged():
         (lambda: friedman(np.ones((1, 2, 2))), r"errors must have shape .*, at least \(2, 1, 1\), got \(1, 2, 2\)"),
         (lambda: friedman(np.ones((3, 1, 1))), "blocks, instances times seeds, must be at least 2, got 1"),
         (lambda: friedman(np.full((3, 2, 2), np.nan)), "errors must be finite, got 12 that are not"),
-        (lambda: friedman(np.ones((3, 2, 2)), 5.0), "level must lie between 0 and 1, got 5.0"),
         (
             lambda: wilcoxon(np.ones((2, 2, 2)), [(0, 2)]),
             r"pairs must be of two different methods of 0 to 1, got \(0, 2",
@@ -178,43 +157,39 @@ def test_an_instance_is_one_block_where_its_seeds_are_averaged():
         ),
     ],
 )
-def test_what_cannot_be_ranked_is_refused(call, message):
+def test_invalid_errors_and_pairs_are_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
 
 
-def test_methods_that_nothing_tells_apart_share_one_letter() -> None:
-    assert compact_letters(3, []) == ["a", "a", "a"]
+@each(
+    ("different", "letters"),
+    [([], ["a", "a", "a"]), ([(0, 1), (0, 2), (1, 2)], ["a", "b", "c"]), ([(0, 2)], ["a", "ab", "b"])],
+)
+def test_methods_share_a_letter_where_they_do_not_differ(different: list[tuple[int, int]], letters: list[str]) -> None:
+    assert compact_letters(3, different) == letters
 
 
-def test_methods_that_all_differ_have_a_letter_each() -> None:
-    assert compact_letters(3, [(0, 1), (0, 2), (1, 2)]) == ["a", "b", "c"]
-
-
-def test_one_between_two_groups_has_both_letters() -> None:
-    assert compact_letters(3, [(0, 2)]) == ["a", "ab", "b"]
-
-
-def test_piephos_definition_holds_whatever_is_told_apart() -> None:
+def test_piephos_definition_holds_for_random_differences() -> None:
     rng = np.random.default_rng(0)
     for _ in range(200):
         count = int(rng.integers(2, 9))
-        apart = [pair for pair in combinations(range(count), 2) if rng.random() < rng.choice([0.1, 0.5, 0.9])]
-        letters = compact_letters(count, apart)
+        different = [pair for pair in combinations(range(count), 2) if rng.random() < rng.choice([0.1, 0.5, 0.9])]
+        letters = compact_letters(count, different)
         for pair in combinations(range(count), 2):
-            assert (not set(letters[pair[0]]) & set(letters[pair[1]])) == (pair in apart)
+            assert (not set(letters[pair[0]]) & set(letters[pair[1]])) == (pair in different)
         used = sorted(set("".join(letters)))
         assert used == list(LETTERS[: len(used)])
         members = [{m for m in range(count) if letter in letters[m]} for letter in used]
-        assert not any(one <= other for one in members for other in members if one is not other)
+        assert not any(group <= other for group in members for other in members if group is not other)
 
 
 def test_too_many_groups_have_no_letters() -> None:
-    count = 2 * 6  # six pairs that are told apart within themselves alone are 2^6 groups
+    count = 2 * 6  # six pairs that differ within themselves alone are 2^6 groups
     assert compact_letters(count, [(2 * k, 2 * k + 1) for k in range(6)]) == [""] * count
 
 
 @each("pair", [(0, 0), (0, 3), (-1, 1)])
-def test_a_pair_that_is_none_is_refused(pair: tuple[int, int]) -> None:
+def test_an_invalid_pair_is_refused(pair: tuple[int, int]) -> None:
     with pytest.raises(ValueError, match="apart must be of two different methods of 0 to 2"):
         compact_letters(3, [pair])

@@ -1,0 +1,55 @@
+"""Contests of runs that took no work."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
+from posefit.report.runs import runs_of
+from posefit.report.summary import leader_sentence
+from posefit.sweep.cell import CellResult
+from posefit.sweep.ledger import Ledger
+from tests.report.browser import ledger, result
+from tests.sweep.fake import cells
+
+FIRST = cells(1)[0]
+Errors = dict[tuple[str, int, int], float]  # of method, instance and seed
+
+
+def contest_in(path: Path) -> Contest:
+    """Return the contest of a ledger."""
+    contest = contest_of(runs_of(Ledger(path)))
+    assert contest is not None
+    return contest
+
+
+def contest_of_results(path: Path, results: Iterable[CellResult]) -> Contest:
+    return contest_in(ledger(path / "results", results))
+
+
+def contest_of_errors(path: Path, errors: Errors) -> Contest:
+    cells = {(m, i, s): replace(FIRST, method=m, instance=i, seed=s) for m, i, s in errors}
+    return contest_of_results(path, [result(cells[key], error) for key, error in errors.items()])
+
+
+def full(methods: dict[str, float], instances: int = 2, seeds: int = 2) -> Errors:
+    """Return the errors of methods that are a little worse on later instances and seeds."""
+    return {
+        (name, i, s): error + 0.1 * i + 0.01 * s
+        for name, error in methods.items()
+        for i in range(instances)
+        for s in range(seeds)
+    }
+
+
+def three_methods() -> Errors:
+    """Return errors of which b's are 1 more than a's in each of 12 blocks, and c's differ from a's by chance alone."""
+    errors = full({"a": 1.0, "b": 2.0}, instances=6)
+    return errors | {("c", i, s): errors["a", i, s] + 0.001 * (-1) ** i for i in range(6) for s in range(2)}
+
+
+def sentence(contest: Contest) -> str:
+    """Return the first sentences of a report."""
+    tests = paired_tests(contest) if contest.testable else None
+    board = leaderboard(contest)
+    return leader_sentence(contest, board, baseline_rows(contest, board), tests)
