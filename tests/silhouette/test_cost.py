@@ -1,6 +1,5 @@
 """The cost by hand, and the areas by law."""
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from posefit.silhouette.cost import areas, mismatch, project, view_of
 from posefit.silhouette.kernels import add_mismatch, paint_bits
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import draw_pose, scratch
-from posefit.silhouette.sharing import LEAST_SHARE
 
 counts = st.tuples(*[st.integers(0, 10**9)] * 3)
 
@@ -72,15 +70,6 @@ def test_costs_of_several_views_add_up() -> None:
     np.testing.assert_allclose(costs, [4.25, 2.0])
 
 
-def test_areas_add_up_to_the_silhouette_and_to_the_body() -> None:
-    poses, translations, silhouette, camera, body = scene(0, 40)
-    found = areas(body, camera, silhouette, poses, translations)
-    assert (found >= 0).all()
-    assert (found[:, 0] + found[:, 2] == silhouette.mask.sum()).all()
-    bodies = [(project(body, camera, p, t) & silhouette.valid).sum() for p, t in zip(poses, translations, strict=True)]
-    np.testing.assert_array_equal(found[:, 1] + found[:, 2], bodies)
-
-
 def test_known_and_unknown_pixels_add_up_to_all() -> None:
     poses, translations, silhouette, camera, body = scene(1, 20)
     mask = project(body, camera, poses[0], translations[0])
@@ -92,15 +81,6 @@ def test_known_and_unknown_pixels_add_up_to_all() -> None:
     nothing = areas(body, camera, Silhouette.of(mask, np.zeros_like(mask)), poses, translations)
     assert not nothing.any()
     assert (mismatch(nothing) == 100.0).all()
-
-
-def test_unknown_pixels_count_for_nothing_whatever_they_show() -> None:
-    poses, translations, silhouette, camera, body = scene(2, 20)
-    noise = np.random.default_rng(3).random(silhouette.mask.shape) < 0.5
-    other = Silhouette.of(np.where(silhouette.valid, silhouette.mask, noise), silhouette.valid)
-    np.testing.assert_array_equal(
-        areas(body, camera, other, poses, translations), areas(body, camera, silhouette, poses, translations)
-    )
 
 
 def test_any_layout_and_type_of_array_gives_the_same_areas_and_none_is_written_to() -> None:
@@ -122,25 +102,6 @@ def test_any_layout_and_type_of_array_gives_the_same_areas_and_none_is_written_t
         np.testing.assert_array_equal(areas(body, camera, silhouette, same[0], same[1]), expected)
     none = areas(body, camera, silhouette, np.zeros((0, ANGLES)), np.zeros((0, 3)), threads=2)
     assert none.shape == (0, 3)
-
-
-def test_every_pose_is_counted_once_however_the_work_is_shared() -> None:
-    for threads in [2, 3, 7]:
-        for count in [LEAST_SHARE - 1, 2 * LEAST_SHARE - 1, 2 * LEAST_SHARE, 5 * LEAST_SHARE + 1]:
-            poses, translations, silhouette, camera, body = scene(5, count)
-            np.testing.assert_array_equal(
-                areas(body, camera, silhouette, poses, translations, threads),
-                areas(body, camera, silhouette, poses, translations, 1),
-            )
-
-
-def test_callers_may_ask_for_different_numbers_of_threads_at_once() -> None:
-    poses, translations, silhouette, camera, body = scene(6, 100)
-    alone = areas(body, camera, silhouette, poses, translations)
-    with ThreadPoolExecutor(4) as pool:
-        jobs = [pool.submit(areas, body, camera, silhouette, poses, translations, 2 + k % 3) for k in range(60)]
-        for job in jobs:
-            np.testing.assert_array_equal(job.result(timeout=600), alone)
 
 
 @pytest.mark.pure

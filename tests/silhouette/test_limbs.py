@@ -1,6 +1,7 @@
 """Combinations of limbs against the whole poses that they mean, pixel for pixel."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from posefit.silhouette.mask import Silhouette
 TWO: Mapping[str, Sequence[str]] = {"hand": ("rwrist", "rhand"), "leg": ("lfemur", "ltibia", "lfoot", "ltoes")}
 
 
-def seen(body: Body, camera: Camera, seed: int) -> Silhouette:
+def observed(body: Body, camera: Camera, seed: int) -> Silhouette:
     """Return the silhouette of a random pose, a tenth of its pixels unknown."""
     rng = np.random.default_rng(seed)
     mask = project(body, camera, rng.normal(0.0, 0.3, ANGLES), np.zeros(3))
@@ -30,11 +31,11 @@ def candidates(seed: int, counts: Sequence[int], limbs: Mapping[str, Sequence[st
 
 
 def assert_as_whole(body: Body, camera: Camera, poses: LimbPoses, where: Sequence[float], chosen: object) -> None:
-    """Compare the areas of combinations with those of whole poses, each drawn anew."""
-    silhouette, place = seen(body, camera, 9), np.array(where)
+    """Compare the areas of combinations with those of whole poses, each drawn by itself."""
+    silhouette, place = observed(body, camera, 9), np.array(where)
     whole = poses.combined(np.array(chosen))
-    found = LimbMasks.draw(body, camera, poses, place).areas(silhouette, np.array(chosen))
-    np.testing.assert_array_equal(found, areas(body, camera, silhouette, whole, np.tile(place, (len(whole), 1))))
+    counted = LimbMasks.draw(body, camera, poses, place).areas(silhouette, np.array(chosen))
+    np.testing.assert_array_equal(counted, areas(body, camera, silhouette, whole, np.tile(place, (len(whole), 1))))
 
 
 def test_all_combinations_have_the_areas_of_their_whole_poses(body: Body) -> None:
@@ -75,7 +76,7 @@ def test_limbs_may_be_the_callers_own_and_only_their_angles_are_used(body: Body,
 @pytest.mark.pure
 def test_one_combination_by_hand_even_uncompiled(body: Body) -> None:
     camera = Camera.around(np.zeros(3), 0.4, 3.5, (40, 30))
-    poses, silhouette = candidates(5, (1, 2), TWO), seen(body, camera, 6)
+    poses, silhouette = candidates(5, (1, 2), TWO), observed(body, camera, 6)
     drawn = project(body, camera, poses.combined([[0, 1]])[0], np.zeros(3)) & silhouette.valid
     expected = [(silhouette.mask & ~drawn).sum(), (drawn & ~silhouette.mask).sum(), (drawn & silhouette.mask).sum()]
     masks = LimbMasks.draw(body, camera, poses, np.zeros(3))
@@ -83,7 +84,7 @@ def test_one_combination_by_hand_even_uncompiled(body: Body) -> None:
 
 
 def test_a_combination_counts_as_a_pose(body: Body, camera: Camera) -> None:
-    count, silhouette = PoseCount(), seen(body, camera, 7)
+    count, silhouette = PoseCount(), observed(body, camera, 7)
     with count.counting():
         LimbMasks.draw(body, camera, candidates(8, (2, 3), TWO), np.zeros(3)).areas(
             silhouette, [[0, 0], [1, 2], [0, 1]]
@@ -93,27 +94,25 @@ def test_a_combination_counts_as_a_pose(body: Body, camera: Camera) -> None:
 
 def test_what_does_not_fit_is_named(body: Body, camera: Camera) -> None:
     pose, some = np.zeros(ANGLES), np.zeros((2, ANGLES))
-    for bad, message in (
+    poses = LimbPoses(pose, [some, some[:1]], TWO)
+    masks, silhouette = LimbMasks.draw(body, camera, poses, np.zeros(3)), observed(body, camera, 8)
+    cases: list[tuple[Callable[[], object], str]] = [
         (lambda: LimbPoses(pose[:5], [some, some], TWO), r"pose must have shape \(66,\), got \(5,\)"),
         (lambda: LimbPoses(pose, [some], TWO), r"candidates must be one array a limb \(2\), got 1"),
         (lambda: LimbPoses(pose, [some, some[0]], TWO), r"candidates of 'leg' must have shape \(K, 66\), got \(66,\)"),
-        (
-            lambda: LimbPoses(pose, [some, some[:0]], TWO),
-            r"candidates of 'leg' must have shape \(K, 66\), got \(0, 66\)",
+        (lambda: LimbPoses(pose, [some, some[:0]], TWO), r"candidates of 'leg' must have shape \(K, 66\), got \(0"),
+        (lambda: LimbMasks.draw(body, camera, poses, np.zeros(2)), r"translation must have shape \(3,\), got \(2,\)"),
+        (lambda: masks.areas(silhouette, [[0, 0, 0]]), r"whole numbers of shape \(m, 2\), got shape \(1, 3\) of int64"),
+        (lambda: masks.areas(silhouette, [[0.0, 0.0]]), r"got shape \(1, 2\) of float64"),
+        *(
+            (partial(masks.areas, silhouette, [[0, 0], row]), r"lie in 0 to the limbs' candidates \(2, 1\), got")
+            for row in ([0, 1], [-1, 0], [2, 0])
         ),
-    ):
+        (
+            lambda: masks.areas(Silhouette.of(np.ones((5, 5))), [[0, 0]]),
+            r"mask must have shape \(72, 96\), the camera's",
+        ),
+    ]
+    for call, message in cases:
         with pytest.raises(ValueError, match=message):
-            bad()
-    poses = LimbPoses(pose, [some, some[:1]], TWO)
-    with pytest.raises(ValueError, match=r"translation must have shape \(3,\), got \(2,\)"):
-        LimbMasks.draw(body, camera, poses, np.zeros(2))
-    masks, silhouette = LimbMasks.draw(body, camera, poses, np.zeros(3)), seen(body, camera, 8)
-    with pytest.raises(ValueError, match=r"whole numbers of shape \(m, 2\), got shape \(1, 3\) of int64"):
-        masks.areas(silhouette, [[0, 0, 0]])
-    with pytest.raises(ValueError, match=r"got shape \(1, 2\) of float64"):
-        masks.areas(silhouette, [[0.0, 0.0]])
-    for bad_row in ([0, 1], [-1, 0], [2, 0]):
-        with pytest.raises(ValueError, match=r"lie in 0 to the limbs' candidates \(2, 1\), got"):
-            masks.areas(silhouette, [[0, 0], bad_row])
-    with pytest.raises(ValueError, match=r"mask must have shape \(72, 96\), the camera's, got \(5, 5\)"):
-        masks.areas(Silhouette.of(np.ones((5, 5))), [[0, 0]])
+            call()

@@ -29,18 +29,18 @@ def posefit(*words: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run([sys.executable, "-m", "posefit", *words], capture_output=True, text=True)
 
 
-@pytest.mark.parametrize(("bug", "found"), planted.APART.items(), ids=lambda one: getattr(one, "__name__", ""))
+@pytest.mark.parametrize("bug", planted.APART, ids=named)
 @pytest.mark.usefixtures("installed")
-def test_what_ends_a_process_fails_the_check_that_ran(bug: Any, found: Any, monkeypatch: Any, capfd: Any) -> None:
+def test_what_ends_a_process_fails_the_check_that_ran(bug: Any, monkeypatch: Any, capfd: Any) -> None:
     if bug is planted.NeverReturns:
         monkeypatch.setattr(results, "SECONDS", 1.0)
         monkeypatch.setattr(process, "OVERRUN_SECONDS", 1.0)
-    rule, said = found
+    rule, detail = planted.APART[bug]
     report = check_in_process("optimiser", named(bug), only=["construction", "shape", rule])
-    assert [one.name for one in report.of("passed")] == ["construction", "shape"]
+    assert [result.name for result in report.of("passed")] == ["construction", "shape"]
     (failed,) = report.of("failed")
     assert failed.name == rule
-    assert failed.detail.startswith(said)
+    assert failed.detail.startswith(detail)
     if bug in (planted.Crashes, planted.NeverReturns):  # where Python could not say it, the process does
         assert f'File "{planted.__file__}"' in capfd.readouterr().err
 
@@ -48,7 +48,7 @@ def test_what_ends_a_process_fails_the_check_that_ran(bug: Any, found: Any, monk
 @pytest.mark.usefixtures("installed")
 def test_the_checks_go_on_after_one_that_ended_the_process_until_another_fails_alike() -> None:
     report = check_in_process("optimiser", "ends-the-process", only=["shape", "dtype", "dimensions", "speed"])
-    assert [(one.name, one.outcome) for one in report.results] == [
+    assert [(result.name, result.outcome) for result in report.results] == [
         ("shape", "passed"),
         ("dtype", "failed"),
         ("dimensions", "failed"),
@@ -68,48 +68,35 @@ def test_a_plugin_that_exits_fails_the_check_and_says_where() -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_what_a_plugin_prints_is_in_no_result() -> None:
-    ran = posefit("check", "optimiser", "talks", "--only", "shape", "--only", "new_process", "--json")
-    assert ran.returncode == 0
-    assert [one["outcome"] for one in json.loads(ran.stdout)["results"]] == ["passed", "passed"]
-    assert "asked\n" in ran.stderr
-    assert "asked, too\n" in ran.stderr
+    checked = posefit("check", "optimiser", "talks", "--only", "shape", "--only", "new_process", "--json")
+    assert checked.returncode == 0
+    assert [result["outcome"] for result in json.loads(checked.stdout)["results"]] == ["passed", "passed"]
+    tracked = posefit("track", "walk", "--method", "talks", "--frames", ":1", "--evaluations", "80", "--json")
+    assert tracked.returncode == 0, tracked.stderr
+    assert json.loads(tracked.stdout)["method"] == "talks@pca"
+    for ran in (checked, tracked):
+        assert "asked\n" in ran.stderr
+        assert "asked, too\n" in ran.stderr
 
 
 @pytest.mark.usefixtures("installed")
-def test_what_a_plugin_prints_in_a_track_is_in_no_result() -> None:
-    ran = posefit("track", "walk", "--method", "talks", "--frames", ":1", "--evaluations", "80", "--json")
-    assert ran.returncode == 0, ran.stderr
-    assert json.loads(ran.stdout)["method"] == "talks@pca"
-    assert "asked, too\n" in ran.stderr
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ("--method", "exits-in-tell"),
-            "optimiser 'exits-in-tell' of posefit-sabotage 1.0: tell must not end the program, got SystemExit: 0",
-        ),
-        (
-            ("--method", "exits-in-track"),
-            "tracker 'exits-in-track' of posefit-sabotage 1.0: it must not end the program, got SystemExit: 0",
-        ),
-    ],
-)
-@pytest.mark.usefixtures("installed")
-def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line(words: tuple[str, str], said: str) -> None:
-    ran = posefit("track", "walk", *words, "--frames", ":1", "--evaluations", "80")
-    assert ran.returncode == 2
-    assert ran.stdout == ""
-    (line,) = [line for line in ran.stderr.splitlines() if line.startswith("posefit: ")]
-    assert line.startswith(f"posefit: {said}")
-    assert "Traceback" not in ran.stderr
+def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
+    for blame in (
+        "optimiser 'exits-in-tell' of posefit-sabotage 1.0: tell",
+        "tracker 'exits-in-track' of posefit-sabotage 1.0: it",
+    ):
+        method = blame.split("'")[1]
+        ran = posefit("track", "walk", "--method", method, "--frames", ":1", "--evaluations", "80")
+        assert (ran.returncode, ran.stdout) == (2, "")
+        (line,) = [line for line in ran.stderr.splitlines() if line.startswith("posefit: ")]
+        assert line.startswith(f"posefit: {blame} must not end the program, got SystemExit: 0")
+        assert "Traceback" not in ran.stderr
 
 
 @pytest.mark.usefixtures("installed")
 def test_a_rule_is_checked_alone_and_one_that_is_not_there_is_named() -> None:
     report = check_in_process("optimiser", "sound", only=["speed"])
-    assert [one.name for one in report.results] == ["speed"]
+    assert [result.name for result in report.results] == ["speed"]
     assert report.plugin == "optimiser 'sound' of posefit-sabotage 1.0"
     with pytest.raises(ValueError, match="--only must be one of construction, shape, .*, got 'sped'"):
         check_in_process("optimiser", "sound", only=["sped"])
