@@ -15,24 +15,31 @@ from posefit.registry import Registry, registry, registry_of
 from posefit.testing.toy import Toy
 from tests.cases import each
 
-EXTRAS = {"pycma": "cma", "nevergrad": "nevergrad", "pymoo": "pymoo", "optuna": "optuna", "ribs": "ribs"}
+LIBRARIES = {
+    "pycma": "cma",
+    "nevergrad": "nevergrad",
+    "pymoo": "pymoo",
+    "optuna": "optuna",
+    "ribs": "ribs",
+    "mediapipe": "mediapipe",
+}
 
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
-    for name, library in EXTRAS.items():
-        registered = registry_of([EntryPoint(name, f"posefit_{name}", "posefit")])
-        (plugin,) = registered.plugins
-        assert registered.offers["optimiser"][name].needs == (library, f"posefit[{name}]")
+    for name, library in LIBRARIES.items():
+        (plugin,) = registry_of([EntryPoint(name, f"posefit_{name}", "posefit")]).plugins
+        assert [offer.needs for offer in plugin.offers] == [(library, f"posefit[{name}]")]
         absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{name}]")) for offer in plugin.offers)
-        message = rf"optimiser {name} needs the library .* pip install 'posefit\[{name}\]'"
+        kind = plugin.offers[0].kind
+        message = rf"{kind} {name} needs the library .* 'posefit\[{name}\]'"
         with pytest.raises(ImportError, match=message):
-            Registry((plugin._replace(offers=absent),)).optimiser(name)
+            Registry((plugin._replace(offers=absent),)).offer(kind, name)
 
 
-def test_listing_the_adapters_imports_none_of_their_libraries() -> None:
+def test_listing_plugins_imports_none_of_their_libraries() -> None:
     script = (
         "import sys; from posefit.registry import registry; registry();"
-        "print([m for m in ('cma', 'nevergrad', 'pymoo', 'optuna', 'ribs', 'scipy.optimize', 'sklearn') if m in sys.modules])"
+        f"print([m for m in {[*LIBRARIES.values(), 'scipy.optimize', 'sklearn']} if m in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.splitlines()[-1] == "[]"
@@ -56,7 +63,8 @@ def test_an_unknown_variant_is_named() -> None:
         ("optuna:Best", "variant must be one of TPESampler"),
         ("nevergrad:Best", "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'"),
         ("scipy:minimize", "variant must be one of differential_evolution, dual_annealing, got 'minimize'"),
-        ("sapso:fast", "optimiser must be sapso, which has no variants, got 'sapso:fast'"),
+        ("pso:fast", "optimiser must be pso, which has no variants, got 'pso:fast'"),
+        ("sapso:fast", "variant must be one of default, paper, got 'fast'"),
     ):
         with pytest.raises(ValueError, match=message):
             posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)

@@ -1,16 +1,12 @@
 """Segmenters are registered like all plugins, and the kit separates right ones from wrong ones."""
 
-import subprocess
-import sys
-from dataclasses import replace
-from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import pytest
 
-from posefit.registry import Registry, registry, registry_of
+from posefit.registry import registry
 from posefit.silhouette.foreground import Footage, Mixture
 from posefit.testing import check_segmenter
 
@@ -31,20 +27,6 @@ def test_the_kit_passes_the_built_in_ones() -> None:
 def test_the_kit_passes_mediapipe() -> None:
     result = check_segmenter(registry().offer("segmenter", "mediapipe").factory)
     assert result, str(result)
-
-
-def test_an_absent_mediapipe_is_named_with_the_extra_to_install() -> None:
-    plugin = registry_of([EntryPoint("mediapipe", "posefit_mediapipe", "posefit")]).plugins[0]
-    assert plugin.offers[0].needs == ("mediapipe", "posefit[mediapipe]")
-    absent = tuple(replace(offer, needs=("no_such_library", "posefit[mediapipe]")) for offer in plugin.offers)
-    with pytest.raises(ImportError, match=r"^segmenter mediapipe needs the library .* 'posefit\[mediapipe\]'$"):
-        Registry((plugin._replace(offers=absent),)).offer("segmenter", "mediapipe")
-
-
-def test_listing_segmenters_does_not_import_mediapipe() -> None:
-    script = "import sys; from posefit.registry import registry; registry(); print('mediapipe' in sys.modules)"
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert ran.stdout.splitlines()[-1] == "False"
 
 
 class Sound(Mixture):

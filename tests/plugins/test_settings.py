@@ -1,9 +1,14 @@
 """Settings are read from a plugin's signature, and a mistake is an error before anything runs."""
 
+import re
+from collections.abc import Callable
 from typing import Any, Literal
 
 import pytest
 
+from posefit.fitting.tracker import Prediction
+from posefit.hooks import PROJECT
+from posefit.registry import registry
 from posefit.settings import accepts, check, parse, planned, settings_in, settings_of, without_settings
 from posefit_filters.particle import Particle
 from posefit_swarm.sapso import SAPSO
@@ -120,3 +125,30 @@ def test_a_list_of_settings_is_read_from_a_docstring() -> None:
     }
     assert without_settings(text) == "A swarm.\n\nMore."
     assert settings_in("Settings stand in prose.") == {}
+
+
+ENTRY = re.compile(r"(?P<name>[a-z_]+)(?: \((?P<letter>[^)]+)\))?: \S.*\.")
+
+
+def listed(factory: Callable[..., Any]) -> list[str]:
+    """Return the lines below `Settings:`, up to the next line that is no farther to the right."""
+    lines = iter((factory.__doc__ or "").splitlines())
+    for line in lines:
+        if line == "    Settings:":
+            break
+    entries = []
+    for line in lines:
+        if not line.startswith(8 * " "):
+            break
+        entries.append(line[8:])
+    return entries
+
+
+def test_every_setting_is_listed_in_its_order_and_nothing_else_is() -> None:
+    offers = [offer for of_kind in registry().offers.values() for offer in of_kind.values()]
+    factories = [offer.factory for offer in offers if offer.distribution == PROJECT]
+    assert len(factories) > 12
+    for factory in (*factories, Prediction):
+        entries = [ENTRY.fullmatch(line) for line in listed(factory)]
+        assert all(entries), (factory, listed(factory))
+        assert [entry["name"] for entry in entries if entry] == [one.name for one in settings_of(factory)], factory
