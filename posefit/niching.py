@@ -1,16 +1,15 @@
 """A niching task: numbered silhouettes that several known poses explain nearly as well, and its scores.
 
-    posed = niche_instance(17)
-    proposals = draw_population(posed.problem.space, np.random.default_rng(0), 20_000)      # or those of any search
-    report = best_apart(posed.problem, proposals, posed.problem.evaluate(proposals))
-    print(posed.kind, scored(posed, report).peak_ratio)
+    instance = niche_instance(17)
+    proposals = draw_population(instance.problem.space, np.random.default_rng(0), 20_000)      # or those of any search
+    report = best_apart(instance.problem, proposals, instance.problem.evaluate(proposals))
+    print(instance.kind, scored(instance, report).peak_ratio)
 
-Instances are of three kinds in turn. `strides` are viewed from the side, where a stride has nearly the silhouette of
-the one half a cycle later. `turns` are viewed from the front or from behind, where walking towards the camera hardly
-differs from walking away. `arms` are hidden: other arms, before the trunk instead of behind it, give the same outline.
-The camera is far away, so that depth does not show. The true pose is drawn at random among the known ones; the person's
-build differs a little from the fitted body and every joint is about a degree off, so that the true pose does not give
-itself away by being the cheapest.
+Instances are of three kinds in turn. `strides` are side views, where a stride has nearly the silhouette of the one half
+a cycle later. `turns` are views from the front or from behind, where walking towards the camera hardly differs from
+walking away. In `arms` other arms, before the trunk instead of behind it, have the same outline. The camera is far,
+so that depth does not show. The true pose is drawn among the known ones. The person's build differs a little from the
+fitted body and every joint is about a degree off, so that the true pose is not always the cheapest.
 
 Every known pose lies in the searched box, costs nearly what the true one does, is apart from the others, and is
 separated from each of them by a hill: on the straight line between them the cost rises.
@@ -32,6 +31,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import displacement, wrap
+from posefit.fitting.check import positive
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body, varied
@@ -43,7 +43,7 @@ from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in, recorded
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.modes import Posterior, poses_apart
 from posefit.uncertainty.searches import boltzmann_weights
 
 # walks and runs of eight people
@@ -74,21 +74,17 @@ class LegsAndArms:
         arms: Array | None = None,
     ) -> Self:
         """Fit to joint angles (T, 63); the arms to other angles (n, 63) where they are given."""
-        samples = (angles, angles if arms is None else arms)
-        columns = (~_ARMS[3:], _ARMS[3:])
-        self.mean, rows = np.zeros(ANGLES - 3), []
-        for sample, mine, count in zip(samples, columns, COMPONENTS, strict=True):
-            self.mean[mine] = sample[:, mine].mean(axis=0)
-            directions = np.linalg.svd(sample[:, mine] - self.mean[mine], full_matrices=False)[2][:count]
+        samples, columns = (angles, angles if arms is None else arms), (~_ARMS[3:], _ARMS[3:])
+        self.mean, self.components = np.zeros(ANGLES - 3), np.zeros((sum(COMPONENTS), ANGLES - 3))
+        blocks = (slice(0, COMPONENTS[0]), slice(COMPONENTS[0], None))
+        for sample, part, count, block in zip(samples, columns, COMPONENTS, blocks, strict=True):
+            self.mean[part] = sample[:, part].mean(axis=0)
+            directions = np.linalg.svd(sample[:, part] - self.mean[part], full_matrices=False)[2][:count]
             directions *= np.sign(directions[np.arange(count), np.abs(directions).argmax(axis=1)])[:, None]
-            block = np.zeros((count, ANGLES - 3))
-            block[:, mine] = directions
-            rows.append(block)
-        self.components = np.concatenate(rows)
-        latents = [self.transform(sample) for sample in samples]
-        first = COMPONENTS[0]
-        ranges = [np.array([one.min(axis=0), one.max(axis=0)]) for one in latents]
-        self.low, self.high = np.concatenate([ranges[0][:, :first], ranges[1][:, first:]], axis=1)
+            self.components[block, part] = directions
+        latents = [self.transform(sample)[:, block] for sample, block in zip(samples, blocks, strict=True)]
+        self.low = np.concatenate([some.min(axis=0) for some in latents])
+        self.high = np.concatenate([some.max(axis=0) for some in latents])
         return self
 
     def transform(self, angles: Array) -> Array:
@@ -98,12 +94,12 @@ class LegsAndArms:
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
         angles = np.tile(self.mean, (len(latents), 1))
-        for k, direction in enumerate(self.components):  # no matrix product: its last bits hang on the other rows
+        for k, direction in enumerate(self.components):  # no matrix product: its last bits depend on the other rows
             angles += latents[:, k, None] * direction
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are poses (n,)."""
+        """Return that all latents (n, m) are feasible (n,)."""
         return np.ones(len(latents), dtype=bool)
 
     def save(self, path: str | Path) -> None:
@@ -186,8 +182,8 @@ class NicheInstance:
         return _proposals(self.problem.space, legs_and_arms(), self.known)
 
     def distances_mm(self, poses: Array) -> Array:
-        """Return the distances (n, K) in millimetres of poses (n, 66) from the known ones; see `apart_mm`."""
-        return apart_mm(self.problem.body, poses, self.known)
+        """Return the distances (n, K) in millimetres of poses (n, 66) from the known ones; see `poses_apart`."""
+        return 1e3 * poses_apart(self.problem.body.skeleton, poses, self.known)
 
 
 @lru_cache(maxsize=256)
@@ -200,27 +196,15 @@ def niche_instance(number: int) -> NicheInstance:
         raise InputError(f"instance must be a whole number from 0 to {COUNT - 1}, got {number!r}")
     kind, rng = KINDS[number % len(KINDS)], np.random.default_rng([RNG_STREAM, number])
     for _ in range(ATTEMPTS):
-        made = _attempt(int(number), kind, rng)
-        if made is not None:
-            return made
+        instance = _attempt(int(number), kind, rng)
+        if instance is not None:
+            return instance
     raise InputError(f"instance {number} must succeed within {ATTEMPTS} draws, and did not")
 
 
 def niche_space() -> SearchSpace:
     """Return the box that is searched, the same in all instances."""
     return SearchSpace(legs_and_arms(), np.zeros(3), ROOT_RANGE, PLACE)
-
-
-def apart_mm(body: Body, poses: Array, others: Array) -> Array:
-    """Return how far poses (n, 66) are from others (K, 66), in millimetres (n, K).
-
-    That is the mean over joints, both roots at one point.
-    """
-    joints = body.skeleton.joints(poses, np.zeros((len(poses), 3)))
-    theirs = body.skeleton.joints(others, np.zeros((len(others), 3)))
-    return np.array([1e3 * np.linalg.norm(one - theirs, axis=-1).mean(axis=-1) for one in joints]).reshape(
-        len(poses), len(others)
-    )
 
 
 def _attempt(number: int, kind: Kind, rng: np.random.Generator) -> NicheInstance | None:
@@ -243,14 +227,13 @@ def _attempt(number: int, kind: Kind, rng: np.random.Generator) -> NicheInstance
     stance[3:] += rng.normal(0.0, STANCE, len(stance) - 3)
     problem = _problem(person, body, camera, stance, space)
     costs = problem.cost(poses, np.tile(PLACE, (len(poses), 1)))
-    order = [true, *np.flatnonzero(np.arange(len(poses)) != true)]
-    chosen_rows: list[int] = []
-    for k in order:
-        if abs(costs[k] - costs[true]) <= BOUND and _is_separate_niche(problem, poses, costs, k, chosen_rows):
-            chosen_rows.append(int(k))
-    if len(chosen_rows) < 2 or (kind == "arms" and not _arms_differ(poses[chosen_rows])):
+    rows: list[int] = []
+    for k in sorted(range(len(poses)), key=lambda k: k != true):
+        if abs(costs[k] - costs[true]) <= BOUND and _is_separate_niche(problem, poses, costs, k, rows):
+            rows.append(k)
+    if len(rows) < 2 or (kind == "arms" and not _arms_differ(poses[rows])):
         return None
-    rows = sorted(chosen_rows)
+    rows.sort()
     return NicheInstance(number, kind, problem, poses[rows], costs[rows], rows.index(true))
 
 
@@ -261,12 +244,11 @@ def _problem(person: Body, body: Body, camera: Camera, pose: Array, space: Searc
 
 def _other_arms(problem: PoseProblem, pose: Array, rng: np.random.Generator) -> Array:
     """Return a pose with other arms (1, 66) and nearly the same silhouette; (0, 66) where there is none."""
-    lent = box_arms()
-    poses = np.tile(pose, (LENT, 1))
+    lent, poses = box_arms(), np.tile(pose, (LENT, 1))
     poses[:, ARMS] = lent[rng.choice(len(lent), LENT, replace=False)]
     costs = problem.cost(np.concatenate([pose[None], poses]), np.tile(PLACE, (len(poses) + 1, 1)))
     near = np.flatnonzero(np.abs(costs[1:] - costs[0]) <= BOUND)
-    far = near[apart_mm(problem.body, poses[near], pose[None])[:, 0] >= APART_MM]
+    far = near[1e3 * poses_apart(problem.body.skeleton, poses[near], pose[None])[:, 0] >= APART_MM]
     for k in rng.permutation(far)[:MANY]:
         pair, pair_costs = np.array([pose, poses[k]]), costs[[0, k + 1]]
         if _is_separate_niche(problem, pair, pair_costs, 1, [0]):
@@ -285,7 +267,7 @@ def _is_separate_niche(problem: PoseProblem, poses: Array, costs: Array, k: int,
     """Return whether pose k is apart from the others, with a hill in between."""
     if not others:
         return True
-    if apart_mm(problem.body, poses[[k]], poses[others]).min() < APART_MM:
+    if 1e3 * poses_apart(problem.body.skeleton, poses[[k]], poses[others]).min() < APART_MM:
         return False
     proposals = _proposals(problem.space, legs_and_arms(), poses)
     for other in others:
@@ -318,8 +300,7 @@ def best_apart(
 
     Weights go with exp(-cost / temperature). Raises ValueError where no cost is a number.
     """
-    if not temperature > 0.0:
-        raise InputError(f"temperature must be above 0, got {temperature}")
+    positive("temperature", temperature)
     proposals, costs = np.asarray(proposals, dtype=np.float64), np.asarray(costs, dtype=np.float64)
     if proposals.ndim != 2 or costs.shape != (len(proposals),):
         raise InputError(f"costs must be one a proposal ({len(proposals)}), got shape {costs.shape}")
@@ -328,13 +309,10 @@ def best_apart(
     if not len(order):
         raise InputError(f"costs must be numbers, got none among {len(costs)}")
     poses, translations = problem.decode(proposals[order])
-    joints = problem.body.skeleton.joints(poses, np.zeros((len(poses), 3)))
-    left = np.ones(len(order), dtype=bool)
-    chosen: list[int] = []
+    left, chosen = np.ones(len(order), dtype=bool), list[int]()
     while left.any() and len(chosen) < most:
-        best = int(left.argmax())
-        chosen.append(best)
-        left &= 1e3 * np.linalg.norm(joints - joints[best], axis=-1).mean(axis=-1) > apart
+        chosen.append(int(left.argmax()))
+        left &= 1e3 * poses_apart(problem.body.skeleton, poses[chosen[-1:]], poses)[0] > apart
     return Posterior(poses[chosen], translations[chosen], boltzmann_weights(costs[order][chosen], temperature))
 
 
@@ -389,7 +367,7 @@ def brier_score(weights: Array, true: int) -> float:
 
 
 def log_score(weights: Array, true: int) -> float:
-    """Return minus the natural logarithm of the weight near the true pose, at least 0.001 of it."""
+    """Return minus the natural logarithm of the weight near the true pose, a weight of at least 0.001."""
     return float(-np.log(np.clip(weights[true], MIN_PROBABILITY, 1.0)))
 
 

@@ -5,9 +5,8 @@
     print(result.floors[0].spread_mm, result.floors[1].spread_mm)    # with one camera, and with two
 
 Five million combinations of pose and yaw are compared from coarse to fine: every third yaw in a small image, the
-neighbours of the good ones there, and at full size what is good in the small image. What a step leaves out is so much
-worse than the best that the next step cannot make up for it; `MARGIN` and `BLUR` are those bounds, and the tests
-compare the result with all combinations at full size.
+neighbours of the good ones there, and at full size what is good in the small image. `MARGIN` and `BLUR` bound what a
+step may leave out; the tests compare the result with all combinations at full size.
 """
 
 import time
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.alignment import align
-from posefit.fitting.check import finite_number, whole
+from posefit.fitting.check import at_least, between, finite_number, one_of, positive, whole
 from posefit.fitting.shape import NAMES, shaped
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
@@ -40,7 +39,7 @@ from posefit.silhouette.cost import pose_costs, project
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.uncertainty.modes import Posterior, modes_of
+from posefit.uncertainty.modes import Posterior, modes_of, poses_apart
 from posefit.uncertainty.searches import boltzmann_weights
 
 MIN_SPACING = 0.02  # metres between joints, root mean square: nearer poses of one clip are left out
@@ -50,7 +49,7 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class LibraryPoses:
-    """Poses (K, 66), in the order of their clips, and where each is from. The mirror images are the second half."""
+    """Poses (K, 66) of clips, in their order. The mirror images are the second half."""
 
     poses: Array = field(repr=False)
     names: tuple[str, ...]  # of the clips
@@ -65,7 +64,7 @@ class LibraryPoses:
         """
         spaced = [spaced_frames(skeleton, motion.poses) for motion in motions]
         poses = [motion.poses[rows] for motion, rows in zip(motions, spaced, strict=True)]
-        images = [mirrored_poses(motion.skeleton, one) for motion, one in zip(motions, poses, strict=True)]
+        images = [mirrored_poses(motion.skeleton, some) for motion, some in zip(motions, poses, strict=True)]
         clips = np.repeat(np.arange(len(motions)), [len(rows) for rows in spaced])
         names = tuple(motion.name for motion in motions)
         return cls(np.concatenate(poses + images), names, np.tile(clips, 2), np.tile(np.concatenate(spaced), 2))
@@ -74,15 +73,13 @@ class LibraryPoses:
         return len(self.poses)
 
     def is_mirrored(self, row: int) -> bool:
-        """Return whether a pose is the mirror image of one that was recorded."""
+        """Return whether a pose is the mirror image of a recorded one."""
         return row >= len(self) // 2
 
 
 def spaced_frames(skeleton: Skeleton, poses: Array) -> Rows:
     """Return the rows of a clip's poses (n, 66) that are two centimetres or more from the last one chosen."""
-    facing = poses.copy()
-    facing[:, 0] = 0.0  # as the yaw of every pose is searched
-    joints = skeleton.joints(facing).reshape(len(poses), -1)
+    joints = skeleton.joints(turned_to(poses, np.zeros(len(poses), dtype=np.int64))).reshape(len(poses), -1)
     rows = [0]
     for k in range(1, len(joints)):
         step = joints[k] - joints[rows[-1]]
@@ -114,28 +111,29 @@ class Moment:
 
     @property
     def factor(self) -> int:
-        """By how much the images may be shrunk."""
+        """The factor by which the images may be shrunk."""
         fewest = min(silhouette.pixels for silhouette in self.silhouettes if silhouette.known)
         return next((factor for factor in SHRINK_FACTORS if fewest >= factor**2 * MIN_PIXELS), 1)
 
     def coarser(self, factor: int) -> Self:
         """Return the same frame in smaller images."""
         cameras = [coarser_camera(camera, factor) for camera in self.cameras]
-        return replace(self, cameras=cameras, silhouettes=[coarser_silhouette(one, factor) for one in self.silhouettes])
+        silhouettes = [coarser_silhouette(silhouette, factor) for silhouette in self.silhouettes]
+        return replace(self, cameras=cameras, silhouettes=silhouettes)
 
-    def only(self, views: Sequence[int]) -> Self:
-        """Return the same frame as some of the cameras show it."""
-        return replace(self, cameras=[self.cameras[v] for v in views], silhouettes=[self.silhouettes[v] for v in views])
+    def view(self, v: int) -> Self:
+        """Return the same frame from one of the cameras."""
+        return replace(self, cameras=[self.cameras[v]], silhouettes=[self.silhouettes[v]])
 
     def placed(self, poses: Array) -> Array:
         """Return the translations (n, 3) of poses (n, 66)."""
         anchors = np.repeat(self.anchor[None], len(poses), axis=0)
         return anchors if self.known else align(self.body, self.cameras, self.silhouettes, poses, anchors)
 
-    def costs(self, poses: Array, translations: Array) -> Array:
-        """Return the cost (n,) of poses (n, 66) at translations (n, 3): the mean over the cameras."""
+    def costs(self, poses: Array) -> Array:
+        """Return the costs (n,) of poses (n, 66) where they are placed: means over the cameras."""
         scene = self.body, self.cameras, self.silhouettes
-        return pose_costs(*scene, poses, translations, threads=self.threads)[0]
+        return pose_costs(*scene, poses, self.placed(poses), threads=self.threads)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +148,9 @@ class States:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def weights(self, temperature: float) -> Array:
-        """Return the probability of each (n,) under a uniform prior: exp(-cost / temperature), normalised."""
-        return boltzmann_weights(self.costs, temperature)
+    def posterior(self, temperature: float) -> Posterior:
+        """Return the posterior under a uniform prior: weights exp(-cost / temperature)."""
+        return Posterior(self.poses, self.translations, boltzmann_weights(self.costs, temperature))
 
 
 def states_within(moment: Moment, poses: Array, within: float) -> States:
@@ -188,8 +186,7 @@ def _best(moment: Moment, poses: Array, rows: Rows, yaws: Rows, within: float) -
     costs = np.empty(len(rows))
     for start in range(0, len(rows), BATCH):
         part = slice(start, start + BATCH)
-        turned = turned_to(poses[rows[part]], yaws[part])
-        costs[part] = moment.costs(turned, moment.placed(turned))
+        costs[part] = moment.costs(turned_to(poses[rows[part]], yaws[part]))
     best = costs <= costs.min() + within
     return rows[best], yaws[best], costs[best]
 
@@ -210,90 +207,46 @@ class PoseCluster:
     image: str  # of the first cluster: mirrored, turned or reflected, see posefit.geometry.symmetry; or ""
 
 
-def clusters_of(moment: Moment, states: States, weights: Array) -> list[PoseCluster]:
-    """Return clusters of states with weights (n,) by their joints relative to the root, the heaviest first."""
-    skeleton = moment.body.skeleton
-    some = np.sort(
-        np.random.default_rng(0).permutation(len(states))[:MAX_COMPARED]
-    )  # a regular stride could pick similar ones
+def clusters_of(moment: Moment, states: States, posterior: Posterior) -> list[PoseCluster]:
+    """Return clusters of states by their joints relative to the root, the heaviest first."""
+    skeleton, weights = moment.body.skeleton, posterior.weights
+    # a random sample, as a regular stride could pick similar poses
+    some = np.sort(np.random.default_rng(0).permutation(len(states))[:MAX_COMPARED])
     modes = modes_of(skeleton, Posterior(states.poses[some], states.translations[some], weights[some]))
-    joints, middles = (_rooted(skeleton, poses) for poses in (states.poses, np.array([mode.pose for mode in modes])))
-    away = np.array([_distances(joints, middle) for middle in middles])
-    nearest = away.argmin(axis=0)
+    nearest = poses_apart(skeleton, np.array([mode.pose for mode in modes]), states.poses).argmin(axis=0)
     groups = [rows for k in range(len(modes)) if len(rows := np.flatnonzero(nearest == k))]
     groups.sort(key=lambda rows: -weights[rows].sum())
     best = [int(rows[states.costs[rows].argmin()]) for rows in groups]
-    first = joints[best[0]]
-    images = _images(moment, states.poses[best[0]])
-    return [
-        PoseCluster(
-            float(weights[rows].sum()),
-            rows,
-            one,
-            total(spread_mm(joints[rows], weights[rows])),
-            float(_distances(joints[one][None], first)[0]),
-            _image(joints[one], first, images),
-        )
-        for rows, one in zip(groups, best, strict=True)
-    ]
-
-
-def spread_mm(joints: Array, weights: Array) -> Array:
-    """Return the spread (27,) of joints (n, 27, 3): their root mean square distance from their mean, by weights (n,).
-
-    Metres become millimetres; weights need not sum to 1.
-    """
-    weights = weights / weights.sum()
-    mean = np.einsum("n,njk->jk", weights, joints)
-    squares = ((joints - mean) ** 2).sum(axis=2)
-    return np.asarray(1e3 * np.sqrt(weights @ squares))
-
-
-def floor_mm(moment: Moment, states: States, weights: Array) -> Array:
-    """Return the spread (27,) in millimetres of ambiguous states, all roots at one point."""
-    return spread_mm(_rooted(moment.body.skeleton, states.poses), weights)
-
-
-def distance_mm(skeleton: Skeleton, pose: Array, other: Array) -> float:
-    """Return the mean distance in millimetres of the joints of two poses (66,), both roots at one point."""
-    joints = _rooted(skeleton, np.stack([pose, other]))
-    return float(_distances(joints[:1], joints[1])[0])
-
-
-def total(spreads_mm: Array) -> float:
-    """Return the spread of a body, of those (27,) of its joints: their root mean square."""
-    return float(np.sqrt((spreads_mm**2).mean()))
-
-
-def _images(moment: Moment, pose: Array) -> dict[str, Array]:
-    """Return the joints of the poses whose silhouettes resemble that of a pose, by name."""
-    skeleton, poses = moment.body.skeleton, pose[None]
-    towards = facing(moment.cameras[0], moment.anchor)
+    first, towards = states.poses[best[:1]], facing(moment.cameras[0], moment.anchor)
     images = {
-        "mirrored": mirrored_poses(skeleton, poses),
-        "turned": turned_poses(poses),
-        "reflected": reflected_poses(skeleton, poses, towards),
+        "mirrored": mirrored_poses(skeleton, first),
+        "turned": turned_poses(first),
+        "reflected": reflected_poses(skeleton, first, towards),
     }
-    return {name: _rooted(skeleton, image)[0] for name, image in images.items()}
+    away = 1e3 * poses_apart(skeleton, states.poses[best], first)[:, 0]
+    # to a millimetre, as in a side view a mirrored pose is the reflected one as well
+    from_images = np.round(1e3 * poses_apart(skeleton, states.poses[best], np.concatenate([*images.values()])))
+    clusters = []
+    for k, rows in enumerate(groups):
+        image = [*images][from_images[k].argmin()] if from_images[k].min() < IMAGE_TOLERANCE * away[k] else ""
+        spread = body_spread(spread_mm(skeleton, states.poses[rows], weights[rows]))
+        clusters.append(PoseCluster(float(weights[rows].sum()), rows, best[k], spread, float(away[k]), image))
+    return clusters
 
 
-def _image(joints: Array, first: Array, images: dict[str, Array]) -> str:
-    """Return which image of the first pose some joints (27, 3) are, or "" where they are none."""
-    # to a millimetre, as from its very side a mirrored pose is the reflected one as well
-    away = {name: round(float(_distances(joints[None], image)[0])) for name, image in images.items()}
-    name = min(away, key=away.__getitem__)
-    return name if away[name] < IMAGE_TOLERANCE * float(_distances(joints[None], first)[0]) else ""
+def spread_mm(skeleton: Skeleton, poses: Array, weights: Array) -> Array:
+    """Return the spread (27,) in millimetres of the joints of poses (n, 66) with weights (n,), all roots at one point.
+
+    It is the root mean square distance of each joint from its mean; weights need not sum to 1.
+    """
+    joints, weights = skeleton.joints(poses), weights / weights.sum()
+    mean = np.einsum("n,njk->jk", weights, joints)
+    return np.asarray(1e3 * np.sqrt(weights @ ((joints - mean) ** 2).sum(axis=2)))
 
 
-def _rooted(skeleton: Skeleton, poses: Array) -> Array:
-    """Return the joints (n, 27, 3) of poses (n, 66), their roots at one point."""
-    joints = skeleton.joints(poses)
-    return np.asarray(joints - joints[:, :1])
-
-
-def _distances(joints: Array, other: Array) -> Array:
-    """Return the mean distances (n,) in millimetres of joints (n, 27, 3) from others (27, 3)."""
-    return np.asarray(1e3 * np.linalg.norm(joints - other, axis=2).mean(axis=1))
+def body_spread(spreads_mm: Array) -> float:
+    """Return the spread of a body from those (27,) of its joints: their root mean square."""
+    return float(np.sqrt((spreads_mm**2).mean()))
 
 
 SUMMARY = "summary.json"
@@ -319,19 +272,15 @@ def body_of(folder: str | Path, body: Body) -> Body:
         if not isinstance(build, Mapping):
             raise InputError("expected the build of a person, got none: it was not fitted")
         factors_by_name = build["factors"]
-        factors = np.array([_within(name, factors_by_name[name], BUILD_RANGE) for name in NAMES])
-        return shaped(body, factors, _within("stature", build["stature"], HEIGHTS))
+        factors = np.array([finite_number(name, factors_by_name[name]) for name in NAMES])
+        stature = finite_number("stature", build["stature"])
+        for name, factor in zip(NAMES, factors, strict=True):
+            between(name, factor, *BUILD_RANGE)
+        between("stature", stature, *HEIGHTS)
+        return shaped(body, factors, stature)
     except (ValueError, KeyError, TypeError) as error:
         message = f"expected {error.args[0]} in it, got none" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{path}: {message}") from None
-
-
-def _within(name: str, value: object, ends: tuple[float, float]) -> float:
-    """Return a finite number between two ends. Raises ValueError otherwise."""
-    number = finite_number(name, value)
-    if not ends[0] <= number <= ends[1]:
-        raise InputError(f"{name} must lie in {ends[0]:g} to {ends[1]:g}, got {number:g}")
-    return number
 
 
 RIGHT_ANGLE = np.radians(90.0)
@@ -339,7 +288,7 @@ RIGHT_ANGLE = np.radians(90.0)
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """The spread of all states that some cameras cannot distinguish."""
+    """The spread of the poses that some cameras cannot distinguish."""
 
     views: str  # which cameras
     count: int  # poses and yaws that cannot be distinguished
@@ -349,7 +298,7 @@ class Floor:
     @property
     def spread_mm(self) -> float:
         """The spread of the body: the root mean square of its joints' spreads."""
-        return total(self.joints_mm)
+        return body_spread(self.joints_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,22 +333,19 @@ def ambiguity_of(
 ) -> Ambiguity:
     """Return every library pose that costs at most `within` more than the best one in one frame of a source.
 
-    `source` and the `options` that say how it is looked at, such as `view_degrees`, are as for `posefit.track`; the
-    frame of a motion is counted after resampling, of footage as filmed. The poses are those of `train` and their
-    mirror images, each at 72 yaws, without the source's own clip; their weights are exp(-cost / temperature). The
-    root stands at its known translation or, for footage and where `translation` is "aligned", where the body fills
-    the silhouettes' borders. `build` is the folder of a track of the same footage, whose fitted build is used;
-    otherwise the body is average. The floor of one camera is compared with that of two: for a known motion a second
-    camera at right angles is added; of several cameras each is also taken alone. Raises ValueError for every
-    mistake in the arguments or files.
+    `source` and the `options` of its view, such as `view_degrees`, are as for `posefit.track`; the frame of a motion is
+    counted after resampling, of footage as filmed. The poses are those of `train` and their mirror images, each at 72
+    yaws, without the source's own clip; their weights are exp(-cost / temperature). The root is at its known
+    translation or, for footage and where `translation` is "aligned", where the body fills the silhouettes' borders.
+    `build` is the folder of a track of the same footage, whose fitted build is used; otherwise the body is average. The
+    spread with one camera is compared with that of two: for a known motion a second camera at right angles is added; of
+    several cameras each is also taken alone. Raises ValueError for every mistake in the arguments or files.
     """
     frame, threads = whole("frame", frame, 0), whole("threads", threads, 1)
-    if not finite_number("within", within) >= 0.0:
-        raise InputError(f"within must be 0 or more, got {within:g}")
-    if not finite_number("temperature", temperature) > 0.0:
-        raise InputError(f"temperature must be above 0, got {temperature:g}")
-    if translation not in (None, "known", "aligned"):
-        raise InputError(f"translation must be known or aligned, got {translation}")
+    at_least("within", finite_number("within", within), 0.0)
+    positive("temperature", finite_number("temperature", temperature))
+    if translation is not None:
+        one_of("translation", translation, ("known", "aligned"))
     sources = source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
     motion = kind_of(sources[0]) == "motion"
     if not motion and translation == "known":
@@ -420,12 +366,13 @@ def ambiguity_of(
     began = time.perf_counter()
     library = LibraryPoses.of(training_motions(clips, FPS), scene.body.skeleton)
     states = states_within(moment, library.poses, within)
-    clusters = clusters_of(moment, states, states.weights(temperature))
+    clusters = clusters_of(moment, states, states.posterior(temperature))
     truth = None
     if scene.truth is not None:
-        right = scene.truth.poses[frame]
-        truth = [distance_mm(scene.body.skeleton, states.poses[one.best], right) for one in clusters]
-    floors = [_floor(_name(moment), moment, states, temperature)]
+        best = states.poses[[cluster.best for cluster in clusters]]
+        truth = (1e3 * poses_apart(scene.body.skeleton, best, scene.truth.poses[frame : frame + 1])[:, 0]).tolist()
+    views = {1: "one camera", 2: "both cameras"}.get(len(moment.cameras), f"all {len(moment.cameras)} cameras")
+    floors = [_floor(views, moment, states, temperature)]
     for name, other in _others(scene, moment, frame):
         floors.append(_floor(name, other, states_within(other, library.poses, within), temperature))
     seconds = time.perf_counter() - began
@@ -450,20 +397,13 @@ def _others(scene: Scene, moment: Moment, frame: int) -> list[tuple[str, Moment]
     """Return the camera sets to compare with, by name: each camera alone, or the only one with a second."""
     if len(moment.cameras) > 1:
         visible = [v for v, silhouette in enumerate(moment.silhouettes) if silhouette.mask.any()]
-        return [(f"camera {v + 1}", moment.only([v])) for v in visible]
+        return [(f"camera {v + 1}", moment.view(v)) for v in visible]
     if scene.truth is None:
         return []
     pose, place = scene.truth.poses[frame], scene.truth.translations[frame]
     camera = camera_about(moment.cameras[0], place, RIGHT_ANGLE)
     silhouette = Silhouette.of(project(moment.body, camera, pose, place))
-    both = Moment(
-        moment.body,
-        [*moment.cameras, camera],
-        [*moment.silhouettes, silhouette],
-        moment.anchor,
-        moment.known,
-        moment.threads,
-    )
+    both = replace(moment, cameras=[*moment.cameras, camera], silhouettes=[*moment.silhouettes, silhouette])
     return [("two cameras, the second at right angles", both)]
 
 
@@ -476,9 +416,6 @@ def camera_about(camera: Camera, place: Array, angle: float) -> Camera:
     return Camera(camera.width, camera.height, camera.focal, camera.centre, rotation, translation)
 
 
-def _name(moment: Moment) -> str:
-    return {1: "one camera", 2: "both cameras"}.get(len(moment.cameras), f"all {len(moment.cameras)} cameras")
-
-
-def _floor(name: str, moment: Moment, states: States, temperature: float) -> Floor:
-    return Floor(name, len(states), float(states.costs.min()), floor_mm(moment, states, states.weights(temperature)))
+def _floor(views: str, moment: Moment, states: States, temperature: float) -> Floor:
+    spreads = spread_mm(moment.body.skeleton, states.poses, states.posterior(temperature).weights)
+    return Floor(views, len(states), float(states.costs.min()), spreads)

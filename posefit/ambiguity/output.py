@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from posefit.ambiguity.estimate import YAWS, Ambiguity, Floor, PoseCluster
+from posefit.ambiguity.estimate import YAWS, Ambiguity, Floor
 from posefit.files import new_folder
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
@@ -71,18 +71,21 @@ def ambiguity_table(result: Ambiguity) -> str:
         + f"{'yaw deg':>7} {'view deg':>13}  {'image':9}  example"
     )
     for k in range(min(MAX_LINES, len(result.clusters))):
-        one = _mode(result, k)
-        clip = f"{one['clip']} frame {one['clip_frame']}{', mirrored' if one['clip_mirrored'] else ''}"
+        mode = _mode(result, k)
+        clip = f"{mode['clip']} frame {mode['clip_frame']}{', mirrored' if mode['clip_mirrored'] else ''}"
         lines.append(
-            f"{one['weight']:6.2f} {one['spread_mm']:9.0f} {one['away_mm']:13.0f} "
-            + (f"{one['truth_mm']:13.0f} " if known else "")
-            + f"{one['yaw_degrees']:7.0f} {one['view_degrees']:13.0f}  {one['image'] or '-':9}  {clip}"
+            f"{mode['weight']:6.2f} {mode['spread_mm']:9.0f} {mode['away_mm']:13.0f} "
+            + (f"{mode['truth_mm']:13.0f} " if known else "")
+            + f"{mode['yaw_degrees']:7.0f} {mode['view_degrees']:13.0f}  {mode['image'] or '-':9}  {clip}"
         )
     if more := result.clusters[MAX_LINES:]:
-        lines.append(f"{sum(one.weight for one in more):6.2f} in {len(more)} more")
+        lines.append(f"{sum(cluster.weight for cluster in more):6.2f} in {len(more)} more")
     lines.append("spread of poses that cannot be distinguished, mm:")
     for floor in result.floors:
-        lines.append(f"{floor.spread_mm:6.0f}  by {floor.views}: {_widest(floor.joints_mm)}; {floor.count:,} poses")
+        spreads = by_kind(floor.joints_mm)
+        widest = sorted(spreads, key=lambda name: -spreads[name])[:WIDEST]
+        joints = ", ".join(f"{name} {spreads[name]:.0f}" for name in widest)
+        lines.append(f"{floor.spread_mm:6.0f}  by {floor.views}: {joints}; {floor.count:,} poses")
     if min(floor.count for floor in result.floors) < MIN_POSES:
         lines.append(
             f"fewer than {MIN_POSES} poses depend more on the library than on the silhouette: try a larger --within"
@@ -91,35 +94,28 @@ def ambiguity_table(result: Ambiguity) -> str:
 
 
 def by_kind(joints_mm: Any) -> dict[str, float]:
-    """Return the spreads (27,) of joints without their sides: the root mean square of left and right."""
+    """Return the spreads (27,) by kind of joint: the root mean square of left and right."""
     squares: dict[str, list[float]] = {}
     for name, value in zip(JOINTS[1:], joints_mm[1:], strict=True):
         squares.setdefault(kind(name), []).append(float(value) ** 2)
     return {name: float(np.sqrt(np.mean(values))) for name, values in squares.items()}
 
 
-def _widest(joints_mm: Any) -> str:
-    spreads = by_kind(joints_mm)
-    names = sorted(spreads, key=lambda name: -spreads[name])[:WIDEST]
-    return ", ".join(f"{name} {spreads[name]:.0f}" for name in names)
-
-
 def _mode(result: Ambiguity, k: int) -> dict[str, Any]:
     """Return the summary of a cluster."""
-    one: PoseCluster = result.clusters[k]
-    row, yaw = int(result.states.rows[one.best]), float(result.states.poses[one.best, 0])
-    towards = facing(result.moment.cameras[0], result.states.translations[one.best])
-    library = result.library
+    cluster, states, library = result.clusters[k], result.states, result.library
+    row, yaw = int(states.rows[cluster.best]), float(states.poses[cluster.best, 0])
+    towards = facing(result.moment.cameras[0], states.translations[cluster.best])
     return {
-        "weight": one.weight,
-        "poses": len(one.members),
-        "spread_mm": one.spread_mm,
-        "away_mm": one.away_mm,
+        "weight": cluster.weight,
+        "poses": len(cluster.members),
+        "spread_mm": cluster.spread_mm,
+        "away_mm": cluster.away_mm,
         **({} if result.truth_mm is None else {"truth_mm": result.truth_mm[k]}),
         "yaw_degrees": float(np.degrees(yaw)),
         "view_degrees": float(np.degrees(wrapped(np.array(towards - yaw)))),
-        "image": one.image or None,
-        "cost": float(result.states.costs[one.best]),
+        "image": cluster.image or None,
+        "cost": float(states.costs[cluster.best]),
         "clip": library.names[library.clips[row]],
         "clip_frame": int(library.frames[row]),
         "clip_mirrored": library.is_mirrored(row),
@@ -139,17 +135,14 @@ NUMBERED = 4  # floors whose numbers are written beside their bars
 
 def picture_of(result: Ambiguity) -> Image:
     """Return the picture (height, width, 3)."""
-    shown = result.clusters[:MAX_COLUMNS]
+    count = min(len(result.clusters), MAX_COLUMNS)
     camera, silhouette = nearer(result.moment.cameras[0], result.moment.silhouettes[0])
-    columns = [_column(result, k, camera, silhouette) for k in range(len(shown))]
-    columns += [_blank(len(columns[0]), WIDTH)] * (MIN_COLUMNS - len(columns))
+    columns = [_column(result, k, camera, silhouette) for k in range(count)]
+    columns += [_blank(len(columns[0]), WIDTH)] * (MIN_COLUMNS - count)
     bodies = np.hstack(columns)
-    title = _blank(TITLE, bodies.shape[1])
-    heading = (
-        f"{result.scene.name}, frame {result.frame}: {len(result.states):,} poses within {result.within:g} of the least"
-    )
-    rest = len(result.clusters) - len(shown)
-    write(title, f"{heading}, {rest} more modes" if rest else heading, (12, 23))
+    title, rest = _blank(TITLE, bodies.shape[1]), len(result.clusters) - count
+    heading = f"{result.scene.name}, frame {result.frame}: {len(result.states):,} poses within {result.within:g}"
+    write(title, f"{heading} of the least" + (f", {rest} more modes" if rest else ""), (12, 23))
     return np.vstack([title, bodies, floors_of(result.floors, bodies.shape[1])])
 
 
@@ -168,13 +161,13 @@ def nearer(camera: Camera, silhouette: Silhouette) -> tuple[Camera, Image]:
 
 def _column(result: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Image:
     """Return the column of a cluster: text, body before the silhouette, body from the side."""
-    one = result.clusters[k]
-    body, pose, place = result.moment.body, result.states.poses[one.best], result.states.translations[one.best]
+    cluster, body = result.clusters[k], result.moment.body
+    pose, place = result.states.poses[cluster.best], result.states.translations[cluster.best]
     head = _blank(BAND, WIDTH)
-    write(head, f"{one.weight:.2f}", (12, 26), scale=0.75)
-    write(head, one.image or ("first" if k == 0 else ""), (90, 26))
-    away = f", {one.away_mm:.0f} from first" if k else ""
-    write(head, f"spread {one.spread_mm:.0f} mm{away}", (12, 50), scale=0.42)
+    write(head, f"{cluster.weight:.2f}", (12, 26), scale=0.75)
+    write(head, cluster.image or ("first" if k == 0 else ""), (90, 26))
+    away = f", {cluster.away_mm:.0f} from first" if k else ""
+    write(head, f"spread {cluster.spread_mm:.0f} mm{away}", (12, 50), scale=0.42)
     front = _blank(HEIGHT, WIDTH)
     front[silhouette > 0] = GREY
     drawn = front.copy()
@@ -203,15 +196,15 @@ def floors_of(floors: Sequence[Floor], width: int) -> Image:
         label = f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses"
         write(image, label, (12, 20 + LEGEND * (k + 1)), BARS[k % len(BARS)])
     top = LEGEND * (len(floors) + 1) + 10
-    most = max(max(max(one.values()) for one in spreads), 1e-9)
+    most = max(*(value for spread in spreads for value in spread.values()), 1e-9)
     for n, name in enumerate(names):
         y = top + n * row
         write(image, name, (12, y + row - 6), scale=0.4)
-        for k, one in enumerate(spreads):
-            end = LABEL + round(longest * one[name] / most)
+        for k, spread in enumerate(spreads):
+            end = LABEL + round(longest * spread[name] / most)
             cv2.rectangle(image, (LABEL, y + k * bar), (end, y + (k + 1) * bar - 2), BARS[k % len(BARS)], -1)
             if k < NUMBERED:
-                write(image, f"{one[name]:4.0f}", (width - FIGURE * (shown - k) - 6, y + row - 6), scale=0.4)
+                write(image, f"{spread[name]:4.0f}", (width - FIGURE * (shown - k) - 6, y + row - 6), scale=0.4)
     return image
 
 
@@ -224,7 +217,7 @@ FILES = ("ambiguity.json", "ambiguity.png")
 
 @contextmanager
 def written_to(path: str | None) -> Iterator[Callable[[Ambiguity], None]]:
-    """Give a function that writes a result to the new folder `path`; without one, it writes nothing.
+    """Yield a function that writes a result to the new folder `path`, or nothing where there is none.
 
     Raises ValueError where `path` exists or cannot be written.
     """
