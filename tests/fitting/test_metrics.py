@@ -22,27 +22,18 @@ def joints() -> Array:
     return motion.skeleton.joints(motion.poses, motion.translations)
 
 
-def test_only_chosen_dimensions_count() -> None:
-    truth, estimate = np.zeros((1, 66)), np.zeros((1, 66))
-    estimate[0, 0] = np.radians(10.0)
-    chosen = np.zeros(66, dtype=bool)
-    chosen[:2] = True
-    assert metrics.pose_error_degrees(truth, estimate, chosen)[0] == pytest.approx(5.0)
-
-
-def test_mpjpe_ignores_where_the_root_is(joints: Array) -> None:
+def test_mpjpe_is_rooted_and_pa_mpjpe_ignores_similarities_but_no_reflection(joints: Array) -> None:
     np.testing.assert_allclose(metrics.mpjpe_mm(joints, joints + [1.0, 2.0, 3.0]), 0.0, atol=1e-9)
-
-
-def test_pa_mpjpe_ignores_rotation_scale_and_place_but_no_reflection(joints: Array) -> None:
     rotation = rotation_from_joint_angles(np.array([0.4, -1.2, 2.0]))
-    np.testing.assert_allclose(metrics.pa_mpjpe_mm(joints, 1.7 * joints @ rotation.T + 3.0), 0.0, atol=1e-8)
     assert metrics.mpjpe_mm(joints, joints @ rotation.T).min() > 100.0
     assert metrics.pa_mpjpe_mm(joints, joints * [1.0, 1.0, -1.0]).min() > 10.0
 
 
-def test_iou_by_hand() -> None:
+def test_iou_skill_and_the_share_of_lost_frames_by_hand() -> None:
     assert metrics.iou(np.array([[10, 20, 30], [0, 0, 0], [1, 0, 0]])).tolist() == [0.5, 1.0, 0.0]
+    assert [metrics.skill(error, 4.0) for error in (1.0, 4.0)] == [0.75, 0.0]
+    assert metrics.skill(1.0, 0.0) is None
+    assert metrics.lost_rate(np.array([149.0, 150.0, 151.0, 400.0])) == 0.5
 
 
 def test_a_mirrored_stride_counts_as_swapped(joints: Array) -> None:
@@ -55,20 +46,12 @@ def test_a_mirrored_stride_counts_as_swapped(joints: Array) -> None:
     assert metrics.swap_rate(joints, joints + np.random.default_rng(0).normal(0.0, 0.003, joints.shape)) == 0.0
 
 
-def test_lost_is_above_150_mm() -> None:
-    assert metrics.lost_rate(np.array([149.0, 150.0, 151.0, 400.0])) == 0.5
-
-
-def test_skill_by_hand() -> None:
-    assert metrics.skill(1.0, 4.0) == 0.75
-    assert metrics.skill(4.0, 4.0) == 0.0
-    assert metrics.skill(1.0, 0.0) is None
-
-
 def test_one_angle_66_degrees_off_is_an_error_of_1_degree() -> None:
     truth, estimate = np.zeros((3, 66)), np.zeros((3, 66))
     estimate[1, 40] = np.radians(-66.0)
     np.testing.assert_allclose(metrics.pose_error_degrees(truth, estimate), [0.0, 1.0, 0.0])
+    chosen = np.isin(np.arange(66), (39, 40))
+    np.testing.assert_allclose(metrics.pose_error_degrees(truth, estimate, chosen), [0.0, 33.0, 0.0])
 
 
 def test_179_and_minus_179_degrees_differ_by_2() -> None:
@@ -128,12 +111,12 @@ def test_mpjpe_by_hand() -> None:
 def test_pa_mpjpe_is_blind_to_similarities_alone(seed: int, rotation: Array, scale: float) -> None:
     rng = np.random.default_rng(seed)
     truth, estimate = rng.normal(0.0, 0.4, (2, 3, 27, 3))
-    found = metrics.pa_mpjpe_mm(truth, estimate)
+    error = metrics.pa_mpjpe_mm(truth, estimate)
     moved = scale * estimate @ rotation.T + rng.normal(0.0, 3.0, 3)
-    np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth, moved), found, rtol=1e-6)
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth, moved), error, rtol=1e-6)
     np.testing.assert_allclose(metrics.pa_mpjpe_mm(truth, scale * truth @ rotation.T + 1.0), 0.0, atol=1e-6)
-    np.testing.assert_allclose(metrics.pa_mpjpe_mm(scale * truth, estimate), scale * found, rtol=1e-6)
-    assert (found > 0.0).all()
+    np.testing.assert_allclose(metrics.pa_mpjpe_mm(scale * truth, estimate), scale * error, rtol=1e-6)
+    assert (error > 0.0).all()
 
 
 @given(seeds, st.booleans())
@@ -159,10 +142,10 @@ def test_an_estimate_in_one_point_is_at_the_centroid_for_pa_mpjpe() -> None:
 
 
 @given(st.lists(st.tuples(*[st.integers(0, 10**6)] * 3), min_size=1, max_size=5))
-def test_iou_lies_in_0_to_1_and_does_not_mind_who_is_who(rows: list[tuple[int, int, int]]) -> None:
-    found = metrics.iou(np.array(rows))
-    assert ((found >= 0.0) & (found <= 1.0)).all()
-    np.testing.assert_array_equal(metrics.iou(np.array(rows)[:, [1, 0, 2]]), found)
+def test_iou_lies_in_0_to_1_and_is_symmetric(rows: list[tuple[int, int, int]]) -> None:
+    shares = metrics.iou(np.array(rows))
+    assert ((shares >= 0.0) & (shares <= 1.0)).all()
+    np.testing.assert_array_equal(metrics.iou(np.array(rows)[:, [1, 0, 2]]), shares)
 
 
 def test_left_and_right_names_traded_count_as_swapped(joints: Array) -> None:
@@ -178,25 +161,25 @@ def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(joints: Array, s
     rng = np.random.default_rng(seed)
     estimate = joints + rng.normal(0.0, 0.05, joints.shape)
     estimate[::2] = estimate[::2, list(MIRROR)]
-    found = metrics.swapped(joints, estimate)
+    swapped = metrics.swapped(joints, estimate)
     moved = metrics.swapped(joints @ rotation.T + rng.normal(size=3), estimate @ rotation.T + rng.normal(size=3))
-    np.testing.assert_array_equal(moved, found)
+    np.testing.assert_array_equal(moved, swapped)
 
 
-def test_an_untrue_number_is_named() -> None:
+def test_joints_and_poses_are_checked() -> None:
     joints, poses = np.zeros((2, 27, 3)), np.zeros((2, 66))
-    holed, spoilt = joints.copy(), poses.copy()
-    holed[1, 3, 0], spoilt[1, :2] = np.nan, np.inf
-    for of_joints in (metrics.mpjpe_mm, metrics.pa_mpjpe_mm, metrics.swapped, metrics.swap_rate):
+    holed_joints, holed_poses = joints.copy(), poses.copy()
+    holed_joints[1, 3, 0], holed_poses[1, :2] = np.nan, np.inf
+    for metric in (metrics.mpjpe_mm, metrics.pa_mpjpe_mm, metrics.swapped, metrics.swap_rate):
         with pytest.raises(ValueError, match="joints must be finite, got 1 that are not"):
-            of_joints(joints, holed)
+            metric(joints, holed_joints)
         with pytest.raises(ValueError, match=r"truth must have shape \(T, 27, 3\), got \(0, 27, 3\)"):
-            of_joints(joints[:0], joints[:0])
-    for of_poses in (metrics.pose_error_degrees, metrics.geodesic_degrees):
+            metric(joints[:0], joints[:0])
+    for metric in (metrics.pose_error_degrees, metrics.geodesic_degrees):
         with pytest.raises(ValueError, match="truth must be finite, got 2 that are not"):
-            of_poses(spoilt, poses)
+            metric(holed_poses, poses)
         with pytest.raises(ValueError, match=r"estimate must have the truth's shape \(2, 66\), got \(2, 65\)"):
-            of_poses(poses, poses[:, 1:])
+            metric(poses, poses[:, 1:])
 
 
 def test_dimensions_are_checked() -> None:

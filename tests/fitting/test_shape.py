@@ -1,4 +1,6 @@
-"""The build of a person: factors on lengths and radii, and how well they are found."""
+"""The build of a person: factors on lengths and radii, and how well they are estimated."""
+
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -17,14 +19,18 @@ AVERAGE = Body.of(built_in.average_skeleton())
 WALK = built_in.motion("walk", frames=40).frames(0, 40)
 
 
-def frame(pose: np.ndarray, translation: np.ndarray) -> Frame:
-    return Frame(pose, translation, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0))
+POSES, PLACES = WALK.poses[::4], WALK.translations[::4]
 
 
-def seen(body: Body, cameras: list[Camera]) -> list[Observation]:
+def frames_at(places: Sequence[np.ndarray]) -> list[Frame]:
+    nothing = np.zeros((1, 3), np.int64)
+    return [Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0)) for pose, place in zip(POSES, places, strict=True)]
+
+
+def observed(body: Body, cameras: list[Camera]) -> list[Observation]:
     return [
         Observation([Silhouette.of(project(body, camera, pose, where)) for camera in cameras])
-        for pose, where in zip(WALK.poses[::4], WALK.translations[::4], strict=True)
+        for pose, where in zip(POSES, PLACES, strict=True)
     ]
 
 
@@ -32,8 +38,7 @@ def test_every_bone_belongs_to_one_group_of_lengths_and_one_of_girths() -> None:
     for groups in (LENGTHS, GIRTHS):
         plain = [bone for group in groups.values() for bone in group]
         assert len(plain) == len(set(plain))
-        found = {bone for bone in BONES for one in plain if bone in (one, f"l{one}", f"r{one}")}
-        assert found == set(BONES)
+        assert {bone for bone in BONES for kind in plain if bone in (kind, f"l{kind}", f"r{kind}")} == set(BONES)
 
 
 def test_factors_multiply_what_they_name() -> None:
@@ -57,7 +62,7 @@ def test_stature_scales_and_is_that_of_an_adult() -> None:
     assert shaped(AVERAGE, np.full(len(NAMES), 1.07), height=1.62).stature == pytest.approx(1.62)
 
 
-def test_varied_people_are_alike_on_both_sides_and_within_their_percentage() -> None:
+def test_varied_people_are_symmetric_and_within_their_percentage() -> None:
     made = varied(AVERAGE, 10.0, np.random.default_rng(3))
     ratio = made.skeleton.lengths / AVERAGE.skeleton.lengths
     assert np.abs(ratio - 1.0).max() <= 0.1
@@ -66,15 +71,14 @@ def test_varied_people_are_alike_on_both_sides_and_within_their_percentage() -> 
     assert varied(AVERAGE, 0.0, np.random.default_rng(3)) is AVERAGE
 
 
-def test_a_build_is_found_where_the_poses_are_known() -> None:
+def test_a_build_is_estimated_where_the_poses_are_known() -> None:
     rng = np.random.default_rng(5)
     true = varied(AVERAGE, 10.0, rng).scaled(1.06, 1.06)
     middle = WALK.translations.mean(axis=0)
     cameras = [Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)]
-    frames = [frame(p, t) for p, t in zip(WALK.poses[::4], WALK.translations[::4], strict=True)]
-    shape = fit_shape(
-        AVERAGE, cameras, seen(true, cameras), lambda _: frames, np.random.default_rng(0), aligned=False, resamples=2
-    )
+    frames, observations = frames_at(PLACES), observed(true, cameras)
+    rng = np.random.default_rng(0)
+    shape = fit_shape(AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False, resamples=2)
     assert shape.body.stature == pytest.approx(true.stature, rel=0.03)
     for bone in ("lfemur", "ltibia", "lhumerus"):
         k = BONES.index(bone)
@@ -83,15 +87,13 @@ def test_a_build_is_found_where_the_poses_are_known() -> None:
     assert shape.spread.max() > 0.0
 
 
-def test_one_camera_that_aligns_takes_the_height_it_is_given() -> None:
+def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
     camera = Camera.around(WALK.translations.mean(axis=0), np.pi / 2, 3.5, (160, 120))
-    observations = seen(AVERAGE, [camera])
+    observations = observed(AVERAGE, [camera])
     places = [
-        align(AVERAGE, [camera], one.silhouettes, pose[None], where[None])[0]
-        for one, pose, where in zip(observations, WALK.poses[::4], WALK.translations[::4], strict=True)
+        align(AVERAGE, [camera], observation.silhouettes, pose[None], place[None])[0]
+        for observation, pose, place in zip(observations, POSES, PLACES, strict=True)
     ]
-    frames = [frame(p, t) for p, t in zip(WALK.poses[::4], places, strict=True)]
-    shape = fit_shape(
-        AVERAGE, [camera], observations, lambda _: frames, np.random.default_rng(0), height=1.55, resamples=1
-    )
+    frames, rng = frames_at(places), np.random.default_rng(0)
+    shape = fit_shape(AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55, resamples=1)
     assert shape.body.stature == pytest.approx(1.55)

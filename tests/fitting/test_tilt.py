@@ -21,6 +21,8 @@ from tests.cases import each
 
 LEFT_HIP = 3  # of a pose: its first joint angle
 DEGREE = np.radians(1.0)
+WALKS = [built_in.motion(style) for style in built_in.other_styles("walk")]
+NOTHING = Observation([], np.zeros(3))
 
 
 class Hip:
@@ -52,14 +54,14 @@ def space_of(tilt: Tilt, reach: float = 1.0) -> SearchSpace:
     return SearchSpace(Hip(), np.zeros(3), np.full(3, reach), np.zeros(3), tilt=tilt)
 
 
-def test_who_bends_his_hips_tilts_as_in_training() -> None:
+def test_bent_hips_tilt_as_in_training() -> None:
     hip = np.linspace(-1.0, 1.0, 201)
     tilt = Tilt.of(Hip(), [bending(0.2 + 0.9 * hip, -0.1 * hip, hip)], 1.0, 2.0 * DEGREE)
-    found = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -0.8], [0.0, 0.0, 0.0, 0.8]]))[0]
+    poses = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -0.8], [0.0, 0.0, 0.0, 0.8]]))[0]
     # a third of a latent's variance and a ridge of 0.05: slopes come out smaller by 0.333 / 0.383
     shrunk = 0.8 / (1.0 + 0.05 / np.mean(hip**2))
-    np.testing.assert_allclose(found[:, 1], 0.2 + 0.9 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
-    np.testing.assert_allclose(found[:, 2], -0.1 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
+    np.testing.assert_allclose(poses[:, 1], 0.2 + 0.9 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
+    np.testing.assert_allclose(poses[:, 2], -0.1 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
     lost = 0.9 * (1.0 - shrunk / 0.8)  # what the ridge leaves to the range
     np.testing.assert_allclose([tilt.low[0], tilt.high[0]], [-lost - 2.0 * DEGREE, lost + 2.0 * DEGREE])
 
@@ -89,21 +91,19 @@ def test_a_roll_past_half_a_turn_is_the_same_as_before_it(turns: int) -> None:
     np.testing.assert_allclose([tilt.low[1], tilt.high[1]], np.radians([-11.0, 11.0]))
 
 
-def test_who_turned_over_in_training_may_turn_over_again_and_again() -> None:
+def test_a_turn_over_in_training_may_be_repeated() -> None:
     cartwheel = bending(np.zeros(73), np.linspace(0.0, 2.0 * np.pi, 73))
     follower = Follower(task_of(cartwheel), Hip(), Prediction())
-    observation = Observation([], np.zeros(3))
-    space = follower.space(observation)
+    space = follower.space(NOTHING)
     assert space.periodic.tolist() == [False, False, True, False]
-    seen = []
+    rolls = []
     for _ in range(50):  # as far as it goes to one side, from frame to frame
         proposal = np.array([0.0, 0.0, 0.9, 0.0])
         follower.commit(proposal)
-        seen.append(space.decode(proposal[None])[0][0, 2])
-        space = follower.space(observation)
-    steps = np.diff(seen)
-    np.testing.assert_allclose(steps, np.radians(0.9 * 15.0))
-    assert seen[-1] - seen[0] > 2.0 * np.pi
+        rolls.append(space.decode(proposal[None])[0][0, 2])
+        space = follower.space(NOTHING)
+    np.testing.assert_allclose(np.diff(rolls), np.radians(0.9 * 15.0))
+    assert rolls[-1] - rolls[0] > 2.0 * np.pi
     assert not space.periodic[2]
 
 
@@ -112,8 +112,7 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
     rolling = bending(np.zeros(500), rng.uniform(-1.0, 1.0, 500))
     prediction = Prediction(tilt_share=1.0, tilt_margin_degrees=0.0)
     follower = Follower(task_of(rolling), Hip(), prediction)
-    observation = Observation([], np.zeros(3))
-    space = follower.space(observation)
+    space = follower.space(NOTHING)
     tilt = space.tilt
     assert tilt is not None
     np.testing.assert_allclose(space.centre[2] + np.array([-1.0, 1.0]) * space.half[2], [tilt.low[1], tilt.high[1]])
@@ -122,7 +121,7 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
         last = space.coordinates(np.array([0.0, 0.0, roll, 0.0]))
         moved = space.centre[2] + roll * space.half[2]
         follower.commit(np.array([0.0, 0.0, roll, 0.0]))
-        space = follower.space(observation)
+        space = follower.space(NOTHING)
         assert space.half[2] == pytest.approx(np.radians(15.0))
         assert space.start is not None
         np.testing.assert_allclose(space.coordinates(space.start.mean), last, atol=1e-12)
@@ -132,11 +131,10 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
 
 
 def test_a_walker_tilts_a_few_degrees_more_than_others_did_at_most() -> None:
-    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
-    angles = np.concatenate([walk.poses[:, 3:] for walk in walks])
-    tilts = np.concatenate([walk.poses[:, 1:3] for walk in walks])
+    angles = np.concatenate([walk.poses[:, 3:] for walk in WALKS])
+    tilts = np.concatenate([walk.poses[:, 1:3] for walk in WALKS])
     for prior in (PCA().fit(angles), Loose().fit(angles)):
-        space = Follower(task_of(*walks), prior, Prediction()).space(Observation([], np.zeros(3)))
+        space = Follower(task_of(*WALKS), prior, Prediction()).space(NOTHING)
         poses = space.decode(draw_population(space, np.random.default_rng(0), 500))[0]
         assert (poses[:, 1:3] > tilts.min(axis=0) - np.radians(8.0)).all()
         assert (poses[:, 1:3] < tilts.max(axis=0) + np.radians(8.0)).all()
@@ -146,40 +144,35 @@ def test_a_walker_tilts_a_few_degrees_more_than_others_did_at_most() -> None:
 def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(how: Prediction) -> None:
     training = [bending(np.full(9, 0.8), np.zeros(9))] if how.tilt == "box" else []
     follower = Follower(task_of(*training), Hip(), how)
-    space = follower.space(Observation([], np.zeros(3)))
+    space = follower.space(NOTHING)
     assert space.tilt is None
     np.testing.assert_allclose(space.centre[:3], [0.3, 0.0, 0.0])
     np.testing.assert_allclose(space.half[:3], np.radians([45.0, 15.0, 15.0]))
     follower.commit(np.array([0.5, 1.0, 1.0, 0.0]))
-    np.testing.assert_array_equal(follower.space(Observation([], np.zeros(3))).centre[1:3], 0.0)
+    np.testing.assert_array_equal(follower.space(NOTHING).centre[1:3], 0.0)
 
 
 def test_a_first_pose_that_is_given_begins_with_the_tilt_that_goes_with_it() -> None:
     hip = np.linspace(-1.0, 1.0, 100)
     lying = bending(0.9 * hip + np.where(hip > 0.5, 0.8, 0.0), 0.0 * hip, hip)
     task = replace(task_of(lying), first_pose=np.eye(63)[0] * 0.4)
-    space = Follower(task, Hip(), Prediction()).space(Observation([], np.zeros(3)))
+    space = Follower(task, Hip(), Prediction()).space(NOTHING)
     assert space.start is not None
     assert space.centre[1] != 0.0
     np.testing.assert_allclose(space.coordinates(space.start.mean), [0.3, 0.0, 0.0, 0.4], atol=1e-12)
 
 
-def test_a_tilt_that_was_learned_before_is_not_learned_again() -> None:
-    tilt = Tilt.of(Hip(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
-    space = Follower(task_of(), Hip(), Prediction(), tilt).space(Observation([], np.zeros(3)))
-    assert space.tilt is tilt
-
-
-def test_a_prior_that_has_learned_already_has_a_box_unless_somebody_wants_its_tilt_learned() -> None:
-    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
-    task = task_of(*walks)
+def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
+    task = task_of(*WALKS)
     learned = PCA().fit(task.angles)
 
     def tilt(choice: TrackOptions) -> Tilt | None:
         tracker = prepare(choice, task).tracker(task)
         assert isinstance(tracker, SynthesisTracker)
-        return Follower(task, learned, tracker.prediction, tracker.tilt).space(Observation([], np.zeros(3))).tilt
+        return Follower(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
 
+    before = Tilt.of(Hip(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
+    assert Follower(task_of(), Hip(), Prediction(), before).space(NOTHING).tilt is before
     assert tilt(TrackOptions(method="@pca")) is not None
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
     assert tilt(TrackOptions(prior=learned)) is None
@@ -187,9 +180,8 @@ def test_a_prior_that_has_learned_already_has_a_box_unless_somebody_wants_its_ti
 
 
 def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
-    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
-    prior = PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in walks]))
-    space = Follower(task_of(*walks), prior, Prediction()).space(Observation([], np.zeros(3)))
+    prior = PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in WALKS]))
+    space = Follower(task_of(*WALKS), prior, Prediction()).space(NOTHING)
     proposals = draw_population(space, np.random.default_rng(0), 60)
     poses = space.decode(proposals)[0]
     np.testing.assert_array_equal(poses[7:8], space.decode(proposals[7:8])[0])
@@ -211,6 +203,6 @@ def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
         ({"tilt_margin_degrees": np.inf}, "tilt_margin_degrees must be 0 or more, got inf"),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(setting: dict[str, float | str], error: str) -> None:
+def test_wrong_settings_are_named(setting: dict[str, float | str], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         Prediction(**setting)  # type: ignore[arg-type]
