@@ -1,4 +1,4 @@
-"""jDE, as somebody writes it who has not read more of posefit than what an optimiser is.
+"""jDE, written with no more than the protocol of an optimiser.
 
 J. Brest, S. Greiner, B. Bošković, M. Mernik, V. Žumer, Self-adapting control parameters in differential evolution, IEEE
 Transactions on Evolutionary Computation 10, 2006: rand/1/bin, F and CR of each individual drawn anew with probability

@@ -1,4 +1,4 @@
-"""Other people's loops run on a problem as they are: COCO's, IOHexperimenter's and Nevergrad's; and all see the same."""
+"""Loops of COCO, IOHexperimenter and Nevergrad run on a problem as they are, with the same trace."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.suites.problem import Problem
+from posefit.suites.problem import BudgetSpentError, Problem
 from tests.suites.jde import JDE
 
 ADDRESSES = [(1, 10_003, 9), (4, 12_345, 16), (7, 2, 66)]
@@ -14,31 +14,30 @@ BUDGET = 400
 
 
 def problems() -> list[Problem]:
-    return [posefit.suite("posefit-2026.1", *one) for one in ADDRESSES]
+    return [posefit.suite("posefit-2026.1", *address) for address in ADDRESSES]
 
 
 @pytest.fixture(scope="module")
 def traces() -> list[tuple[np.ndarray, np.ndarray]]:
     """Return jDE's trace on each problem, driven by posefit's own loop, in populations."""
-    found = []
+    traces = []
     for problem in problems():
         result = posefit.minimise(problem.evaluate, JDE(problem.space, np.random.default_rng(1)), BUDGET)
         assert result.cost == problem.best_observed_fvalue1 == problem.trace[1][-1]
         assert problem.evaluations == BUDGET
-        found.append(problem.trace)
-    return found
+        traces.append(problem.trace)
+    return traces
 
 
 def one_by_one(function, optimiser, budget):
-    """Drive an optimiser as somebody does whose functions take one proposal at a time."""
+    """Drive an optimiser on a function of one proposal."""
     for _ in range(budget // 20):
         proposals = optimiser.ask()
-        optimiser.tell(proposals, np.array([function(one) for one in proposals]))
+        optimiser.tell(proposals, np.array([function(proposal) for proposal in proposals]))
 
 
-def test_a_loop_like_cocos_sees_the_same_trace(traces) -> None:
-    numbers = [(problem.id_function, problem.id_instance, problem.dimension) for problem in problems()]
-    for (function, instance, dimension), expected in zip(numbers, traces, strict=True):
+def test_a_loop_like_cocos_has_the_same_trace(traces) -> None:
+    for (function, instance, dimension), expected in zip(ADDRESSES, traces, strict=True):
         suite = posefit.Suite("posefit-2026.1", functions=[function], dimensions=[dimension], instances=[instance])
         for problem in suite:  # as in COCO's example experiment
             assert problem.evaluations == 0
@@ -49,7 +48,7 @@ def test_a_loop_like_cocos_sees_the_same_trace(traces) -> None:
             assert np.array_equal(problem.trace, expected)
 
 
-def test_iohexperimenter_sees_and_logs_the_same_trace(traces, tmp_path: Path) -> None:
+def test_iohexperimenter_logs_the_same_trace(traces, tmp_path: Path) -> None:
     ioh = pytest.importorskip("ioh", reason="it has no wheels for every Python")
     for problem, expected in zip(problems(), traces, strict=True):
         wrapped = ioh.wrap_problem(
@@ -88,15 +87,13 @@ def test_nevergrads_own_loop_runs_on_a_problem() -> None:
     problem = posefit.suite("posefit-2026.1", 1, 10_003, 9)
     box = ng.p.Array(shape=(problem.dimension,), lower=-1.0, upper=1.0)
     box.random_state = np.random.RandomState(3)
-    found = ng.optimizers.OnePlusOne(parametrization=box, budget=120).minimize(problem)
+    recommended = ng.optimizers.OnePlusOne(parametrization=box, budget=120).minimize(problem)
     assert problem.evaluations == 120
-    assert problem.best_observed_fvalue1 == problem.trace[1][-1] <= problem(found.value)
+    assert problem.best_observed_fvalue1 == problem.trace[1][-1] <= problem(recommended.value)
     assert problem.best_observed_fvalue1 < 30.0
 
 
-def test_a_library_that_asks_for_too_much_is_ended_by_the_budget() -> None:
-    from posefit.suites.problem import BudgetSpentError
-
+def test_a_budget_ends_a_library_that_exceeds_it() -> None:
     problem = posefit.suite("posefit-2026.1", 1, 10_003, 9, budget=50)
     with pytest.raises(BudgetSpentError, match="0 of 50 evaluations are left"):
         one_by_one(problem, JDE(problem.space, np.random.default_rng(1)), 100)
