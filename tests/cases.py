@@ -2,10 +2,8 @@
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, TypeVar
-
-Value = TypeVar("Value")
+from collections.abc import Callable, Iterable
+from typing import Any
 
 
 def each(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -15,7 +13,7 @@ def each(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[[Callab
 
     def decorate(test: Callable[..., None]) -> Callable[..., None]:
         signature = inspect.signature(test)
-        fixtures = [one for name, one in signature.parameters.items() if name not in arguments]
+        fixtures = [parameter for name, parameter in signature.parameters.items() if name not in arguments]
 
         @functools.wraps(test)
         def run(**given: Any) -> None:
@@ -36,10 +34,3 @@ def each(names: str | tuple[str, ...], cases: Iterable[Any]) -> Callable[[Callab
         return run
 
     return decorate
-
-
-def cases(values: Iterable[Value]) -> Iterator[Value]:
-    """Yield the cases of a loop within a test, each printed: the output of a failure ends with its case."""
-    for value in values:
-        print(f"case {value!r}")
-        yield value

@@ -12,8 +12,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space
-from posefit.fitting.check import at_least, one_of, positive
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, inertia, speed_limits
+from posefit.fitting.check import one_of
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
 
 POPULATION_SIZE = 40
 ITERATIONS = 60
@@ -56,16 +56,10 @@ class PSO:
         alpha: float = ALPHA,
         redraws: int = REDRAWS,
     ) -> None:
-        at_least("population_size", population_size, 1)
-        at_least("iterations", iterations, 1)
+        check_swarm(population_size, iterations, inertia, acceleration, alpha, redraws)
         one_of("velocity", velocity, ("constricted", "inertia", "original"))
         if not phi > 4.0:
             raise InputError(f"phi must be above 4, got {phi}")
-        if not inertia > 0.1:
-            raise InputError(f"inertia must be above 0.1, got {inertia}")
-        at_least("acceleration", acceleration, 0.0)
-        positive("alpha", alpha)
-        at_least("redraws", redraws, 0)
         self._kind, self._chi, self._phi = velocity, constriction(phi), phi
         self._inertia, self._acceleration = inertia, acceleration
         self._iteration, self._iterations = 0, iterations

@@ -5,10 +5,9 @@ from typing import Literal
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, between, one_of, positive
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, inertia, speed_limits
+from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
 
 POPULATION_SIZE = 40  # N, section 5.2
 ITERATIONS = 60  # C, section 5.2
@@ -61,9 +60,10 @@ class SAPSO:
         last_generation: Literal["evaluated", "skipped"] = "evaluated",
         variant: Literal["default", "paper"] = "default",
     ) -> None:
-        _check(
-            population_size, iterations, temperature, cooling, stop_temperature, inertia, acceleration, alpha, redraws
-        )
+        check_swarm(population_size, iterations, inertia, acceleration, alpha, redraws)
+        positive("temperature", temperature)
+        between("cooling", cooling, 0.0, 1.0)
+        at_least("stop_temperature", stop_temperature, 0.0)
         one_of("cool", cool, ("iteration", "acceptance"))
         one_of("rand", rand, ("dimension", "scalar"))
         one_of("velocity_limits", velocity_limits, ("symmetric", "literal"))
@@ -102,26 +102,3 @@ class SAPSO:
             # SAPSO A1.2e, Interpretation S6
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
         self._iteration += 1
-
-
-def _check(
-    population_size: int,
-    iterations: int,
-    temperature: float,
-    cooling: float,
-    stop_temperature: float,
-    first_inertia: float,
-    acceleration: float,
-    alpha: float,
-    redraws: int,
-) -> None:
-    at_least("population_size", population_size, 1)
-    at_least("iterations", iterations, 1)
-    positive("temperature", temperature)
-    between("cooling", cooling, 0.0, 1.0)
-    at_least("stop_temperature", stop_temperature, 0.0)
-    if not first_inertia > 0.1:
-        raise InputError(f"inertia must be above 0.1, got {first_inertia}")
-    at_least("acceleration", acceleration, 0.0)
-    positive("alpha", alpha)
-    at_least("redraws", redraws, 0)

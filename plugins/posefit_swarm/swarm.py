@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population, extent
+from posefit.fitting.check import at_least, positive
 from posefit_swarm.kernels import accept, accept_and_move, move, repair
 
 INERTIA = 0.9  # A; Interpretation S5: the paper gives none, and it must be above 0.1
@@ -195,6 +196,19 @@ class SwarmState:
             clipped = np.minimum(np.maximum(self.moved[rows], -1.0), 1.0)
             self.moved[rows] = np.where(self._space.feasible(clipped)[:, None], clipped, self.position[rows])
             self._next_velocity[rows] = 0.0
+
+
+def check_swarm(
+    population_size: int, iterations: int, first_inertia: float, acceleration: float, alpha: float, redraws: int
+) -> None:
+    """Raise ValueError where a setting that swarms share makes no sense."""
+    at_least("population_size", population_size, 1)
+    at_least("iterations", iterations, 1)
+    if not first_inertia > 0.1:
+        raise InputError(f"inertia must be above 0.1, got {first_inertia}")
+    at_least("acceleration", acceleration, 0.0)
+    positive("alpha", alpha)
+    at_least("redraws", redraws, 0)
 
 
 def speed_limits(space: Space, alpha: float, kind: Literal["symmetric", "literal"]) -> tuple[Array, Array]:

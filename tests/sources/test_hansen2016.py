@@ -8,7 +8,6 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.evolution.strategy import Constants, Strategy, default_population_size
-from tests.cases import cases
 
 # Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
 RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
@@ -168,7 +167,7 @@ def test_eq_46_a_bad_step_weighs_as_if_it_were_as_long_as_the_dimensions_say() -
 
 @pytest.mark.pure
 def test_eq_47_the_covariance_learns_from_its_path_and_from_every_step() -> None:  # HANSEN2016 (47)
-    for far in cases([0.0, 5.0]):
+    for far in [0.0, 5.0]:
         one = learnt(far=far)
         h, rates, w = heeded(one), EIGHT.rates, EIGHT.weights
         lengths = np.linalg.norm(one.y @ one.root, axis=1)

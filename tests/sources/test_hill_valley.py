@@ -11,7 +11,6 @@ from posefit.fitting.box import displacement, wrap
 from posefit.testing.toy import Toy
 from posefit.uncertainty.hill_valley import edge_length, same_valley, valleys
 from posefit.uncertainty.landscape import Landscape
-from tests.cases import cases
 
 
 def two_holes(proposals: Array) -> Array:
@@ -60,7 +59,7 @@ def slow(cost: Callable[[Array], Array], space: Toy, proposals: Array, costs: Ar
 
 
 def test_a_hill_between_two_points_parts_them() -> None:  # URSEM1999 (hill valley)
-    for probes, one in cases([(1, False), (2, False), (4, False)]):
+    for probes, one in [(1, False), (2, False), (4, False)]:
         points = np.array([[-0.5], [0.5], [-0.4], [0.9]])
         costs = two_holes(points)
         landscape = Landscape(Toy(1), two_holes)
@@ -128,10 +127,8 @@ def test_a_point_joins_the_nearest_better_one_that_no_hill_parts_it_from() -> No
 
 
 def test_clusters_are_those_of_one_test_after_the_other() -> None:
-    for least, (cost, dimensions, wrapping) in cases(
-        itertools.product(
-            [1, 3], [(two_holes, 1, 0), (two_holes, 2, 0), (eggs, 1, 0), (eggs, 2, 0), (turning, 1, 1), (turning, 2, 1)]
-        )
+    for least, (cost, dimensions, wrapping) in itertools.product(
+        [1, 3], [(two_holes, 1, 0), (two_holes, 2, 0), (eggs, 1, 0), (eggs, 2, 0), (turning, 1, 1), (turning, 2, 1)]
     ):
         space = Toy(dimensions, wrapping=wrapping)
         for seed in range(5):
@@ -145,9 +142,13 @@ def test_clusters_are_those_of_one_test_after_the_other() -> None:
 
 
 def test_known_basins_are_found() -> None:
-    for cost, dimensions, wrapping, count in cases(
-        [(two_holes, 1, 0, 2), (two_holes, 2, 0, 2), (eggs, 1, 0, 3), (eggs, 2, 0, 9), (turning, 1, 1, 2)]
-    ):
+    for cost, dimensions, wrapping, count in [
+        (two_holes, 1, 0, 2),
+        (two_holes, 2, 0, 2),
+        (eggs, 1, 0, 3),
+        (eggs, 2, 0, 9),
+        (turning, 1, 1, 2),
+    ]:
         points = np.random.default_rng(0).uniform(-1.0, 1.0, (400, dimensions))
         costs = cost(points)
         good = costs < np.median(costs)

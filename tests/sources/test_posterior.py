@@ -7,7 +7,6 @@ import pytest
 
 from posefit.uncertainty.calibration import calibration_error, conformal_factor
 from posefit_exemplars.window import backward_messages, sample_states
-from tests.cases import cases
 from tests.sources.test_exemplars_steps import SIZES, Model, model, ways
 
 POWERS = (1.0, 0.4)
@@ -19,7 +18,7 @@ def tempered(one: Model, power: float) -> Model:
 
 
 def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:  # GODSILL2004 (messages)
-    for power in cases(POWERS):
+    for power in POWERS:
         one = model(0)
         found = backward_messages(one.frames[1:], power)
         expected = np.zeros(SIZES[1])
@@ -30,7 +29,7 @@ def test_a_message_is_the_share_of_all_ways_on_from_a_state() -> None:  # GODSIL
 
 
 def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (step)
-    for power in cases(POWERS):
+    for power in POWERS:
         one, count, rng = model(1), 40_000, np.random.default_rng(0)
         rows, drawn = None, []
         for k in range(len(SIZES)):

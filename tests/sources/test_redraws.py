@@ -10,7 +10,6 @@ from posefit.testing.toy import Toy
 from posefit_swarm import kernels
 from posefit_swarm import swarm as swarm_module
 from posefit_swarm.swarm import SwarmState, speed_limits
-from tests.cases import cases
 
 OMEGA, ACCELERATION = 0.9, 2.0
 REACH = 0.5  # the largest speed
@@ -75,7 +74,7 @@ def test_redrawing_coordinates_has_the_distribution_of_redrawing_particles() -> 
 
 
 def test_a_coordinate_is_redrawn_as_often_as_asked_and_no_oftener() -> None:  # Interpretation S7
-    for redraws, failing in cases([(0, 0.9), (1, 0.81), (4, 0.59049), (20, 0.109419)]):
+    for redraws, failing in [(0, 0.9), (1, 0.81), (4, 0.59049), (20, 0.109419)]:
         moved, stuck = redrawn(*particle(SELDOM), 4000, redraws)
         # where coordinates are not redrawn by themselves, none is stopped: the particle as a whole may be redrawn
         failed = moved[:, 0] == 1.0 if redraws else moved[:, 0] > 1.0

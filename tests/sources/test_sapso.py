@@ -23,7 +23,6 @@ from posefit.silhouette.cost import areas, mismatch, project
 from posefit_priors.pca import PCA
 from posefit_swarm import kernels, sapso, swarm
 from posefit_swarm.sapso import SAPSO
-from tests.cases import cases
 
 ROOT = Path(__file__).parents[2]
 TAGS = (
@@ -80,7 +79,7 @@ def walk() -> Array:
 
 
 def test_every_equation_and_step_has_one_home() -> None:
-    for tag in cases(TAGS):
+    for tag in TAGS:
         pattern = re.compile(rf"# SAPSO {re.escape(tag)}(?![\w.(]| \w)")
         homes = [
             f"{path.relative_to(ROOT)}:{number}"
@@ -407,7 +406,7 @@ def test_a1_2c_a_velocity_beyond_its_limits_is_redrawn_and_not_moved_to_them() -
 
 
 def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Interpretation S7
-    for rand in cases(["dimension", "scalar"]):
+    for rand in ["dimension", "scalar"]:
         space = line_space()
         optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
         optimiser._swarm.position[:], optimiser._swarm.best[:] = 0.9, 0.9
@@ -418,7 +417,7 @@ def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  #
 
 
 def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance() -> None:  # Interpretation S6
-    for cool, expected in cases([("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))]):
+    for cool, expected in [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))]:
         optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=4, iterations=9, cool=cool)
         for _ in range(4):  # a flat cost: every move is accepted
             optimiser.tell(optimiser.ask(), np.zeros(4))
@@ -440,7 +439,7 @@ def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
 
 
 def test_s11_a_refused_move_keeps_or_loses_its_velocity() -> None:
-    for kind in cases(["kept", "zeroed"]):
+    for kind in ["kept", "zeroed"]:
         optimiser = SAPSO(
             line_space(), Fixed(1.0), population_size=1, iterations=2, rejected_velocity=kind, acceleration=0.0
         )

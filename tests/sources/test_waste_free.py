@@ -12,7 +12,6 @@ from posefit.testing.toy import Toy
 from posefit.uncertainty import smc
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.smc import NormalMixture, next_step, reweighed, systematic_rows, tempered
-from tests.cases import cases
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def test_a_comb_keeps_each_row_as_often_as_its_weight_asks() -> None:
 
 
 def test_a_start_has_the_density_that_it_draws_from() -> None:
-    for broad in cases([0.2, 0.7]):
+    for broad in [0.2, 0.7]:
         start = NormalMixture(np.array([[-0.9, 0.2], [0.5, -0.8]]), np.array([[0.2, 0.1], [0.4, 0.3]]), broad)
         space = Toy(2, wrapping=1)
         drawn, share = start.draw(space, np.random.default_rng(0), 4000)
@@ -180,14 +179,12 @@ def test_what_costs_infinitely_much_weighs_nothing() -> None:
 
 
 def test_settings_that_make_no_sense_are_refused() -> None:
-    for given, said in cases(
-        [
-            ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
-            ({"particles": 10}, "particles must be at least 2 chains of 2 or more, got 10 and chains of 8"),
-            ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 2048 and chains of 1"),
-            ({"survival": 1.0}, "survival must lie between 0 and 1, got 1.0"),
-        ]
-    ):
+    for given, said in [
+        ({"temperature": 0.0}, "temperature must be above 0, got 0.0"),
+        ({"particles": 10}, "particles must be at least 2 chains of 2 or more, got 10 and chains of 8"),
+        ({"chain": 1}, "particles must be at least 2 chains of 2 or more, got 2048 and chains of 1"),
+        ({"survival": 1.0}, "survival must lie between 0 and 1, got 1.0"),
+    ]:
         settings = {"temperature": 1.0, **given}
         with pytest.raises(ValueError, match=said):
             tempered(Landscape(Toy(2), PAIR.cost), NormalMixture.anywhere(2), rng=np.random.default_rng(0), **settings)
