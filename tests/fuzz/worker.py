@@ -34,14 +34,14 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit.motion.asf import read_asf
     from posefit.motion.bvh import read_bvh
     from posefit.sweep import plan
-    from posefit.sweep.ledger import Ledger
+    from posefit.sweep.ledger import FOLDERS, Ledger
     from posefit_priors.full import Full
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA
     from posefit_priors.union import Union
 
     skeleton = read_asf(folder / "a.asf")
-    plan.MOST = CELLS
+    plan.MAX_CELLS = CELLS
 
     def masks(path: Path) -> object:
         views = Views([read_masks(path, (None, None))])
@@ -59,7 +59,7 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
 
     def ledger(path: Path) -> object:
         room = path.parent / f"{NAME}-ledger"
-        for name in ("rows", "claims", "quarantine", "aside"):
+        for name in FOLDERS:
             (room / name).mkdir(parents=True)
         shutil.copy(path, room / "ledger.json")
         return Ledger(room)
