@@ -10,7 +10,7 @@ into an error.
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import lru_cache, partial
@@ -209,8 +209,11 @@ def load(
     """
     owners = dict(taken or {})
     plugins: list[Plugin[T]] = []
-    for owner, point in sorted(_owned(points), key=lambda owned: (owned[0][0] != PROJECT, owned[1].name)):
-        plugin = _loaded(point, owner, collect, label, variables, owners)
+    points = list(points)
+    distributions = [(point.dist.name, point.dist.version) if point.dist else ("unknown", "") for point in points]
+    owned = zip(distributions, points, strict=True)
+    for distribution, point in sorted(owned, key=lambda pair: (pair[0][0] != PROJECT, pair[1].name)):
+        plugin = _loaded(point, distribution, collect, label, variables, owners)
         plugins.append(plugin)
         if plugin.state == "broken":
             message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
@@ -270,16 +273,6 @@ def _installed(what: str) -> list[EntryPoint]:
     return [point for point in entry_points(group=PROJECT) if _registers(point.name) == what]
 
 
-def _owned(points: Iterable[EntryPoint]) -> Iterator[tuple[tuple[str, str], EntryPoint]]:
-    """Yield each entry point with the name and the version of its distribution, read once."""
-    known: dict[int, tuple[str, str]] = {}
-    for point in points:
-        dist = point.dist
-        if dist is not None and id(dist) not in known:
-            known[id(dist)] = dist.name, dist.version
-        yield known.get(id(dist), ("unknown", "")), point
-
-
 def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
     """Return why the variables leave a plugin out, or nothing."""
 
@@ -314,29 +307,23 @@ def _methods(relay: Any, distribution: str, version: str) -> list[Offer]:
     return offers
 
 
-def _commands(relay: Any, _distribution: str, _version: str) -> "list[click.Command]":
+def _commands(relay: Any, *_: str) -> "list[click.Command]":
     """Return the commands that one plugin registers."""
     import click
 
-    commands: list[click.Command] = []
-
-    def register(command: click.Command) -> None:
+    commands: list[Any] = []
+    relay.posefit_register_commands(register=commands.append)
+    for command in commands:
         if not isinstance(command, click.Command) or not command.name:
             raise TypeError(f"a command must be a click.Command with a name, got {command!r}")
-        commands.append(command)
-
-    relay.posefit_register_commands(register=register)
     return commands
 
 
-def _claims(relay: Any, _distribution: str, _version: str) -> list[ClaimedOrder]:
+def _claims(relay: Any, *_: str) -> list[ClaimedOrder]:
     """Return the claims that one plugin registers."""
-    claims: list[ClaimedOrder] = []
-
-    def register(claim: ClaimedOrder) -> None:
+    claims: list[Any] = []
+    relay.posefit_register_claims(register=claims.append)
+    for claim in claims:
         if not isinstance(claim, ClaimedOrder):
             raise TypeError(f"a claim must be a ClaimedOrder, got {claim!r}")
-        claims.append(claim)
-
-    relay.posefit_register_claims(register=register)
     return claims

@@ -17,7 +17,7 @@ from posefit.settings import Setting, settings_in, without_settings
 
 
 def described(offer: Offer) -> dict[str, Any]:
-    """Return what `posefit plugins --json` says of an offer."""
+    """Return an offer as `posefit plugins --json` prints it."""
     settings = [
         {"name": one.name, "type": one.type, "default": None if one.default is Parameter.empty else one.default}
         for one in offer.settings
@@ -55,14 +55,14 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
         raise InputError(f"plugin must be one of {', '.join(known)}, got {name!r}{hint}")
     for offer in mine:
         text = getdoc(offer.factory) or ""
-        said = settings_in(text)
+        listed = settings_in(text)
         yield _head(offer)
         yield from (f"    {line}".rstrip() for line in without_settings(text).splitlines())
         if not offer.settings:
             yield "    It has no settings."
         for setting in offer.settings:
             yield f"    --set {name}.{_typed(setting)}"
-            symbol, meaning = said.get(setting.name, ("", ""))
+            symbol, meaning = listed.get(setting.name, ("", ""))
             yield from _wrapped(f"({symbol}) {meaning}" if symbol else meaning, 8 * " ", 8 * " ")
 
 
@@ -88,34 +88,32 @@ def diagnosis(
     claiming: Sequence[Plugin[ClaimedOrder]] = (),
     verbose: bool = False,
 ) -> tuple[list[str], bool]:
-    """Return what `posefit plugins doctor` says, and whether all is well.
+    """Return the lines of `posefit plugins doctor`, and whether all is well.
 
     `added` are the plugins with commands, and `claiming` those with claims of publications. Where it is to be
     `verbose`, the traceback of what could not be loaded follows its line.
     """
     lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
     for plugin in registry.plugins:
-        names = ", ".join(f"{offer.kind} {offer.name}" for offer in plugin.offers) or "nothing"
-        lines += _state(plugin, f"offers {names}", verbose)
+        lines += _state(plugin, ", ".join(f"{offer.kind} {offer.name}" for offer in plugin.offers), verbose)
         for offer in plugin.offers:
             if offer.missing:
                 lines.append(f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'")
             if not offer.summary:
                 lines.append(f"          {offer.name} has no docstring to be listed with")
-    for more in added:
-        names = ", ".join(f"command {command.name}" for command in more.offers) or "nothing"
-        lines += _state(more, f"offers {names}", verbose)
-    for one in claiming:
-        names = "; ".join(f"claim {claim.name}" for claim in one.offers) or "nothing"
-        lines += _state(one, f"offers {names}", verbose)
+    for with_commands in added:
+        lines += _state(with_commands, ", ".join(f"command {offer.name}" for offer in with_commands.offers), verbose)
+    for with_claims in claiming:
+        lines += _state(with_claims, "; ".join(f"claim {offer.name}" for offer in with_claims.offers), verbose)
     groups: tuple[Sequence[Plugin[Any]], ...] = (registry.plugins, added, claiming)
     well = all(plugin.state != "broken" for group in groups for plugin in group)
-    more_told = "" if verbose else "; -v shows where they fail"
-    lines.append("all plugins work" if well else f"broken plugins are left out; the others work{more_told}")
+    hint = "" if verbose else "; -v shows where they fail"
+    lines.append("all plugins work" if well else f"broken plugins are left out; the others work{hint}")
     return lines, well
 
 
 def _state(plugin: Plugin[Any], offers: str, verbose: bool) -> list[str]:
-    cause = " ".join(plugin.cause.split())  # on one line, whatever the error says
-    said = f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause or offers}"
-    return [said, *(f"          {line}" for line in plugin.traceback.splitlines() if verbose)]
+    """Return a plugin's line, and its traceback."""
+    cause = " ".join(plugin.cause.split()) or f"offers {offers or 'nothing'}"  # on one line, whatever the error says
+    line = f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}"
+    return [line, *(f"          {traced}" for traced in plugin.traceback.splitlines() if verbose)]

@@ -1,11 +1,10 @@
 """`posefit suite`."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from posefit.cli.options import parsed_by
+from posefit.cli.options import Decorator, options, parsed_by
 from posefit.cli.output import json_line, progress, results_alone, say
 from posefit.errors import InputError
 from posefit.tracking.options import text_range
@@ -15,31 +14,18 @@ if TYPE_CHECKING:
 
 NAME = "posefit-2026.1"
 
-F = TypeVar("F", bound=Callable[..., Any])
 
-
-def _problem_options(instances: str) -> Callable[[F], F]:
+def _problem_options(instances: str) -> Decorator:
     """Return a decorator that adds the options which select problems."""
-
-    def decorate(command: F) -> F:
-        for option in (
-            click.option(
-                "--instances",
-                callback=parsed_by(text_range),
-                default=instances,
-                show_default=True,
-                metavar="A:B",
-                help="A to B - 1.",
-            ),
-            click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9."),
-            click.option(
-                "--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each."
-            ),
-        ):
-            command = option(command)
-        return command
-
-    return decorate
+    numbers = {"type": int, "multiple": True}
+    span = {"callback": parsed_by(text_range), "default": instances, "show_default": True, "metavar": "A:B"}
+    return options(
+        (
+            click.option("--function", "functions", help="Its number; repeatable, by default each.", **numbers),
+            click.option("--dimension", "dimensions", help="Repeatable, by default 9.", **numbers),
+            click.option("--instances", help="A to B - 1.", **span),
+        )
+    )
 
 
 @click.group(invoke_without_command=True)
@@ -88,7 +74,6 @@ def suite_run(
 ) -> None:
     """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
     from posefit import settings
-    from posefit.files import check_new, check_place
     from posefit.fitting.check import whole
     from posefit.registry import registry
     from posefit.suites.problem import Suite
@@ -98,9 +83,7 @@ def suite_run(
     with results_alone():
         whole("budget", budget, 1)
         whole("seed", seed, 0)
-        if out is not None:
-            check_new(out)
-            check_place(out)
+        _check_free(out)
         problems = Suite(
             name,
             functions=functions or None,
@@ -131,14 +114,11 @@ def suite_run(
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
-    from posefit.files import check_new, check_place
     from posefit.suites.tally import score_lines, suite_scores
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.table import search_runs
 
-    if iohprofiler is not None:
-        check_new(iohprofiler)
-        check_place(iohprofiler)
+    _check_free(iohprofiler)
     results = Ledger(ledger, say)
     runs = list(search_runs(results))
     scores = suite_scores(runs)
@@ -169,16 +149,14 @@ def suite_audit(
     """Search problems with each method, and check what is reported; exit status 1 where something is wrong."""
     import json
 
-    from posefit.files import check_new, check_place, new_file
+    from posefit.files import new_file
     from posefit.fitting.check import whole
     from posefit.suites.audit import METHODS, audit_lines, audited, known_json
     from posefit.suites.problem import Suite
 
     with results_alone():
         whole("times", times, 0)
-        if write is not None:
-            check_new(write)
-            check_place(write)
+        _check_free(write)
         problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
         searching = methods or METHODS
         asked = audited(problems, searching, times=times)
@@ -189,6 +167,15 @@ def suite_audit(
     for line in audit_lines(rows):
         click.echo(line)
     context.exit(1 if any(row.faults for row in rows) else 0)
+
+
+def _check_free(path: str | None) -> None:
+    """Return nothing. Raises ValueError where a file or folder exists already, or has no place."""
+    from posefit.files import check_new, check_place
+
+    if path is not None:
+        check_new(path)
+        check_place(path)
 
 
 def _numbers(instances: tuple[int | None, int | None]) -> range:
@@ -211,24 +198,12 @@ def write_runs(runs: "list[SuiteRun]", out: str) -> None:
     from posefit.suites.functions import suite_function
     from posefit.suites.tally import budgets_differ
 
-    def settings_of(run: "SuiteRun") -> dict[str, Any]:
-        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
-        return {**run.settings, "infeasible proposals": run.infeasible, **budget}
-
     several = budgets_differ(runs)
-    write_iohprofiler(
-        (
-            LoggedRun(
-                run.method,
-                settings_of(run),
-                f"f{run.function} {suite_function(run.function).name}",
-                run.dimension,
-                run.instance,
-                run.seed,
-                run.evaluations,
-                run.costs,
-            )
-            for run in runs
-        ),
-        out,
-    )
+
+    def logged(run: "SuiteRun") -> LoggedRun:
+        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
+        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
+        name = f"f{run.function} {suite_function(run.function).name}"
+        return LoggedRun(run.method, settings, name, run.dimension, run.instance, run.seed, run.evaluations, run.costs)
+
+    write_iohprofiler(map(logged, runs), out)
