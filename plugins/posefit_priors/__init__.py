@@ -6,7 +6,7 @@
 - `full.Full` is all joint angles that are free, within their limits.
 - `sklearn.Transformed` is any transformer of scikit-learn that has an inverse: `sklearn:KernelPCA`.
 
-`arrays` checks what comes in, `kernels` has the loops.
+`arrays` has the checks and files, `kernels` the loops.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="@loose", frames=(0, 3))

@@ -1,7 +1,8 @@
-"""What the priors share: joint angles checked, and arrays read back from a file."""
+"""What the priors share: checks of settings and joint angles, and arrays in a file."""
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +10,43 @@ from numpy.typing import NDArray
 from posefit.archive import read_arrays
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.fitting.check import at_least
 
 LARGEST = 500_000_000  # bytes of a file, packed and unpacked; a space learned from 200,000 poses has 100 MB
 Shape = tuple[str | int, ...]
+
+
+class Stored:
+    """A prior whose learned arrays are its attributes, by name those of `SHAPES`."""
+
+    SHAPES: ClassVar[Mapping[str, Shape]]
+
+    def arrays(self) -> dict[str, Any]:
+        """Return the learned arrays by name."""
+        return {name: getattr(self, name) for name in self.SHAPES}
+
+    def save(self, path: str | Path) -> None:
+        """Write the learned space to an .npz file."""
+        np.savez(path, **self.arrays())
+
+    @classmethod
+    def load(cls, path: str | Path, prefix: str = "") -> Self:
+        """Return the space that `save` wrote; `prefix` precedes the names of a space within another's file.
+
+        Raises ValueError where the file is not one.
+        """
+        prior, arrays = cls(), load_arrays(path, {prefix + name: shape for name, shape in cls.SHAPES.items()})
+        for name in cls.SHAPES:
+            setattr(prior, name, arrays[prefix + name])
+        return prior
+
+
+def check_clustering(clusters: int, quantile: float, seed: int) -> None:
+    """Return nothing. Raises ValueError where a setting of the clusters makes no sense."""
+    at_least("clusters", clusters, 1)
+    if not 0.0 < quantile <= 1.0:
+        raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
+    at_least("seed", seed, 0)
 
 
 def angles_of(angles: Array, least: int) -> Array:
@@ -38,13 +73,12 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
             kind = "none" if name not in stored else f"one of {stored[name].dtype}"
             raise InputError(f"{path}: expected an .npz file with {', '.join(shapes)}, got {kind} for {name}")
         arrays[name] = np.array(stored[name], dtype=np.float64)
-    sizes: dict[str, int] = {}
+    sizes: dict[str | int, int] = {}
     for name, shape in shapes.items():
         came = arrays[name].shape
-        for letter, size in zip(shape, came, strict=False):
-            if isinstance(letter, str):
-                sizes.setdefault(letter, size)
-        wanted = tuple(sizes.get(one, 0) if isinstance(one, str) else one for one in shape)
+        for side, size in zip(shape, came, strict=False):
+            sizes.setdefault(side, size if isinstance(side, str) else side)
+        wanted = tuple(sizes.get(side, 0) for side in shape)
         if came != wanted or not np.isfinite(arrays[name]).all():
             raise InputError(f"{path}: {name} must be finite and of shape {wanted}, got {came}")
     if "low" in arrays and not (arrays["low"] <= arrays["high"]).all():
@@ -53,7 +87,7 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
 
 
 def indices_of(path: str | Path, name: str, values: Array, count: int) -> NDArray[np.intp]:
-    """Return numbers of a file as indices into so many. Raises ValueError where one is none, or is there twice."""
+    """Return distinct indices from 0 to below `count`. Raises ValueError where numbers of a file are not such."""
     whole = (values == np.round(values)) & (values >= 0.0) & (values < count)
     if not whole.all() or len(np.unique(values)) != len(values):
         raise InputError(f"{path}: {name} must be different whole numbers from 0 to {count - 1}, got others")

@@ -1,7 +1,8 @@
 """The full space: every joint angle that is free, between its limits. No compact space, and no constraint 2."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,10 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, one_of
 from posefit.geometry.skeleton import Skeleton
-from posefit_priors.arrays import Shape, angles_of, indices_of, load_arrays
-
-_SHAPES: dict[str, Shape] = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
+from posefit_priors.arrays import Shape, Stored, angles_of, indices_of
 
 
-class Full:
+class Full(Stored):
     """The joint angles themselves are the latents, those that are free, with a range for each.
 
     An angle without range stays at its training mean and is no latent. Limits are widened where training poses pass
@@ -26,8 +25,11 @@ class Full:
         margin: share of the training range by which it is widened to either side, 0 or more. Ours.
     """
 
+    SHAPES: ClassVar[Mapping[str, Shape]] = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
     low: Array  # (m,) radians
     high: Array  # (m,)
+    angles: NDArray[np.intp]  # (m,) the free ones
+    rest: Array  # (63,) radians: the mean, where the others stay
 
     def __init__(self, *, limits: Literal["asf", "training"] = "asf", margin: float = 0.0) -> None:
         one_of("limits", limits, ("asf", "training"))
@@ -37,7 +39,7 @@ class Full:
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Take the limits from the skeleton, or the range of joint angles (T, 63).
 
-        Raises ValueError where limits are asked for that the skeleton does not state, or where nothing moves.
+        Raises ValueError where the skeleton states no limits, or where nothing moves.
         """
         angles = angles_of(angles, 1)
         low, high = angles.min(axis=0), angles.max(axis=0)
@@ -68,18 +70,12 @@ class Full:
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are poses (n,): the box is the only constraint."""
+        """Return that all latents (n, m) are feasible (n,): the box is the only constraint."""
         return np.ones(len(latents), dtype=bool)
 
-    def save(self, path: str | Path) -> None:
-        """Write the ranges to an .npz file."""
-        np.savez(path, low=self.low, high=self.high, angles=self.angles, rest=self.rest)
-
     @classmethod
-    def load(cls, path: str | Path) -> "Full":
+    def load(cls, path: str | Path, prefix: str = "") -> Self:
         """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        arrays = load_arrays(path, _SHAPES)
-        prior = cls()
-        prior.low, prior.high, prior.rest = arrays["low"], arrays["high"], arrays["rest"]
-        prior.angles = indices_of(path, "angles", arrays["angles"], len(prior.rest)).astype(np.int64)
+        prior = super().load(path, prefix)
+        prior.angles = indices_of(path, "angles", prior.angles, len(prior.rest))
         return prior

@@ -55,10 +55,12 @@ def close(centres, latents, i, reach):
 
 
 @jit
-def near(centres, latents, reach, allowed):
-    """Write which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
+def near(centres, latents, reach):
+    """Return which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
+    allowed = np.empty(latents.shape[0], dtype=np.bool_)
     for i in range(latents.shape[0]):
         allowed[i] = close(centres, latents, i, reach[()])
+    return allowed
 
 
 @jit
@@ -71,9 +73,9 @@ def recover_loose(latents, components, mean, loose, angles):
 
 
 @jit
-def near_and_bearable(latents, components, mean, loose, low, high, centres, reach, allowed):
-    """Write which latents (n, m + k) are near a cluster and bend no loose joint past low and high, but for rounding."""
-    m = components.shape[0]
+def near_within_limits(latents, components, mean, loose, low, high, centres, reach):
+    """Return which latents (n, m + k) are near a cluster with loose joints within low and high, but for rounding."""
+    m, allowed = components.shape[0], np.empty(latents.shape[0], dtype=np.bool_)
     bends = np.empty((loose.size, m))
     for k in range(loose.size):
         for c in range(m):
@@ -87,6 +89,7 @@ def near_and_bearable(latents, components, mean, loose, low, high, centres, reac
                 angle += latents[i, c] * bends[k, c]
             allowed[i] = low[k] - ROUNDING <= angle <= high[k] + ROUNDING
             k += 1
+    return allowed
 
 
 @jit

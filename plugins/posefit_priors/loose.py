@@ -1,7 +1,8 @@
 """Principal components with freedom around them at the limbs: arms may swing as in no training pose."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,19 +11,18 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
-from posefit_priors.arrays import indices_of, load_arrays
-from posefit_priors.kernels import near_and_bearable, recover_loose
+from posefit_priors.arrays import Shape, Stored, indices_of
+from posefit_priors.kernels import near_within_limits, recover_loose
 from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
 
 COMPONENTS = 12
 ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
-SLACK = 1.5  # how many times as far as chi a pose may be from the nearest cluster
+SLACK = 1.5  # times chi: the distance of a pose from the nearest cluster, at most
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
-_SHAPES = {"loose": ("k",), "angles_low": ("k",), "angles_high": ("k",), "low": ("d",), "high": ("d",)}
 
 
-class Loose:
+class Loose(Stored):
     """The space of `pca`, and a latent more for each angle of shoulders, elbows, hips and knees that moves in training.
 
     Such a latent, in radians, is added to the angle that the components give, within the skeleton's joint limits where
@@ -32,12 +32,22 @@ class Loose:
         components (m): a whole number of them, or a share of the variance below 1 to keep at least. As `pca`.
         arms_degrees: how far shoulders and elbows may leave the components to either side, 0 or more. Ours.
         legs_degrees: how far hips and knees may leave them to either side, 0 or more. Ours.
-        slack: a pose may be so many times as far from the clusters as chi, above 0. Ours.
+        slack: times chi, the distance of a pose from the clusters, at most; above 0. Ours.
         clusters (K): centres that K-means finds among the training poses, 1 or more. As `pca`.
         quantile: chi is this quantile of the training distances, above 0 and at most 1. As `pca`.
         seed: of the clustering, 0 or more.
     """
 
+    SHAPES: ClassVar[Mapping[str, Shape]] = {
+        "loose": ("k",),
+        "angles_low": ("k",),
+        "angles_high": ("k",),
+        "low": ("d",),
+        "high": ("d",),
+    }
+    loose: NDArray[np.intp]  # (k,) of the joint angles
+    angles_low: Array  # (k,) radians: their limits
+    angles_high: Array  # (k,)
     low: Array  # (d,)
     high: Array  # (d,)
 
@@ -66,19 +76,19 @@ class Loose:
         angles = np.asarray(angles, dtype=np.float64)
         least, most = angles.min(axis=0), angles.max(axis=0)
         chosen, reach = [], []
-        for bones, reached in zip((ARMS, LEGS), self._reach, strict=True):
+        for bones, bones_reach in zip((ARMS, LEGS), self._reach, strict=True):
             for name in (name for bone in bones for name in both(bone)):
                 first = angle_index(JOINTS.index(name)) - 3
                 moving = [i for i in range(first, first + 3) if most[i] > least[i]]
                 chosen += moving
-                reach += [reached] * len(moving)
+                reach += [bones_reach] * len(moving)
         self.loose = np.array(chosen, dtype=np.intp)
         self.angles_low, self.angles_high = np.full(len(chosen), -np.pi), np.full(len(chosen), np.pi)
         if skeleton is not None and skeleton.limits is not None:
             self.angles_low, self.angles_high = skeleton.limits[self.loose].T.copy()
         self.angles_low = np.minimum(self.angles_low, least[self.loose])
         self.angles_high = np.maximum(self.angles_high, most[self.loose])
-        # as far as a training pose may still go, so that little of the box is past a joint limit
+        # as far as the limits leave room for a training pose, so that little of the box is infeasible
         down = np.minimum(reach, least[self.loose] - self.angles_low)
         up = np.minimum(reach, self.angles_high - most[self.loose])
         left = self.transform(angles)[:, len(self._pca.low) :]
@@ -105,27 +115,20 @@ class Loose:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
-        pca, allowed = self._pca, np.empty(len(latents), dtype=bool)
-        limits = self.angles_low, self.angles_high
-        near_and_bearable(
-            writeable(latents), pca.components, pca.mean, self.loose, *limits, pca.centres, pca.reach, allowed
-        )
-        return allowed
+        pca, limits = self._pca, (self.angles_low, self.angles_high)
+        pose = writeable(latents), pca.components, pca.mean, self.loose
+        return np.asarray(near_within_limits(*pose, *limits, pca.centres, pca.reach))
 
-    def save(self, path: str | Path) -> None:
-        """Write the learned space to an .npz file."""
-        own: dict[str, Any] = {name: getattr(self, name) for name in _SHAPES}
-        np.savez(path, **own, **{f"pca_{name}": value for name, value in self._pca.arrays().items()})
+    def arrays(self) -> dict[str, Any]:
+        """Return the learned arrays by name."""
+        return {**super().arrays(), **{f"pca_{name}": value for name, value in self._pca.arrays().items()}}
 
     @classmethod
-    def load(cls, path: str | Path) -> "Loose":
+    def load(cls, path: str | Path, prefix: str = "") -> Self:
         """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        arrays = load_arrays(path, _SHAPES)
-        prior = cls()
+        prior = super().load(path, prefix)
         prior._pca = PCA.load(path, "pca_")
-        prior.loose = indices_of(path, "loose", arrays["loose"], len(prior._pca.mean))
-        if (wanted := len(prior._pca.low) + len(prior.loose)) != len(arrays["low"]):
-            raise InputError(f"{path}: low must be of shape ({wanted},), got {arrays['low'].shape}")
-        for name in ("angles_low", "angles_high", "low", "high"):
-            setattr(prior, name, arrays[name])
+        prior.loose = indices_of(path, "loose", prior.loose, len(prior._pca.mean))
+        if (wanted := len(prior._pca.low) + len(prior.loose)) != len(prior.low):
+            raise InputError(f"{path}: low must be of shape ({wanted},), got {prior.low.shape}")
         return prior

@@ -1,16 +1,15 @@
 """The compact pose space: principal components, a range, and clusters that mark where poses are. SAPSO section 2."""
 
-from pathlib import Path
-from typing import Any, Self
+from collections.abc import Mapping
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
-from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
-from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.arrays import Shape, Stored, angles_of, check_clustering
 from posefit_priors.clusters import clustered
 from posefit_priors.kernels import distance, near, recover
 
@@ -18,18 +17,37 @@ COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
 DECIMALS = 7  # of what is learned, in radians and shares
 QUANTILE = 0.99  # Interpretation S5: chi is this quantile of the training distances
-_SHAPES = {
+SHAPES: dict[str, Shape] = {
     "mean": (63,),
     "components": ("m", 63),
     "low": ("m",),
     "high": ("m",),
     "centres": ("k", "m"),
-    "reach": (),
-    "explained": ("m",),
 }
 
 
-class PCA:
+class Linear(Stored):
+    """Poses that are a mean and a weighted sum of components."""
+
+    mean: Array  # (63,)
+    components: Array  # (m, 63)
+    low: Array  # (m,)
+    high: Array  # (m,)
+    centres: Array  # (K, m) of clusters
+    reach: Array  # () of a cluster: chi
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
+        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)  # SAPSO 2.1.3 projection
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
+        angles = np.empty((len(latents), len(self.mean)))
+        recover(writeable(latents), self.components, self.mean, angles)
+        return angles
+
+
+class PCA(Linear):
     """Principal components of joint angles with constraint 1, a range, and constraint 2, nearness to a cluster.
 
     Settings:
@@ -39,13 +57,8 @@ class PCA:
         seed: of the clustering, 0 or more.
     """
 
-    mean: Array  # (63,) c
-    components: Array  # (m, 63) rows are U_m transposed
+    SHAPES: ClassVar[Mapping[str, Shape]] = {**SHAPES, "reach": (), "explained": ("m",)}
     explained: Array  # (m,) share of the variance along each component
-    low: Array  # (m,)
-    high: Array  # (m,)
-    centres: Array  # (K, m) cluster centres
-    reach: Array  # () chi
 
     def __init__(
         self,
@@ -56,16 +69,12 @@ class PCA:
         seed: int = 0,
     ) -> None:
         check_components(components)
-        at_least("clusters", clusters, 1)
-        if not 0.0 < quantile <= 1.0:
-            raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
-        at_least("seed", seed, 0)
+        check_clustering(clusters, quantile, seed)
         self._components, self._clusters, self._quantile, self._seed = components, clusters, quantile, seed
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
-        least = int(self._components) + 1 if self._components >= 1 else 2
-        angles = angles_of(angles, max(self._clusters, least))
+        angles = angles_of(angles, max(self._clusters, frames_for(self._components)))
         self.mean = to_decimals(angles.mean(axis=0))  # SAPSO 2.1.1
         self.components, self.explained = principal(angles - self.mean, self._components)
         latents = to_decimals(self.transform(angles))
@@ -75,16 +84,6 @@ class PCA:
         self.reach = reach_of(self.centres, latents, self._quantile)
         return self
 
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
-        return (np.asarray(angles) - self.mean) @ self.components.T  # SAPSO 2.1.3 projection
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
-        angles = np.empty((len(latents), len(self.mean)))
-        recover(writeable(latents), self.components, self.mean, angles)
-        return angles
-
     @property
     def affine(self) -> tuple[Array, Array]:
         """The weights (m, 63) of the latents and the angles (63,) where all of them are 0. SAPSO 2.1."""
@@ -92,31 +91,7 @@ class PCA:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        allowed = np.empty(len(latents), dtype=bool)
-        near(self.centres, writeable(latents), self.reach, allowed)
-        return allowed
-
-    def arrays(self) -> dict[str, Any]:
-        """Return what was learned, by name."""
-        return {name: getattr(self, name) for name in _SHAPES}
-
-    def save(self, path: str | Path) -> None:
-        """Write the learned space to an .npz file."""
-        np.savez(path, **self.arrays())
-
-    @classmethod
-    def load(cls, path: str | Path, prefix: str = "") -> "PCA":
-        """Return the space that `save` wrote. Raises ValueError where the file is not one.
-
-        `prefix` is what stands before the names, where the file holds more than this space.
-        """
-        stored = load_arrays(path, {prefix + name: shape for name, shape in _SHAPES.items()})
-        arrays = {name: stored[prefix + name] for name in _SHAPES}
-        m = len(arrays["components"])
-        prior = cls(components=m, clusters=len(arrays["centres"]))
-        for name, value in arrays.items():
-            setattr(prior, name, value)
-        return prior
+        return np.asarray(near(self.centres, writeable(latents), self.reach))
 
 
 def check_components(components: float) -> None:
@@ -125,12 +100,15 @@ def check_components(components: float) -> None:
         raise InputError(f"components must be a whole number or a share of variance below 1, got {components}")
 
 
+def frames_for(components: float) -> int:
+    """Return the least number of frames for so many components, or for a share of variance."""
+    return int(components) + 1 if components >= 1 else 2
+
+
 def principal(centred: Array, components: float) -> tuple[Array, Array]:
     """Return the principal directions (m, 63) of centred joint angles (T, 63), and each one's share of variance (m,).
 
-    Of either sign that a direction may have, its largest number is above 0.
-
-    Raises ValueError where the frames are too few for so many.
+    The largest number of a direction is above 0. Raises ValueError where there are too few frames.
     """
     most = min(len(centred) - 1, centred.shape[1])
     if most < components:
@@ -146,14 +124,14 @@ def principal(centred: Array, components: float) -> tuple[Array, Array]:
 def to_decimals(numbers: Array) -> Array:
     """Return numbers with seven decimals.
 
-    Libraries of linear algebra differ in the last digits from processor to processor, and a search that follows a track
-    makes degrees of them. Rounded, the same frames give the same space everywhere.
+    Libraries of linear algebra differ in the last digits from processor to processor, and a search makes degrees of
+    them. Rounded, the same frames give the same space everywhere.
     """
     return np.asarray(np.round(numbers, DECIMALS) + 0.0)  # no -0.0
 
 
 def _orthonormal(directions: Array) -> Array:
-    """Return directions (m, 63) that are so but for rounding, to the last digits, without a library's sums."""
+    """Return nearly orthonormal directions (m, 63), orthonormal to the last digits, without a library's sums."""
     kept: list[Array] = []
     for direction in directions:
         for other in kept:

@@ -14,7 +14,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import cut, parsed_json
-from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.arrays import angles_of, check_clustering, load_arrays
 from posefit_priors.clusters import clustered
 from posefit_priors.kernels import near, recover
 from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, reach_of
@@ -24,10 +24,10 @@ DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0
 
 
 class Transformed:
-    """A space that a scikit-learn transformer learns, with the paper's constraints 1 and 2 on its latents.
+    """The space of a scikit-learn transformer, with the paper's constraints 1 and 2 on its latents.
 
-    A linear transformer is inverted by our own loop; any other is asked row by row, about 100 us each, since the same
-    row must always give the same bits.
+    A linear transformer is inverted by our own loop; any other row by row, about 100 us each, since the same row must
+    always give the same bits.
 
     Settings:
         variant: the class, such as KernelPCA; `sklearn:NAME` sets it.
@@ -54,22 +54,22 @@ class Transformed:
         seed: int = 0,
     ) -> None:
         at_least("components", components, 1)
-        at_least("clusters", clusters, 1)
-        if not 0.0 < quantile <= 1.0:
-            raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
-        at_least("seed", seed, 0)
-        self._variant, self._components, self._options = variant, components, options
-        self._clusters, self._quantile, self._seed = clusters, quantile, seed
-        _built(variant, components, options, seed)
+        check_clustering(clusters, quantile, seed)
+        # in the order of a file
+        self._settings = [variant, components, options, clusters, quantile, seed]
+        self._transformer = variant, components, options, seed
+        self._components, self._clusters, self._quantile, self._seed = components, clusters, quantile, seed
+        _built(*self._transformer)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
         self._angles = angles_of(angles, max(self._clusters, self._components + 1))
-        self._model = _built(self._variant, self._components, self._options, self._seed)
+        self._model = _built(*self._transformer)
         self._model.fit(self._angles)
         latents = self.transform(self._angles)
         if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
-            raise InputError(f"variant must give finite latents (n, m), got {latents.shape} from {self._variant}")
+            name = type(self._model).__name__
+            raise InputError(f"variant must give finite latents (n, m), got {latents.shape} from {name}")
         self._linear = _linear(self._model, latents.shape[1])
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)
         self.centres = clustered(latents, self._clusters, self._seed)[0]
@@ -95,14 +95,11 @@ class Transformed:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
-        allowed = np.empty(len(latents), dtype=bool)
-        near(self.centres, writeable(latents), self.reach, allowed)
-        return allowed
+        return np.asarray(near(self.centres, writeable(latents), self.reach))
 
     def save(self, path: str | Path) -> None:
         """Write what the space was learned from to an .npz file; `load` learns it again."""
-        words = [self._variant, self._components, self._options, self._clusters, self._quantile, self._seed]
-        text = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+        text = np.frombuffer(json.dumps(self._settings).encode(), dtype=np.uint8)
         np.savez(path, angles=self._angles, words=text)
 
     @classmethod
@@ -116,7 +113,7 @@ class Transformed:
         try:
             settings = dict(zip(names, parsed_json(letters.astype(np.uint8).tobytes().decode()), strict=True))
             return cls(**settings).fit(arrays["angles"])
-        except Exception as error:  # whatever the transformer trips over, the file is to blame
+        except Exception as error:  # of any transformer
             came = cut(" ".join(str(error).split()))
             raise InputError(f"{path}: expected the settings of a prior, got {came}") from None
 
@@ -125,36 +122,33 @@ def _built(variant: str, components: int, options: str, seed: int) -> Any:
     """Return the transformer. Raises ValueError where there is none of that name, or its parameters are others."""
     kind = _class(variant)
     try:
-        given = json.loads(options)
-        if not isinstance(given, dict):
-            raise TypeError(type(given).__name__)
+        parameters = json.loads(options)
+        if not isinstance(parameters, dict):
+            raise TypeError(type(parameters).__name__)
     except (ValueError, TypeError) as error:
         raise InputError(f"options must be a JSON object, got {options!r} ({error})") from None
     known = kind().get_params()
-    usual = {"n_components": components, "random_state": seed, **DEFAULTS.get(variant, {})}
-    unknown = sorted(set(given) - set(known))
-    if unknown:
+    defaults = {"n_components": components, "random_state": seed, **DEFAULTS.get(variant, {})}
+    if unknown := sorted(set(parameters) - set(known)):
         raise InputError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
-    return kind(**{name: value for name, value in usual.items() if name in known} | given)
+    return kind(**{name: value for name, value in defaults.items() if name in known} | parameters)
 
 
 def _class(variant: str) -> Callable[..., Any]:
-    choices = []
+    known: dict[str, Callable[..., Any]] = {}
     for module in MODULES:
-        home = importlib.import_module(f"sklearn.{module}")
-        for name in home.__all__:
-            kind = getattr(home, name)
-            if isinstance(kind, type) and hasattr(kind, "transform") and _inverts(kind):
-                choices.append(name)
-                if name == variant:
-                    return kind
-    raise InputError(
-        f"variant must be a transformer with an inverse, such as {', '.join(sorted(choices))}, got {variant!r}"
-    )
+        package = importlib.import_module(f"sklearn.{module}")
+        kinds = {name: getattr(package, name) for name in package.__all__}
+        known |= {name: kind for name, kind in kinds.items() if isinstance(kind, type) and _inverts(kind)}
+        if variant in known:
+            return known[variant]
+    choices = ", ".join(sorted(known))
+    raise InputError(f"variant must be a transformer with an inverse, such as {choices}, got {variant!r}")
 
 
 def _inverts(kind: type) -> bool:
-    return hasattr(kind, "inverse_transform") or kind.__name__ == "FactorAnalysis"  # linear, so we can
+    """Return whether a transformer has an inverse, or is linear and needs none."""
+    return hasattr(kind, "transform") and (hasattr(kind, "inverse_transform") or kind.__name__ == "FactorAnalysis")
 
 
 def _linear(model: Any, components: int) -> tuple[Array, Array] | None:
