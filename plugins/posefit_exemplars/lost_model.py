@@ -145,8 +145,8 @@ class FailureClassifier:
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """Return the models that JSON holds."""
-        models = (LogisticModel.from_dict(stored[name]) for name in ("lost", "sides"))
-        return cls(*models, unknown=float(stored["unknown"]))
+        lost, sides = (LogisticModel.from_dict(stored[name]) for name in ("lost", "sides"))
+        return cls(lost, sides, float(stored["unknown"]))
 
 
 @cache

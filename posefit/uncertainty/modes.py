@@ -81,7 +81,8 @@ class Posterior:
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """Return the posterior that `as_dict` gave."""
         corrections = None if stored["recalibration"] is None else Recalibration(**stored["recalibration"])
-        return cls(*(np.array(stored[name]) for name in ARRAYS), stored["coherent"], corrections)
+        arrays = {name: np.array(stored[name]) for name in ARRAYS}
+        return cls(**arrays, coherent=stored["coherent"], recalibration=corrections)
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
