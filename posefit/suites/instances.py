@@ -7,7 +7,7 @@ of three who are in no training data.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
@@ -110,8 +110,16 @@ class _Draft:
         proposals[bad] = np.round(0.999 * proposals[bad], DIGITS)  # rounding moved it out of the ellipsoid
         return np.asarray(proposals)
 
+    @cached_property
+    def body(self) -> Body:
+        """The person's true body."""
+        return _body(recorded.clips([self.subject])[0].skeleton)
+
     def camera(self, azimuth: float, away: tuple[float, float] = NEAR) -> Camera:
         return Camera.around(PLACE, azimuth, away[0], SIZE, away[1])
+
+    def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
+        return Silhouette.of(project(self.body, camera, pose, PLACE))
 
     def made(self, problem: PoseProblem, truth: Array, decoy: Array | None = None) -> SuiteInstance:
         cost = float(problem.evaluate(truth[None])[0])
@@ -123,21 +131,17 @@ def _body(skeleton: Skeleton) -> Body:
     return Body.of(skeleton)
 
 
-def _person(draft: _Draft) -> Body:
-    return _body(recorded.clips([draft.subject])[0].skeleton)
-
-
 def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     """Return a pose of the box, seen from anywhere by one camera or more at right angles."""
-    pose, body, rng = draft.poses()[0], _person(draft), draft.rng
+    pose, rng = draft.poses()[0], draft.rng
     space = draft.space(pose[0] + YAW_OFF * rng.uniform(-1.0, 1.0))
     azimuth = rng.uniform(-np.pi, np.pi)
     pose = _still(draft, pose)
     truth = draft.nearest(space, pose[None])[0]
     cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
     pose = space.decode(truth[None])[0][0]
-    silhouettes = [_silhouette(body, camera, pose) for camera in cameras]
-    return draft.made(PoseProblem(body, cameras, silhouettes, space), truth)
+    silhouettes = [draft.silhouette(camera, pose) for camera in cameras]
+    return draft.made(PoseProblem(draft.body, cameras, silhouettes, space), truth)
 
 
 def _still(draft: _Draft, pose: Array) -> Array:
@@ -154,14 +158,14 @@ def _still(draft: _Draft, pose: Array) -> Array:
 
 def _next_frame(draft: _Draft) -> SuiteInstance:
     """Return the third of three poses of a track, as the box holds them, with a start where the first two lead."""
-    poses, body, rng = draft.poses(3), _person(draft), draft.rng
+    poses, rng = draft.poses(3), draft.rng
     space = draft.space(float(poses[1, 0]) + 0.25 * YAW_OFF * rng.uniform(-1.0, 1.0))
     camera = draft.camera(rng.uniform(-np.pi, np.pi))
     before, last, truth = draft.nearest(space, poses)
     step, pose = last - before, space.decode(truth[None])[0][0]
     mean = draft.nearest(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[0]
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
-    return draft.made(PoseProblem(body, [camera], [_silhouette(body, camera, pose)], space), truth)
+    return draft.made(PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space), truth)
 
 
 def _corrupted(draft: _Draft) -> SuiteInstance:
@@ -186,13 +190,13 @@ def _ambiguous(draft: _Draft) -> SuiteInstance:
     """
     best, least = None, np.inf
     for _ in range(ATTEMPTS):
-        pose, body, rng = draft.poses()[0], _person(draft), draft.rng
+        pose, body, rng = draft.poses()[0], draft.body, draft.rng
         space = draft.space(pose[0] + 0.5 * YAW_OFF * rng.uniform(-1.0, 1.0))
         side = rng.choice([-1.0, 1.0]) * 0.5 * np.pi + np.radians(10.0) * rng.uniform(-1.0, 1.0)
         camera = draft.camera(pose[0] + side, FAR)
         truth = draft.nearest(space, pose[None])
         true_pose = space.decode(truth)[0]
-        problem = PoseProblem(body, [camera], [_silhouette(body, camera, true_pose[0])], space)
+        problem = PoseProblem(body, [camera], [draft.silhouette(camera, true_pose[0])], space)
         decoy = draft.nearest(space, wrapped(reflected_poses(body.skeleton, true_pose, facing(camera, PLACE))))
         joints = body.skeleton.joints(np.concatenate([true_pose, space.decode(decoy)[0]]), np.zeros((2, 3)))
         cost = float(problem.evaluate(decoy)[0])
@@ -212,10 +216,6 @@ def _aligned(draft: _Draft) -> SuiteInstance:
     return draft.made(
         replace(made.posed, space=replace(made.posed.space, anchor=anchor, translation="aligned")), made.truth
     )
-
-
-def _silhouette(body: Body, camera: Camera, pose: Array) -> Silhouette:
-    return Silhouette.of(project(body, camera, pose, PLACE))
 
 
 _MAKERS: dict[int, Callable[[_Draft], SuiteInstance]] = {

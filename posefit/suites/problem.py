@@ -18,7 +18,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.box import Space, Start, draw_population
+from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import one_of, positive, whole
 from posefit.reading import parsed_json, quoted
 from posefit.suites.functions import (
@@ -84,6 +84,17 @@ class Problem:
             positive("seconds", seconds)
         self.suite, self.function, self.made, self.index = suite, function, made, index
         self.infeasible, self.budget, self._limit = infeasible, budget, seconds
+        self.id_function = function.number
+        self.instance = self.id_instance = made.number
+        self.dimension = self.number_of_variables = d = len(made.truth)
+        # without blanks, as in posefit-2026.1_f001_i00017_d09; and in words
+        self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
+        self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
+        self.space: Space = made.posed.space  # as posefit's own optimisers take it: `factory(problem.space, rng)`
+        self.start = self.space.start  # the predicted start of the search, with its spread; None without a prediction
+        # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
+        self.optimum = 0.0 if function.exact else None
+        self.truth_cost = made.truth_cost  # of the true pose, which is in the box and feasible
         self.evaluations = 0
         self.best_observed_fvalue1 = np.inf
         self._best: Array | None = None
@@ -108,42 +119,6 @@ class Problem:
         return self.made.repaired(self._checked(proposals).reshape(-1, self.dimension))
 
     @property
-    def space(self) -> Space:
-        """The box as posefit's own optimisers take it: `factory(problem.space, rng)`."""
-        return self.made.posed.space
-
-    @property
-    def dimension(self) -> int:
-        """d."""
-        return len(self.made.truth)
-
-    number_of_variables = dimension
-
-    @property
-    def instance(self) -> int:
-        """The instance's number."""
-        return self.made.number
-
-    id_instance = instance
-
-    @property
-    def id_function(self) -> int:
-        """The function's number."""
-        return self.function.number
-
-    @property
-    def id(self) -> str:
-        """Return the problem's name without blanks, as in `posefit-2026.1_f001_i00017_d09`."""
-        return f"{self.suite}_f{self.function.number:03d}_i{self.instance:05d}_d{self.dimension:02d}"
-
-    @property
-    def name(self) -> str:
-        """The problem's name in words."""
-        return (
-            f"{self.suite} f{self.function.number} {self.function.name}, instance {self.instance} in {self.dimension}D"
-        )
-
-    @property
     def lower_bounds(self) -> Array:
         """-1 (d,)."""
         return np.full(self.dimension, -1.0)
@@ -152,11 +127,6 @@ class Problem:
     def upper_bounds(self) -> Array:
         """1 (d,)."""
         return np.ones(self.dimension)
-
-    @property
-    def start(self) -> Start | None:
-        """The predicted start of the search, with its spread; None without a prediction."""
-        return self.space.start
 
     @property
     def initial_solution(self) -> Array:
@@ -169,16 +139,6 @@ class Problem:
             return self.initial_solution
         drawn: Array = draw_population(self.space, np.random.default_rng([self.instance, restart]), 1)[0]
         return drawn
-
-    @property
-    def optimum(self) -> float | None:
-        """The lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown."""
-        return 0.0 if self.function.exact else None
-
-    @property
-    def truth_cost(self) -> float:
-        """The cost of the true pose, which is in the box and feasible."""
-        return self.made.truth_cost
 
     @property
     def best_known(self) -> float:
