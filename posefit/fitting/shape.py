@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,57 +96,45 @@ def fit_shape(
     cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. `spread`
     is bootstrapped: it comes from `resamples` fits to frames drawn with replacement.
     """
-    factors = np.ones(len(NAMES))
-    base = body
-    for k in range(ROUNDS):
-        frames = follow(shaped(base, factors, height))
-        fitted = _Frames(base, cameras, observations, frames, height, aligned)
-        factors = fitted.search(factors, np.arange(len(observations)), rng, first=k == 0)
-    drawn = [
-        fitted.search(factors, rng.integers(len(observations), size=len(observations)), rng) for _ in range(resamples)
-    ]
-    cost = fitted.cost(factors, np.arange(len(observations)))
-    return Shape(shaped(base, factors, height), factors, np.std(drawn, axis=0), cost, height)
+    everything = np.arange(len(observations))
 
-
-@dataclass(frozen=True, eq=False)
-class _Frames:
-    """Frames whose poses are held while the body is sought."""
-
-    base: Body
-    cameras: Sequence[Camera]
-    observations: Sequence[Observation]
-    frames: Sequence[Frame]
-    height: float | None
-    aligned: bool
-
-    def cost(self, factors: Array, chosen: NDArray[np.int64]) -> float:
-        """Return the mean mismatch over the chosen frames."""
-        body, total = shaped(self.base, factors, self.height), 0.0
+    def cost(factors: Array, chosen: NDArray[np.int64]) -> float:
+        """Return the mean mismatch over the chosen frames, whose poses are held."""
+        tried, total = shaped(body, factors, height), 0.0
         for k in chosen.tolist():
-            pose, translation = self.frames[k].pose[None], self.frames[k].translation[None]
-            silhouettes = self.observations[k].silhouettes
-            if self.aligned:
-                translation = align(body, self.cameras, silhouettes, pose, translation)
-            for camera, silhouette in zip(self.cameras, silhouettes, strict=True):
-                total += float(mismatch(areas(body, camera, silhouette, pose, translation))[0])
-        return total / (len(chosen) * len(self.cameras))
+            pose, translation = frames[k].pose[None], frames[k].translation[None]
+            silhouettes = observations[k].silhouettes
+            if aligned:
+                translation = align(tried, cameras, silhouettes, pose, translation)
+            for camera, silhouette in zip(cameras, silhouettes, strict=True):
+                total += float(mismatch(areas(tried, camera, silhouette, pose, translation))[0])
+        return total / (len(chosen) * len(cameras))
 
-    def search(
-        self, start: Array, chosen: NDArray[np.int64], rng: np.random.Generator, *, first: bool = False
-    ) -> Array:
-        """Return the factors (17,) that fit the chosen frames best, by CMA-ES in spreads of their logarithms."""
-        mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
-        population = default_population_size(len(NAMES))
-        strategy = Strategy(mean, np.full(len(NAMES), WIDTH if first else NEAR), population)
-        best, least = mean, np.inf
-        for _ in range(GENERATIONS if first else AGAIN):
-            asked = _within_reach(strategy, rng, population)
-            costs = np.array([self.cost(np.exp(SPREAD * one), chosen) + PULL * float(one @ one) for one in asked])
-            if costs.min() < least:
-                best, least = asked[costs.argmin()], costs.min()
-            strategy.learn(asked, costs)
-        return np.asarray(np.exp(SPREAD * best))
+    factors = np.ones(len(NAMES))
+    for k in range(ROUNDS):
+        frames = follow(shaped(body, factors, height))
+        factors = _search(partial(cost, chosen=everything), factors, rng, first=k == 0)
+    samples = []
+    for _ in range(resamples):
+        chosen = rng.integers(len(observations), size=len(observations))
+        samples.append(_search(partial(cost, chosen=chosen), factors, rng))
+    spread = np.std(samples, axis=0)
+    return Shape(shaped(body, factors, height), factors, spread, cost(factors, everything), height)
+
+
+def _search(cost: Callable[[Array], float], start: Array, rng: np.random.Generator, *, first: bool = False) -> Array:
+    """Return the factors (17,) of least cost, by CMA-ES in spreads of their logarithms."""
+    mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
+    population = default_population_size(len(NAMES))
+    strategy = Strategy(mean, np.full(len(NAMES), WIDTH if first else NEAR), population)
+    best, least = mean, np.inf
+    for _ in range(GENERATIONS if first else AGAIN):
+        asked = _within_reach(strategy, rng, population)
+        costs = np.array([cost(np.exp(SPREAD * point)) + PULL * float(point @ point) for point in asked])
+        if costs.min() < least:
+            best, least = asked[costs.argmin()], costs.min()
+        strategy.learn(asked, costs)
+    return np.asarray(np.exp(SPREAD * best))
 
 
 def _within_reach(strategy: Strategy, rng: np.random.Generator, count: int) -> Array:
