@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace
 from posefit.arrays import Array
-from posefit.fitting.check import finite_number, whole
+from posefit.fitting.check import whole
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
@@ -304,12 +304,6 @@ def row_of(observations: Any, i: int) -> Any:
     return {name: one[i] for name, one in observations.items()} if isinstance(observations, dict) else observations[i]
 
 
-def check_budget(target_cost: float, name: str, evaluations: int) -> None:
-    """Return nothing. Raises ArgumentError where a number is not what it must be."""
-    checked(finite_number, "target_cost", target_cost)
-    checked(whole, name, evaluations, 2)
-
-
 def image_spaces(world: World) -> tuple[Box, Box]:
     """Return the space of a world's proposals, and that of its pictures."""
     width, height = world.size
@@ -328,20 +322,17 @@ def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
 
     A name that `others` has too has those values where the mask is false.
     """
-    everywhere, nowhere = bool(mask.all()), not mask.any()
+    everywhere, somewhere = bool(mask.all()), bool(mask.any())
     infos: Infos = {}
     for name, value in values.items():
-        if name in others:
-            infos[f"_{name}"] = np.ones(len(mask), dtype=bool)
-        elif nowhere:
+        if name not in others and not somewhere:
             continue
-        else:
-            infos[f"_{name}"] = mask.copy()
-        if everywhere or others.get(name) is value:
+        infos[f"_{name}"] = np.ones_like(mask) if name in others else mask.copy()
+        other = others.get(name, 0)
+        if everywhere or other is value:
             infos[name] = value
         else:
-            shape = (-1, *[1] * (value.ndim - 1))
-            infos[name] = np.where(mask.reshape(shape), value, others.get(name, np.zeros_like(value)))
+            infos[name] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, other)
     return infos
 
 
@@ -364,7 +355,7 @@ def _chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int
     chosen = options.get("instance") if options else None
     if chosen is None:
         return [None] * count
-    if isinstance(chosen, int | np.integer) or not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
+    if not isinstance(chosen, Sequence | np.ndarray) or isinstance(chosen, str):
         return [instance_number(chosen)] * count
     if (isinstance(chosen, np.ndarray) and chosen.ndim != 1) or len(chosen) != count:
         raise ArgumentError(f"instance must be one number or {count}, one for each environment, got {quoted(chosen)}")

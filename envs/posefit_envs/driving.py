@@ -30,52 +30,44 @@ class EnvObjective:
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any], dtype: Any) -> None:
-        self._env, self._dtype = env, dtype
-        bare: Any = env.unwrapped
+        bare = env.unwrapped
         if not isinstance(bare, FitImageEnv | FitImageVectorEnv | FitStateEnv | FitStateVectorEnv):
             raise error.Error(f"env must be posefit/FitImage-v0 or FitState-v0, got {type(bare).__name__}")
-        self._bare = bare
-        self.count = env.num_envs if isinstance(env, VectorEnv) else 1
-        self._with_step = isinstance(bare, FitStateEnv | FitStateVectorEnv)
-        self._numbers: list[int] = []
+        self._env, self._bare, self._dtype = env, bare, dtype
+        self._vector = isinstance(env, VectorEnv)
+        self._count = env.num_envs if isinstance(env, VectorEnv) else 1
+        self._instances: Any = None
 
-    def begin(self, seed: int, instance: int | Sequence[int] | None) -> list[int]:
-        """Reset with an instance for all or for each, or with random ones; return their numbers."""
-        options = {} if instance is None else {"options": {"instance": instance}}
-        _, info = self._env.reset(seed=seed, **options)
-        self._numbers = np.atleast_1d(info["instance"]).tolist()
-        return self._numbers
-
-    def spaces(self) -> list[SearchSpace]:
-        """Return the space that each environment searches."""
+    def begin(self, seed: int, instance: int | Sequence[int] | None) -> list[SearchSpace]:
+        """Reset with an instance for all or for each, or with random ones; return the space that each searches."""
+        _, info = self._env.reset(seed=seed, options={"instance": instance})
+        self._instances = info["instance"]
         bare = self._bare
         return [bare.search_space] if isinstance(bare, FitImageEnv | FitStateEnv) else bare.search_spaces
+
+    @property
+    def instances(self) -> list[int]:
+        """The number of each environment's instance."""
+        numbers: list[int] = np.atleast_1d(self._instances).tolist()
+        return numbers
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
         actions = proposals.astype(self._dtype)
-        if self._with_step:
+        if isinstance(self._bare, FitStateEnv | FitStateVectorEnv):
             actions = np.append(actions, np.full((len(actions), 1), WHOLE_WAY, dtype=self._dtype), axis=1)
-        if not isinstance(self._env, VectorEnv):
-            _, _, ended, cut, info = self._env.step(actions[0])
-            if ended or cut:
-                self._env.reset(options={"instance": self._numbers[0]})
-            return np.array([info["cost"]])
-        _, _, terminated, truncated, infos = self._env.step(actions)
-        costs: Array = np.array(infos["cost"])
-        done = np.asarray(terminated) | np.asarray(truncated)
+        _, _, terminated, truncated, infos = self._env.step(actions if self._vector else actions[0])
+        costs, done = np.array(infos["cost"]), np.logical_or(terminated, truncated)
         if done.any():
-            self._env.reset(options={"reset_mask": done, "instance": self._numbers})
-        return costs
+            mask = {"reset_mask": done} if self._vector else {}
+            self._env.reset(options={"instance": self._instances, **mask})
+        return np.atleast_1d(costs)
 
     def costs(self, proposals: Array) -> Array:
         """Return the costs (m,) of any number of proposals (m, d), in environments of one instance."""
-        costs = np.empty(len(proposals))
-        for first in range(0, len(proposals), self.count):
-            rows = proposals[first : first + self.count]
-            filling = np.repeat(rows[-1:], self.count - len(rows), axis=0)
-            costs[first : first + self.count] = self.step(np.concatenate([rows, filling]))[: len(rows)]
-        return costs
+        filling = np.repeat(proposals[-1:], -len(proposals) % self._count, axis=0)
+        turns = np.concatenate([proposals, filling]).reshape(-1, self._count, proposals.shape[1])
+        return np.concatenate([self.step(turn) for turn in turns])[: len(proposals)]
 
 
 def drive(
@@ -98,11 +90,11 @@ def drive(
     budget does not hold one population, and where the environments have several instances: `drive_each` is for those.
     """
     objective = EnvObjective(env, dtype)
-    numbers = objective.begin(seed, instance)
+    space, numbers = objective.begin(seed, instance)[0], objective.instances
     if len(set(numbers)) > 1:
         raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
     if isinstance(optimiser, str):
-        optimiser = _optimiser(objective.spaces()[0], optimiser, seed, evaluations, settings)
+        optimiser = _optimiser(space, optimiser, seed, evaluations, settings)
     try:
         return minimise(objective.costs, optimiser, evaluations, budget_known=True)
     except BudgetError as mistake:
@@ -126,10 +118,9 @@ def drive_each(
     gymnasium.error.Error as `drive` does.
     """
     objective = EnvObjective(env, dtype)
-    objective.begin(seed, instances)
     searches = [
         _stepwise(_optimiser(space, optimiser, seed + i, evaluations, settings), evaluations)
-        for i, space in enumerate(objective.spaces())
+        for i, space in enumerate(objective.begin(seed, instances))
     ]
     proposals = np.stack([next(search) for search in searches])
     minima: dict[int, Minimum] = {}

@@ -6,16 +6,9 @@ import numpy as np
 
 from posefit import PoseProblem
 from posefit.arrays import Array
-from posefit_envs.base import (
-    Flags,
-    Infos,
-    Outcome,
-    SearchEnv,
-    SearchVectorEnv,
-    check_budget,
-    image_spaces,
-)
-from posefit_envs.instance import Episode, Image, first_episode
+from posefit.fitting.check import finite_number, whole
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
+from posefit_envs.instance import Episode, Image, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Evaluation, Rows
 
@@ -34,7 +27,8 @@ class FitImageVectorEnv(SearchVectorEnv):
         max_evaluations: int = MAX_EVALUATIONS,
         **arguments: Any,
     ) -> None:
-        check_budget(target_cost, "max_evaluations", max_evaluations)
+        checked(finite_number, "target_cost", target_cost)
+        checked(whole, "max_evaluations", max_evaluations, 2)
         super().__init__(num_envs, image_spaces, **arguments)
         self._target, self._budget = float(target_cost), int(max_evaluations)
         self._best = np.full(num_envs, np.inf)

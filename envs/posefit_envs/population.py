@@ -10,6 +10,7 @@ from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space, displacement, draw_population, fold, repair, sample_normal
 from posefit_envs.instance import World, first_episode
 from posefit_envs.scales import log_cost, scaled, unscaled
+from posefit_envs.stage import Rows
 from posefit_swarm.sapso import COOLING
 from posefit_swarm.swarm import INERTIA as SAPSO_INERTIA
 from posefit_swarm.swarm import SwarmState, inertia, speed_limits
@@ -33,7 +34,6 @@ ELITE_SHARE = 0.5  # of the bests, which a normal distribution is estimated from
 MIN_SPREAD, MAX_SPREAD = 1e-3, 1.0  # deviations of bests, in half-ranges, that show as 0 and 1
 INSTANCE_FEATURES, PROGRESS_FEATURES = 9, 16
 
-Rows = NDArray[np.int64]
 State = NDArray[np.float32]
 
 
@@ -285,8 +285,7 @@ def progress_features(population: Population) -> Array:
 
 def observed_state(features: Array, population: Population) -> State:
     """Return the observation (25,) of an instance's features and a search."""
-    state: State = np.clip(np.concatenate([features, progress_features(population)]), 0.0, 1.0).astype(np.float32)
-    return state
+    return np.asarray(np.clip([*features, *progress_features(population)], 0.0, 1.0), dtype=np.float32)
 
 
 def _log_scaled(spread: float) -> float:

@@ -8,7 +8,7 @@ from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
 from posefit.fitting.tracker import Follower, Prediction
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, check_budget, image_spaces
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
 from posefit_envs.instance import Episode, Image, Instance, checked, instance
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Evaluation, Rows
@@ -30,7 +30,7 @@ class TrackVectorEnv(SearchVectorEnv):
         evaluations_per_frame: int = EVALUATIONS,
         **arguments: Any,
     ) -> None:
-        check_budget(0.0, "evaluations_per_frame", evaluations_per_frame)
+        checked(whole, "evaluations_per_frame", evaluations_per_frame, 2)
         checked(whole, "frames", frames, 1)
         super().__init__(num_envs, image_spaces, **arguments)
         self._frame_count, self._budget = int(frames), int(evaluations_per_frame)

@@ -190,9 +190,16 @@ class Follower:
         centre = np.array([task.yaw or 0.0, 0.0, 0.0])
         if self._tilt is not None:  # the first frame looks at all tilts
             centre[1:], reach[1:] = self._tilt.around(np.zeros(2), np.full(2, np.inf))
-        limits = np.array(prediction.translation_range)
-        how = {"tilt": self._tilt, "root_order": prediction.root_order}
-        self._space = SearchSpace(prior, centre, reach, task.anchor, task.translation, limits, **how)
+        self._space = SearchSpace(
+            prior,
+            centre,
+            reach,
+            task.anchor,
+            task.translation,
+            np.array(prediction.translation_range),
+            tilt=self._tilt,
+            root_order=prediction.root_order,
+        )
         earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
         self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
 
