@@ -107,7 +107,7 @@ def tangent(state: Array) -> Array:
 
 def inverse_tangent(state: Array) -> Array:
     """Return how the error of a state (43,) changes with its numbers: (33, 43)."""
-    return tangent(state).T * np.repeat([1.0, 4.0], [3, STATE - 3])
+    return np.asarray(tangent(state).T * np.repeat([1.0, 4.0], [3, STATE - 3]))
 
 
 def lifted(state: Array, covariance: Array) -> Array:

@@ -65,7 +65,7 @@ def test_the_figures_are_drawn(tmp_path: Path, experiment: PatentTrack) -> None:
 def test_reproduce_prints_both_presets() -> None:
     result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1"])
     assert result.exit_code == 0
-    for words in ("\ndefault ", "\npatent ", "\nimm_all_six ", "\ndegrees ahead ", "\nlabels, patent "):
+    for words in ("default  patent  imm_all_six", "\nthe right model ", "\ndegrees ahead ", "\nlabels, patent "):
         assert words in result.stdout
 
 

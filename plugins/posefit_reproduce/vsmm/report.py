@@ -15,30 +15,42 @@ from posefit_reproduce.jobs import Progress
 from posefit_reproduce.vsmm.activities import ACTIVITIES, film_of
 from posefit_reproduce.vsmm.experiment import SHOWN, WORKERS, repeat_patent
 
-_COLUMNS = (
-    ("elbow_detected_cm", "elbow det.", 1),
-    ("hand_detected_cm", "hand det.", 1),
-    ("elbow_cm", "elbow cm", 1),
-    ("hand_cm", "hand cm", 1),
-    ("elbow_3d_cm", "elbow 3D", 1),
-    ("hand_3d_cm", "hand 3D", 1),
-    ("mpjpe_mm", "MPJPE mm", 0),
-    ("error_degrees", "degrees", 2),
+_FIGURES = (
+    ("elbow_detected_cm", "elbow to the detected, cm", 1),
+    ("hand_detected_cm", "hand to the detected, cm", 1),
+    ("elbow_cm", "elbow to the truth, cm", 1),
+    ("hand_cm", "hand to the truth, cm", 1),
+    ("elbow_3d_cm", "elbow in space, cm", 1),
+    ("hand_3d_cm", "hand in space, cm", 1),
+    ("mpjpe_mm", "MPJPE, mm", 0),
+    ("error_degrees", "error, degrees", 2),
     ("iou", "IoU", 2),
-    ("dominant_fraction", "a model", 2),
-    ("right_model_fraction", "right model", 2),
-    ("right_group_fraction", "right group", 2),
-    ("restarts", "restarts", 1),
+    ("dominant_fraction", "a model dominates", 2),
+    ("right_model_fraction", "the right model", 2),
+    ("right_group_fraction", "the right group", 2),
+    ("switch_delay_frames", "longest delay, frames", 1),
     ("activations", "activations", 1),
-    ("wrong_activations", "wrong act.", 1),
-    ("wrong_terminations", "wrong term.", 1),
+    ("wrong_activations", "wrong activations", 1),
+    ("wrong_terminations", "wrong terminations", 1),
+    ("restarts", "restarts of all models", 1),
+    ("activity_accuracy", "right activity label", 2),
+    ("chance", "by chance", 2),
+    ("filter_ms", "filter, ms", 2),
+    ("detection_ms", "detection, ms", 2),
+    ("frame_ms", "frame, ms", 2),
+)
+_CHANGES = (
+    ("worse_mm", "worse by mm", 1),
+    ("worse_films", "films", 0),
+    ("mpjpe_mm", "MPJPE", 0),
+    ("error_degrees", "degrees", 2),
+    ("elbow_cm", "elbow", 1),
+    ("hand_cm", "hand", 1),
+    ("right_model_fraction", "model", 2),
+    ("right_group_fraction", "group", 2),
     ("switch_delay_frames", "delay", 1),
-    ("activity_accuracy", "label", 2),
-    ("filter_ms", "filter ms", 2),
-    ("detection_ms", "detect ms", 1),
+    ("activations", "activations", 1),
     ("frame_ms", "frame ms", 1),
-    ("worse_mm", "worse mm", 1),
-    ("worse_films", "worse films", 0),
 )
 _KEYS = ("still_1", "identity_1", "zero_1", "still_10", "identity_10", "zero_10")
 
@@ -70,22 +82,24 @@ def patent_report(
 
 
 def patent_text(figures: Mapping[str, Any]) -> str:
-    """Return the figures as tables: a column a method, the means over seeds; a row a model; a row an activity."""
+    """Return the figures as tables: means over seeds, the models' predictions, and the labels of activities."""
     methods = figures["methods"]
-    shown = [column for column in _COLUMNS if any(column[0] in row for row in methods.values())]
+    compared = {name: row for name, row in methods.items() if "worse_mm" not in row}
     parts = [
         _table(
             f"seeds: {figures['seeds']}",
-            [label for _, label, _ in shown],
-            {
-                name: [f"{row[key]:.{digits}f}" if key in row else "-" for key, _, digits in shown]
-                for name, row in methods.items()
-            },
-        )
+            list(compared),
+            {label: [_cell(row, key, digits) for row in compared.values()] for key, label, digits in _FIGURES},
+        ),
+        "the patent: elbow and hand to the detected 2.7 to 5.2 cm, filter 100 ms, detection 1000 ms",
     ]
-    parts.append(
-        "the patent: elbow and hand 2.7 to 5.2 cm against the detected joints, filter 100 ms, detection 1000 ms"
-    )
+    changed = {
+        name: [_cell(row, key, digits) for key, _, digits in _CHANGES]
+        for name, row in methods.items()
+        if name not in compared
+    }
+    if changed:
+        parts.append(_table("against default", [label for _, label, _ in _CHANGES], changed))
     rows = {name: [f"{report[key]:.2f}" for key in _KEYS] for name, report in figures["prediction_degrees"].items()}
     labels = ["still, 1", "default, 1", "patent, 1", "still, 10", "default, 10", "patent, 10"]
     parts.append(_table("degrees ahead", labels, rows))
@@ -97,6 +111,10 @@ def patent_text(figures: Mapping[str, Any]) -> str:
         }
         parts.append(_table(f"labels, {preset}", [*(activity.label for activity in ACTIVITIES), "a jump"], rows))
     return "\n\n".join(parts)
+
+
+def _cell(row: Mapping[str, Any], key: str, digits: int) -> str:
+    return f"{row[key]:.{digits}f}" if key in row else "-"
 
 
 def _table(corner: str, labels: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
