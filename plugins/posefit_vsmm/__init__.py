@@ -10,7 +10,8 @@ models knows what the person does: walking, arms held out, jumping jacks, jumps,
 - 6: `measurement`, what cameras measure of a state (6.1), and `imm`, the filter.
 - 7 to 9: `switching`, when a group comes into force and when it goes.
 
-`tracker` is `vsmm`, from its settings to a frame; `joined` leads a swarm by the models. `kernels` has the loops.
+`settings` has the patent's letter beside ours. `tracker` is `vsmm`, from its settings to a frame; `joined` leads a
+swarm by the models. `kernels` has the loops.
 
 >>> import posefit
 >>> track = posefit.track("jacks", method="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0)
