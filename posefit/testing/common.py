@@ -25,11 +25,12 @@ class PluginCase:
 
 def duplicates(plugin: Any) -> dict[str, Any]:
     """Return a deep copy of a plugin, and what comes out of its pickle."""
+    ways: dict[str, Callable[[Any], Any]] = {
+        "a deep copy": copy.deepcopy,
+        "a pickle": lambda original: pickle.loads(pickle.dumps(original)),
+    }
     made = {}
-    for what, duplicate in (
-        ("a deep copy", copy.deepcopy),
-        ("a pickle", lambda original: pickle.loads(pickle.dumps(original))),
-    ):
+    for what, duplicate in ways.items():
         try:
             made[what] = duplicate(plugin)
         except Exception as error:

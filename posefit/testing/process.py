@@ -82,8 +82,8 @@ def _blame(last: dict[str, Any], end: dict[str, Any]) -> str:
     return f"it must not end the program, got {how}"
 
 
-def _check() -> None:
-    """Check what standard input asks for, and end this process."""
+def _check() -> int:
+    """Check what standard input asks for, and end this process; return 0 where there is nothing to check."""
     faulthandler.enable()
     out = os.fdopen(_stdout_kept_apart(), "w", encoding="utf-8")
     task = json.load(sys.stdin)
@@ -97,7 +97,8 @@ def _check() -> None:
     try:
         label, checks = _checks(task["kind"], task["name"], task["settings"], task["only"])
     except (ValueError, ImportError) as mistake:
-        return send(mistake=str(mistake))
+        send(mistake=str(mistake))
+        return 0
     send(checks=[check.name for check in checks], label=label)
     done: list[Result] = []
     with memory(GIGABYTES):

@@ -55,8 +55,8 @@ def _angles(label: str, joints: list[list[float]], errors: str = "") -> str:
 def _lines_2(report: dict[str, Any]) -> Iterator[str]:
     yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours; free: over the"
     yield "angles that move; wrong: runs that err more than the mean pose"
-    heads = ("paper", "spread", "s", "ours", "free", "worst", "spread", "s", "skill", "swapped", "lost", "wrong")
-    heads = (*heads, "evaluations")
+    heads: tuple[str, ...] = ("paper", "spread", "s", "ours", "free", "worst", "spread", "s", "skill")
+    heads += ("swapped", "lost", "wrong", "evaluations")
     for motion, rows in report["table_2"].items():
         yield f"{LABELS[motion]:39}" + "".join(f"{head:>{12 if head == 'evaluations' else 8}}" for head in heads)
         for name, one in rows.items():
