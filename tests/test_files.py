@@ -5,7 +5,9 @@ import json
 import os
 import subprocess
 import sys
-from threading import Barrier, Thread
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from threading import Barrier
 
 import pytest
 
@@ -22,11 +24,18 @@ from posefit.files import (
 )
 
 MARK = b"<!-- ours -->"
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 NEW = pytest.mark.parametrize("opened", [new_folder, new_file])
 
 
 def write(building, text="a"):
     (building / "a" if building.is_dir() else building).write_text(text)
+
+
+def fail(opening, error):
+    with opening as building:
+        write(building)
+        raise error
 
 
 @NEW
@@ -41,27 +50,15 @@ def test_a_name_appears_when_its_content_is_whole(tmp_path, opened):
 
 
 @NEW
-@pytest.mark.parametrize(
-    ("error", "raised", "message"),
-    [
+def test_a_failure_leaves_nothing(tmp_path, opened):
+    for error, raised, message in (
         (RuntimeError("no"), RuntimeError, "no"),
         (KeyboardInterrupt("stop"), KeyboardInterrupt, "stop"),
-        (
-            OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)),
-            ValueError,
-            "out: expected a place to write to, got No space left on device",
-        ),
-    ],
-)
-def test_a_failure_leaves_nothing(tmp_path, opened, error, raised, message):
-    def fail():
-        with opened(tmp_path / "out") as building:
-            write(building)
-            raise error
-
-    with pytest.raises(raised, match=message):
-        fail()
-    assert list(tmp_path.iterdir()) == []
+        (FULL, ValueError, "out: expected a place to write to, got No space left on device"),
+    ):
+        with pytest.raises(raised, match=message):
+            fail(opened(tmp_path / "out"), error)
+        assert list(tmp_path.iterdir()) == []
 
 
 @NEW
@@ -86,29 +83,23 @@ def test_a_folder_that_a_killed_run_left_is_neither_in_the_way_nor_removed(tmp_p
     assert (tmp_path / ".out.partial" / "old").read_text() == "old"
 
 
-def test_no_link_is_followed_and_none_removed(tmp_path):
-    for fails in [False, True]:
-        for opened in [new_file, lambda path: replaced_file(path, MARK)]:
-            folder_of_case = tmp_path / str(len(list(tmp_path.iterdir())))
-            folder_of_case.mkdir()
-            theirs = folder_of_case / "theirs"
-            theirs.write_text("theirs")
-            for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html"):
-                (folder_of_case / name).symlink_to(theirs)
-            before = sorted(folder_of_case.iterdir())
-            try:
-                with opened(folder_of_case / "out.html") as building:
-                    assert not building.is_symlink()
-                    building.write_text("mine")
-                    if fails:
-                        raise RuntimeError
-            except RuntimeError:
-                pass
-            assert theirs.read_text() == "theirs"
-            assert sorted(folder_of_case.iterdir()) == sorted(
-                [*before, *([] if fails else [folder_of_case / "out.html"])]
-            )
-            assert all((folder_of_case / name).is_symlink() for name in (".out.partial", ".out.html"))
+@pytest.mark.parametrize("opened", [new_file, lambda path: replaced_file(path, MARK)])
+@pytest.mark.parametrize("error", [nullcontext(), pytest.raises(RuntimeError)])
+def test_no_link_is_followed_and_none_removed(tmp_path, opened, error):
+    theirs = tmp_path / "theirs"
+    theirs.write_text("theirs")
+    links = [tmp_path / name for name in (".out.partial", ".out.partial.html", ".out.html.partial", ".out.html")]
+    for link in links:
+        link.symlink_to(theirs)
+    fails = not isinstance(error, nullcontext)
+    with error, opened(tmp_path / "out.html") as building:
+        assert not building.is_symlink()
+        building.write_text("mine")
+        if fails:
+            raise RuntimeError
+    assert theirs.read_text() == "theirs"
+    assert {*tmp_path.iterdir()} == {theirs, *links, *([] if fails else [tmp_path / "out.html"])}
+    assert all(link.is_symlink() for link in links)
 
 
 def test_a_link_at_the_name_itself_counts_as_existing(tmp_path):
@@ -145,18 +136,15 @@ def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypa
     if not links:
         without_links(monkeypatch)
 
-    def both():
-        with opened(tmp_path / "out") as late:
-            write(late, "late")
-            with opened(tmp_path / "out") as early:
-                assert early != late
-                write(early, "early")
-
-    with pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists"):
-        both()
-    found = tmp_path / "out"
-    assert (found / "a" if found.is_dir() else found).read_text() == "early"
-    assert list(tmp_path.iterdir()) == [found]
+    taken = pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists")
+    with taken, opened(tmp_path / "out") as late:
+        write(late, "late")
+        with opened(tmp_path / "out") as early:
+            assert early != late
+            write(early, "early")
+    target = tmp_path / "out"
+    assert (target / "a" if target.is_dir() else target).read_text() == "early"
+    assert list(tmp_path.iterdir()) == [target]
 
 
 def without_links(monkeypatch):
@@ -180,11 +168,8 @@ def test_of_many_that_create_a_file_exactly_one_does(tmp_path, monkeypatch, link
             if create_once(tmp_path / str(name), {"by": k}):
                 created.append((name, k))
 
-    threads = [Thread(target=work, args=(k,)) for k in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(8) as threads:
+        list(threads.map(work, range(8)))
     assert sorted(name for name, _ in created) == list(range(50))
     assert all(json.loads((tmp_path / str(name)).read_text()) == {"by": k} for name, k in created)
     assert len(list(tmp_path.iterdir())) == 50
@@ -201,13 +186,8 @@ def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):
     assert replaceable(path, MARK)
     assert not replaceable(tmp_path, MARK)
 
-    def fail():
-        with replaced_file(path, MARK) as building:
-            building.write_text("half")
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
     with pytest.raises(ValueError, match="got No space left on device"):
-        fail()
+        fail(replaced_file(path, MARK), FULL)
     assert path.read_bytes() == MARK + b"two"
     path.write_text("a letter")
     wanted = r"out.html: expected a new name or an earlier file of this kind"
@@ -222,22 +202,15 @@ def test_only_marked_folders_of_this_target_that_are_not_in_use_count_as_interru
     in_use = Unfinished.begin(target, {"seed": 0})
     ended = Unfinished.begin(target, {"seed": 1})
     ended.close()
-    for name, mark in (
-        (".out.partial", None),
-        (".out.1", "no JSON"),
-        (".out.2", '{"target": "other", "info": {}}'),
-        (".out.3", "[]"),
-    ):
-        (tmp_path / name).mkdir()
-        if mark is not None:
-            (tmp_path / name / UNFINISHED).write_text(mark)
+    (tmp_path / ".out.partial").mkdir()
+    for k, mark in enumerate(("no JSON", '{"target": "other", "info": {}}', "[]")):
+        (tmp_path / f".out.{k}").mkdir()
+        (tmp_path / f".out.{k}" / UNFINISHED).write_text(mark)
     (tmp_path / ".out.4").symlink_to(ended.path)
-    found = Unfinished.interrupted(target)
-    assert [one.path for one in found] == [ended.path]
-    assert found[0].info == {"seed": 1}
+    assert [(folder.path, folder.info) for folder in Unfinished.interrupted(target)] == [(ended.path, {"seed": 1})]
     assert Unfinished.interrupted(target) == []  # it is in use now
     in_use.close()
-    assert [one.path for one in Unfinished.interrupted(target)] == [in_use.path]
+    assert [folder.path for folder in Unfinished.interrupted(target)] == [in_use.path]
 
 
 def test_of_an_unfinished_folder_only_named_files_are_removed(tmp_path):
@@ -280,8 +253,8 @@ def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
         "from posefit.silhouette.cost import pose_costs, project\n"
         "body, pose = Body.of(built_in.average_skeleton()), np.zeros((1, 66))\n"
         "camera = Camera.around(np.zeros(3), 0.0, 4.0, (40, 30))\n"
-        "seen = Silhouette.of(project(body, camera, pose[0], np.zeros(3)))\n"
-        "print(PoseProblem.__name__, pose_costs(body, [camera], [seen], pose, np.zeros((1, 3)))[0][0])\n"
+        "observed = Silhouette.of(project(body, camera, pose[0], np.zeros(3)))\n"
+        "print(PoseProblem.__name__, pose_costs(body, [camera], [observed], pose, np.zeros((1, 3)))[0][0])\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.stdout == "PoseProblem 0.0\n", done.stderr

@@ -2,31 +2,31 @@
 
 import signal
 import time
+from collections.abc import Callable
 
 import pytest
 
 from posefit.limits import allowed_bytes, memory, timed
+from tests.cases import each
 
 
-def test_what_takes_too_long_is_ended() -> None:
-    def works() -> None:
-        while True:
-            pass
+def works() -> None:
+    while True:
+        pass
 
+
+def swallows() -> None:
+    while True:
+        try:
+            time.sleep(10.0)
+        except Exception:
+            continue
+
+
+@each("endless", [works, swallows])
+def test_what_takes_too_long_is_ended(endless: Callable[[], None]) -> None:
     with pytest.raises(TimeoutError), timed(0.05):
-        works()
-
-
-def test_what_swallows_exceptions_is_ended() -> None:
-    def swallows() -> None:
-        while True:
-            try:
-                time.sleep(10.0)
-            except Exception:
-                continue
-
-    with pytest.raises(TimeoutError), timed(0.05):
-        swallows()
+        endless()
 
 
 def test_a_limit_within_a_limit_leaves_the_outer_one_as_it_was() -> None:

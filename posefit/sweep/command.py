@@ -67,24 +67,26 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
 
     Or those of one JSON object with the same content. A million cells are never in memory together.
     """
-    from posefit.sweep.estimate import Estimate, Workload, estimate_of
+    from posefit.sweep.estimate import Estimate, KindTotal, Workload, estimate_of
 
     cells = Plan.read(plan)
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    left, workers = Workload(), 0
+    left: Workload = {}
+    workers = count = 0
     if as_json:
         yield '{"cells": ['
     for k, cell in enumerate(cells):
         done = ledger is not None and cell.key in ledger
         if not done:
-            left.add(cell)
+            left.setdefault(cell.kind, KindTotal(cell)).add(cell)
+            count += 1
         if as_json:
             line = json.dumps({"key": cell.key, "done": done, **cell.spec})
             yield line if k == len(cells) - 1 else f"{line},"
         else:
             yield f"{cell.key[:8]}  {cell.summary}{'  done' if done else ''}"
     estimate = Estimate(0.0, {})
-    if len(left):
+    if left:
         with closing(start()) as running:
             workers = running.window()
             estimate = estimate_of(left, running, workers)
@@ -94,8 +96,8 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
         return
     for cell_text, reason in estimate.untried.items():
         yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
-    takes = f": about {duration_text(estimate.seconds)} on {workers} workers" if len(left) else ""
-    yield f"{len(cells)} cells, {len(left)} of them to run{takes}"
+    takes = f": about {duration_text(estimate.seconds)} on {workers} workers" if left else ""
+    yield f"{len(cells)} cells, {count} of them to run{takes}"
 
 
 def engine(

@@ -1,7 +1,7 @@
 """How long a plan will take, from a few small cells of each kind that are really run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from posefit.sweep.cell import Cell
 from posefit.sweep.engines.engine import Engine
@@ -18,23 +18,14 @@ class KindTotal:
     count: int = 0
     evaluations: int = 0  # of all frames
 
-
-@dataclass
-class Workload:
-    """The cells of a plan that are to run, by kind."""
-
-    kinds: dict[tuple[object, ...], KindTotal] = field(default_factory=dict)
-
     def add(self, cell: Cell) -> None:
         """Count a cell."""
-        total = self.kinds.setdefault(cell.kind, KindTotal(cell))
-        total.count += 1
-        total.evaluations += cell.total_evaluations
-        if cell.total_evaluations > total.largest.total_evaluations:
-            total.largest = cell
+        self.count += 1
+        self.evaluations += cell.total_evaluations
+        self.largest = max(self.largest, cell, key=lambda known: known.total_evaluations)
 
-    def __len__(self) -> int:
-        return sum(total.count for total in self.kinds.values())
+
+Workload = dict[tuple[object, ...], KindTotal]  # the cells of a plan that are to run, by kind
 
 
 @dataclass(frozen=True)
@@ -52,8 +43,8 @@ def estimate_of(workload: Workload, engine: Engine, workers: int) -> Estimate:
     the time of their evaluations. A kind that fails, as it would in the sweep, counts for nothing and is named.
     """
     seconds, untried = 0.0, {}
-    warmed = [_run(total.largest.trials(), engine) for total in workload.kinds.values()]
-    for total, warm in zip(workload.kinds.values(), warmed, strict=True):
+    warmed = [_run(total.largest.trials(), engine) for total in workload.values()]
+    for total, warm in zip(workload.values(), warmed, strict=True):
         short, long = total.largest.trials()
         times = warm if isinstance(warm, str) else _run((short, long), engine)
         if isinstance(times, str):

@@ -28,7 +28,7 @@ from posefit.errors import InputError
 from posefit.files import create_once, replaced_file
 from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.cell import other_version
-from posefit.sweep.log import JOINTS, SUFFIX, Damage, decoded, joints_at, lines
+from posefit.sweep.log import JOINTS, SUFFIX, decoded, joints_at, lines
 from posefit.sweep.table import dataframe
 from posefit.version import posefit_build
 
@@ -80,7 +80,7 @@ class Ledger:
             for offset, line in lines(self.path / ROWS / name, self._ends.get(name, 0)):
                 self._ends[name] = offset + len(line)
                 if (entry := decoded(line)) is None:
-                    self.set_aside(Damage(self.path / ROWS / name, offset, line))
+                    self._set_aside(name, offset, line)
                     continue
                 key, row = entry
                 # a row may be there twice, of a lock that a file system did not keep: the first one counts
@@ -188,18 +188,20 @@ class Ledger:
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
         return dataframe(self.all_rows())
 
-    def set_aside(self, damage: Damage) -> bool:
-        """Keep a damaged line for a human to look at, and return whether it is kept."""
-        aside = self.path / ASIDE / f"{damage.path.stem}-{damage.offset}.txt"
+    def _set_aside(self, name: str, offset: int, line: bytes) -> None:
+        """Keep a damaged line of a log for a human to look at."""
+        aside = self.path / ASIDE / f"{Path(name).stem}-{offset}.txt"
         if aside.exists():
-            return True
+            return
+        key = re.search(rb'"key": "([0-9a-f]{8})', line)
+        cell = f", the row of cell {key[1].decode()}," if key else ""
+        damage = f"{self.path / ROWS / name} at byte {offset}{cell} is damaged"
         try:
-            aside.write_bytes(damage.text)
+            aside.write_bytes(line)
         except OSError as error:
             self._say(f"warning: {damage}, and cannot be put aside: {error.strerror}; it does not count")
-            return False
-        self._say(f"warning: {damage}; put aside as {aside}, to be run again")
-        return True
+        else:
+            self._say(f"warning: {damage}; put aside as {aside}, to be run again")
 
     def _logs(self) -> dict[str, int]:
         """Return the logs with their sizes."""

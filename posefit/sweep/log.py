@@ -16,7 +16,6 @@ import secrets
 import time
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,20 +34,6 @@ LOCAL = {
     "smb3": ("nobrl",),
     "fuse.sshfs": ("",),
 }
-
-
-@dataclass(frozen=True)
-class Damage:
-    """A line that is not what was written."""
-
-    path: Path
-    offset: int
-    text: bytes = field(repr=False)
-
-    def __str__(self) -> str:
-        named = re.search(rb'"key": "([0-9a-f]{8})', self.text)
-        cell = f", the row of cell {named[1].decode()}," if named else ""
-        return f"{self.path} at byte {self.offset}{cell} is damaged"
 
 
 def encoded(key: str, row: Mapping[str, Any]) -> bytes:

@@ -29,7 +29,7 @@ class Block:
 
 
 def pages() -> list[Path]:
-    """Return README and every page of the handbook that somebody wrote."""
+    """Return README and every page of the handbook that was written by hand."""
     written = [path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts)]
     return [ROOT / "README.md", *sorted(written)]
 

@@ -1,5 +1,6 @@
 """The pages that are made from the code say what the code does."""
 
+import json
 import re
 from dataclasses import fields
 from pathlib import Path
@@ -42,29 +43,27 @@ def test_the_page_of_commands_holds_the_help_of_each() -> None:
 
 
 @pytest.fixture(scope="module")
-def followed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tracked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("docs") / "walk"
     track("walk", frames=(0, 2), evaluations=80, out=out)
     return out
 
 
-def test_every_key_of_summary_json_is_told(followed: Path) -> None:
-    import json
-
-    found = json.loads((followed / "summary.json").read_text("utf-8"))
+def test_every_key_of_summary_json_is_described(tracked: Path) -> None:
+    summary = json.loads((tracked / "summary.json").read_text("utf-8"))
     described = {*figures.REQUEST, *figures.MEASURES, *figures.RESULT}
-    assert set(found) <= described
-    assert described - set(found) <= {"history"}  # of a single frame
+    assert set(summary) <= described
+    assert described - set(summary) <= {"history"}  # of a single frame
 
 
-def test_every_column_of_frames_csv_is_told(followed: Path) -> None:
-    head = (followed / "frames.csv").read_text("utf-8").splitlines()[0].split(",")
+def test_every_column_of_frames_csv_is_described(tracked: Path) -> None:
+    head = (tracked / "frames.csv").read_text("utf-8").splitlines()[0].split(",")
     assert [name for name in head if name not in {f"{place}_{axis}" for place in PLACES for axis in "xyz"}] == list(
         figures.FRAME
     )
 
 
-def test_every_column_of_a_sweeps_csv_is_told() -> None:
+def test_every_column_of_a_sweeps_csv_is_described() -> None:
     row = run_cell(cell_of({"method": "sapso@pca", "motion": "walk", "frames": 2, "evaluations": 80})).row
     described = rows(figures.page().partition("## Columns of a sweep")[2])
     for column in flat(row):
@@ -73,7 +72,7 @@ def test_every_column_of_a_sweeps_csv_is_told() -> None:
         )
 
 
-def test_every_setting_of_every_method_is_told() -> None:
+def test_every_setting_of_every_method_is_described() -> None:
     described = rows(settings.page())
     for kind in KINDS:
         for offer in registry().offers[kind].values():
@@ -89,22 +88,22 @@ def test_every_equation_has_a_line_and_a_test() -> None:
     assert [name for name, tag in found.items() if not equations.tests_of(tag)] == []
 
 
-def test_every_joint_is_told() -> None:
+def test_every_joint_is_described() -> None:
     assert len(re.findall(r"^\| \d+ \| `", joints.page(), re.MULTILINE)) == len(JOINTS)
     assert "| 2 | `lfemur` | left knee | `left_knee` | `lhipjoint` |" in joints.page()
 
 
-def test_every_angle_is_told(followed: Path) -> None:
-    head = (followed / "angles.csv").read_text("utf-8").splitlines()[0].split(",")
+def test_every_angle_is_described(tracked: Path) -> None:
+    head = (tracked / "angles.csv").read_text("utf-8").splitlines()[0].split(",")
     assert head == ["frame", "seconds", *COLUMNS]
     described = re.findall(r"^\| `(\w+)` \|", angles.page(), re.MULTILINE)
     assert {name.partition("_")[2] for name in COLUMNS} == set(described)
     page = (DOCS / "howto" / "measuring.md").read_text("utf-8")
-    steps = (followed / "gait.csv").read_text("utf-8").splitlines()[0].split(",")
+    steps = (tracked / "gait.csv").read_text("utf-8").splitlines()[0].split(",")
     assert re.findall(r"^\| `(\w+)` \|", page.partition("of `gait.csv`")[2], re.MULTILINE) == steps
 
 
-def test_every_environment_is_told() -> None:
+def test_every_environment_is_described() -> None:
     assert re.findall(r"^## `(.*)`$", environments.page(), re.MULTILINE) == [
         "posefit/FitImage-v0",
         "posefit/FitState-v0",
@@ -121,7 +120,7 @@ def test_every_module_with_a_docstring_has_a_page() -> None:
     assert ".. automodule:: posefit.hooks\n" in pages["posefit"]
 
 
-def test_a_plan_is_told_with_every_field_list_and_corruption() -> None:
+def test_a_plan_is_described_with_every_field_list_and_corruption() -> None:
     page = (DOCS / "howto" / "plan.md").read_text("utf-8")
     assert set(FIELDS) | set(LISTS) | set(CORRUPTIONS) | {DROPPED} == rows(page)
     defaults: dict[str, Any] = {one.name: one.default for one in fields(TrackCell)}

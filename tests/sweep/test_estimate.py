@@ -8,7 +8,7 @@ import pytest
 from posefit.sweep.cell import Cell, CellResult
 from posefit.sweep.check import cell_of
 from posefit.sweep.engines.engine import Ended, Outcome
-from posefit.sweep.estimate import Workload, estimate_of
+from posefit.sweep.estimate import KindTotal, Workload, estimate_of
 from posefit.sweep.plan import search_cells
 from tests.cases import each
 
@@ -48,10 +48,10 @@ def searches(**more: Any) -> Sequence[Cell]:
 
 
 def workload(cells: Sequence[Cell]) -> Workload:
-    total = Workload()
+    kinds: Workload = {}
     for cell in cells:
-        total.add(cell)
-    return total
+        kinds.setdefault(cell.kind, KindTotal(cell)).add(cell)
+    return kinds
 
 
 @each(
