@@ -2,7 +2,7 @@
 
 - `read_text`: a file that may have so many bytes, in UTF-8.
 - `parsed_toml`, `parsed_json`: the values of a text. Whatever is wrong with it raises InputError.
-- `quoted`: a value as messages quote it.
+- `quoted`: a value as messages quote it; `suggestion`: the known name that a wrong one is near.
 
 Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
 """
@@ -10,6 +10,8 @@ Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
 import json
 import re
 import tomllib
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +39,12 @@ def quoted(value: object, most: int = SHOWN) -> str:
 def cut(text: str, most: int = SHOWN) -> str:
     """Return a text, cut where it is long."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message about a wrong name, which asks for the nearest known one; "" where none is near."""
+    near = get_close_matches(name[:SHOWN], list(known), 1)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def check_size(path: Path, most: int) -> None:

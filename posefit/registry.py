@@ -12,7 +12,6 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -23,6 +22,7 @@ import pluggy
 from posefit import hooks
 from posefit.errors import InputError
 from posefit.hooks import PROJECT, ClaimedOrder
+from posefit.reading import suggestion
 from posefit.settings import Setting, settings_of
 from posefit.version import source_digest
 
@@ -133,9 +133,9 @@ class Registry:
         known = self.offers[kind]
         family, colon, variant = name.partition(":")
         if family not in known:
-            near = get_close_matches(family, known, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {name!r}{hint}")
+            raise InputError(
+                f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {name!r}{suggestion(family, known)}"
+            )
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs

@@ -5,10 +5,10 @@ import re
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from posefit.errors import InputError
+from posefit.reading import suggestion
 
 HEADING = "Settings:"  # of a docstring's list of them
 _ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
@@ -181,10 +181,8 @@ def _section(lines: list[str]) -> tuple[int, int]:
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
     if name not in known:
-        near = get_close_matches(name, known, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
         listed = f"one of {', '.join(known)}" if known else "none, it takes none"
-        raise InputError(f"a setting of {plugin} must be {listed}, got {name!r}{hint}")
+        raise InputError(f"a setting of {plugin} must be {listed}, got {name!r}{suggestion(name, known)}")
     return known[name]
 
 

@@ -6,7 +6,6 @@ The motion, its speed and phase, and the camera's azimuth are those of a sweep's
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -23,7 +22,7 @@ from posefit.footage.instance import motion_of_instance, variation
 from posefit.footage.source import motion_of
 from posefit.geometry.body import varied
 from posefit.motion import built_in
-from posefit.reading import quoted
+from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
@@ -87,9 +86,9 @@ def world_of(**arguments: Any) -> World:
     known = tuple(World.__dataclass_fields__)
     for name in arguments:
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise TypeError(f"an argument must be one of {', '.join(known)}, got {quoted(name)}{hint}")
+            raise TypeError(
+                f"an argument must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+            )
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)
     checked(one_of, "translation", world.translation, TRANSLATIONS)

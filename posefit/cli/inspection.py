@@ -4,7 +4,6 @@ import os
 import shutil
 import textwrap
 from collections.abc import Iterator, Sequence
-from difflib import get_close_matches
 from inspect import Parameter, getdoc
 from typing import Any
 
@@ -12,6 +11,7 @@ import click
 
 from posefit.errors import InputError
 from posefit.hooks import ClaimedOrder
+from posefit.reading import suggestion
 from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
 
@@ -50,9 +50,7 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
     mine = [offer for offer in offers if offer.name == name]
     if not mine:
         known = sorted({offer.name for offer in offers})
-        near = get_close_matches(name, known, 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise InputError(f"plugin must be one of {', '.join(known)}, got {name!r}{hint}")
+        raise InputError(f"plugin must be one of {', '.join(known)}, got {name!r}{suggestion(name, known)}")
     for offer in mine:
         text = getdoc(offer.factory) or ""
         listed = settings_in(text)

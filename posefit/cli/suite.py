@@ -17,13 +17,13 @@ NAME = "posefit-2026.1"
 
 def _problem_options(instances: str) -> Decorator:
     """Return a decorator that adds the options which select problems."""
-    numbers = {"type": int, "multiple": True}
-    span = {"callback": parsed_by(text_range), "default": instances, "show_default": True, "metavar": "A:B"}
+    numbers: dict[str, Any] = {"type": int, "multiple": True}
+    span: dict[str, Any] = {"default": instances, "show_default": True, "metavar": "A:B"}
     return options(
         (
             click.option("--function", "functions", help="Its number; repeatable, by default each.", **numbers),
             click.option("--dimension", "dimensions", help="Repeatable, by default 9.", **numbers),
-            click.option("--instances", help="A to B - 1.", **span),
+            click.option("--instances", callback=parsed_by(text_range), help="A to B - 1.", **span),
         )
     )
 

@@ -12,7 +12,6 @@ with funding from NSF EIA-0196217.
 import json
 import re
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
@@ -24,7 +23,7 @@ from posefit.errors import InputError
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.motion.motion import LONGEST, Motion
-from posefit.reading import SHOWN, quoted
+from posefit.reading import quoted, suggestion
 
 
 @lru_cache(maxsize=1)
@@ -107,9 +106,7 @@ def _model(name: str) -> tuple[list[int], Array, float, float]:
 
 def _check(name: str) -> None:
     if name not in names():
-        near = get_close_matches(name[:SHOWN], names(), 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
         raise InputError(
             "motion must be a file, a folder, a recorded one that posefit motions lists, or one of "
-            f"{', '.join(names())}, got {quoted(name)}{hint}"
+            f"{', '.join(names())}, got {quoted(name)}{suggestion(name, names())}"
         )

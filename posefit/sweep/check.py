@@ -1,8 +1,7 @@
 """Checks a cell's spec before anything runs: options of a track by their one declaration, all other fields here."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import fields
-from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, motion_of
 from posefit.footage.training import training_clips
 from posefit.motion import built_in, recorded
-from posefit.reading import SHOWN, quoted
+from posefit.reading import quoted, suggestion
 from posefit.registry import Offer, registry
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -34,7 +33,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     """
     for name in spec:
         if name not in FIELDS:
-            raise InputError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{_nearest(name, FIELDS)}")
+            raise InputError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{suggestion(name, FIELDS)}")
     for name in ("method", "motion"):
         if name not in spec:
             raise InputError(f"a cell must say its {name}, got none")
@@ -122,11 +121,6 @@ def _length(motion: str, fps: float) -> int:
     return len(motion_of(motion, None, fps))
 
 
-def _nearest(name: str, known: Sequence[str]) -> str:
-    near = get_close_matches(name[:SHOWN], known, 1)
-    return f"; did you mean {near[0]!r}?" if near else ""
-
-
 def _name(field: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
         raise InputError(f"{field} must be a name, got {quoted(value)}")
@@ -143,7 +137,7 @@ def _motion(field: str, value: Any) -> str:
     if name not in built_in.names() and not recorded.is_recorded(name) and Path(name).suffix.lower() not in MOTIONS:
         raise InputError(
             f"{field} must be an .amc file, a .bvh file or one of {', '.join(built_in.names())}, "
-            f"got {quoted(name)}{_nearest(name, built_in.names())}"
+            f"got {quoted(name)}{suggestion(name, built_in.names())}"
         )
     return name
 
@@ -175,7 +169,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
     kinds = (*CORRUPTIONS, DROPPED)
     for kind in value:
         if kind not in kinds:
-            raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{_nearest(kind, kinds)}")
+            raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}")
     strengths = {kind: _within(1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 

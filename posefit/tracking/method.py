@@ -6,7 +6,6 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -29,6 +28,7 @@ from posefit.fitting.validation import (
 )
 from posefit.footage.source import Source, kind_of
 from posefit.motion import built_in, recorded
+from posefit.reading import suggestion
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.modes import WeighingTracker
@@ -62,9 +62,9 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
     if family in offers["optimiser"]:
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
-    near = get_close_matches(optimiser, known, 1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {method!r}{hint}")
+    raise InputError(
+        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {method!r}{suggestion(optimiser, known)}"
+    )
 
 
 def resolved(source: Source, options: TrackOptions) -> TrackOptions:
