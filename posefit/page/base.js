@@ -19,6 +19,7 @@ function filled(node, about, children) {
 const number = (value, digits) => (given(value) ? value.toFixed(digits).replace("-", "−") : "–");
 const whole = (value) => value.toLocaleString("en-GB", { maximumFractionDigits: 0 });
 const counted = (count, noun) => `${whole(count)} ${noun}${count === 1 ? "" : "s"}`;
+const between = (low, high, value) => Math.max(low, Math.min(high, value));
 const range = (count) => Array.from({ length: count }, (_, k) => k);
 
 // A figure with its digits and without its unit, as D.columns has them.

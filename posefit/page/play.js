@@ -27,8 +27,8 @@ function clock(control, pace, advance) {
 function turnable(canvas, repaint) {
   const turn = (yaw, pitch, zoom) => {
     gaze.yaw += yaw;
-    gaze.pitch = Math.max(-1.5, Math.min(1.5, gaze.pitch + pitch));
-    gaze.zoom = Math.max(0.4, Math.min(4, gaze.zoom * zoom));
+    gaze.pitch = between(-1.5, 1.5, gaze.pitch + pitch);
+    gaze.zoom = between(0.4, 4, gaze.zoom * zoom);
     repaint();
   };
   const held = new Map();
@@ -50,20 +50,17 @@ function turnable(canvas, repaint) {
   });
   for (const name of ["pointerup", "pointercancel"])
     canvas.addEventListener(name, (event) => held.delete(event.pointerId));
-  canvas.addEventListener(
-    "wheel",
-    (event) => {
-      event.preventDefault();
-      turn(0, 0, event.deltaY < 0 ? 1.1 : 1 / 1.1);
-    },
-    { passive: false },
-  );
-  const keys = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "+", "=", "-"];
-  canvas.addEventListener("keydown", (event) => {
-    const key = keys.indexOf(event.key);
-    if (key < 0 || event.ctrlKey || event.metaKey) return;
+  const wheel = (event) => {
     event.preventDefault();
-    turn([0.12, -0.12][key] ?? 0, [0.12, -0.12][key - 2] ?? 0, [1.1, 1.1, 1 / 1.1][key - 4] ?? 1);
+    turn(0, 0, event.deltaY < 0 ? 1.1 : 1 / 1.1);
+  };
+  canvas.addEventListener("wheel", wheel, { passive: false });
+  const keys = { ArrowLeft: [0.12, 0, 1], ArrowRight: [-0.12, 0, 1], ArrowUp: [0, 0.12, 1], ArrowDown: [0, -0.12, 1] };
+  Object.assign(keys, { "+": [0, 0, 1.1], "=": [0, 0, 1.1], "-": [0, 0, 1 / 1.1] });
+  canvas.addEventListener("keydown", (event) => {
+    if (!keys[event.key] || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    turn(...keys[event.key]);
   });
   new ResizeObserver(repaint).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);

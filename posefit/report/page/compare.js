@@ -10,7 +10,7 @@ function ranksDiagram(P, room) {
   const order = P.ranks.map((rank, k) => [rank, k]).sort((a, b) => a[0] - b[0]);
   const count = order.length;
   const half = Math.ceil(count / 2);
-  const width = Math.max(290, Math.min(760, room));
+  const width = between(290, 760, room);
   const side = Math.min(250, 0.4 * width);
   const [left, right, line] = [side, width - side, 62];
   const at = (rank) => left + ((right - left) * (rank - 1)) / Math.max(count - 1, 1);
@@ -19,10 +19,10 @@ function ranksDiagram(P, room) {
   const svg = drawing(width, names + 20 * half + 4, `Mean ranks, best first: ${ranks.join(", ")}`);
   const long = Math.min(P.critical_difference, count - 1);
   const longer = P.critical_difference > long ? ", longer than the line" : "";
-  const text = `critical difference ${P.critical_difference.toFixed(2)}${longer}`;
+  const difference = `critical difference ${P.critical_difference.toFixed(2)}${longer}`;
   svg.append(
     drawLine(at(1), 26, at(1 + long), 26, { class: "ink", "stroke-width": 2 }),
-    drawText(Math.max(0, Math.min(at(1), width - textWidth(text) - 4)), 17, text),
+    drawText(between(0, width - textWidth(difference) - 4, at(1)), 17, difference),
     drawLine(at(1), line, at(count), line, { class: "ink" }),
   );
   const every = Math.ceil((textWidth(String(count)) + 4) / ((right - left) / Math.max(count - 1, 1)));
@@ -42,17 +42,11 @@ function ranksDiagram(P, room) {
     const edge = best ? left - 14 : right + 14;
     const value = rank.toFixed(2);
     const name = fitted(METHODS[m], side - 22 - textWidth(` ${value}`));
-    const points = corners([
-      [at(rank), line],
-      [at(rank), y],
-      [edge, y],
-    ]).join(" ");
+    const text = best ? `${name}  ${value}` : `${value}  ${name}`;
     svg.append(
-      draw("polyline", { points, ...stroke(m, 1) }),
+      draw("path", { d: `M${at(rank)},${line}V${y}H${edge}`, ...stroke(m, 1) }),
       mark(m, at(rank), line, 4),
-      drawText(best ? edge - 5 : edge + 5, y + 4, best ? `${name}  ${value}` : `${value}  ${name}`, {
-        "text-anchor": best ? "end" : "start",
-      }),
+      drawText(best ? edge - 5 : edge + 5, y + 4, text, { "text-anchor": best ? "end" : "start" }),
     );
   });
   return svg;
@@ -64,20 +58,12 @@ function duelsOf(m) {
   const mine = P.methods.indexOf(m);
   const not = (share) => (given(share) ? 1 - share : null);
   return P.pairs
-    .filter((pair) => pair[0] === mine || pair[1] === mine)
-    .map(([first, second, difference, p, adjusted, better, low, high]) =>
-      first === mine
-        ? { other: P.methods[second], difference, p, adjusted, better, low, high }
-        : {
-            other: P.methods[first],
-            difference: -difference,
-            p,
-            adjusted,
-            better: not(better),
-            low: not(high),
-            high: not(low),
-          },
-    );
+    .filter((pair) => pair.slice(0, 2).includes(mine))
+    .map(([first, second, difference, p, adjusted, better, low, high]) => {
+      if (first === mine) return { other: P.methods[second], difference, p, adjusted, better, low, high };
+      const other = { better: not(better), low: not(high), high: not(low) };
+      return { other: P.methods[first], difference: -difference, p, adjusted, ...other };
+    });
 }
 
 function comparison() {
@@ -94,27 +80,19 @@ function comparison() {
   drawn($("difference"), (width) => ranksDiagram(P, width));
   const columns = [
     textColumn("other method", (row) => METHODS[row.other]),
-    column("median difference °", (row) => row.difference, twoDigits, { about: "Below 0 the chosen method is better" }),
-    column("Wilcoxon p", (row) => row.p, probability),
-    column("p after Holm", (row) => row.adjusted, probability, {
-      about: `Adjusted for all ${P.pairs.length} comparisons`,
-    }),
-    column("probability of improvement", (row) => row.better, twoDigits, {
+    column("median difference °", "difference", twoDigits, { about: "Below 0 the chosen method is better" }),
+    column("Wilcoxon p", "p", probability),
+    column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P.pairs.length} comparisons` }),
+    column("probability of improvement", "better", twoDigits, {
       about: "That a run of the chosen method has the lower error",
       down: true,
     }),
-    {
-      title: "95 % interval",
-      about: "From three seeds on, if the runs are not too many",
-      value: (row) => row.low,
-      show: (row) => (given(row.low) ? `${number(row.low, 2)} – ${number(row.high, 2)}` : "–"),
-    },
+    intervalColumn("From three seeds on, if the runs are not too many", "low", 2, () => "–"),
     textColumn("verdict", verdict),
   ];
   const show = (m) => table($("pairs"), columns, duelsOf(m), { name: "Paired tests", by: 1 });
   const names = P.methods.map((m) => [String(m), METHODS[m]]);
-  choose($("against"), names, String(D.leaderboard[0].method), () => show(+$("against").value));
-  show(D.leaderboard[0].method);
+  chooseMethod($("against"), names, D.leaderboard[0].method, show);
 }
 
 // The results of orders of methods that publications claim.
@@ -136,6 +114,12 @@ function claims() {
     const text = `: ${C.said}. Here ${errors.join(", ")}. ${parts.join("; ")}. ${result}`;
     $("claims").append(make("div", { class: "note claim" }, make("strong", {}, `The claim of ${C.source}`), text));
   }
+}
+
+// A select of methods, which shows the chosen one.
+function chooseMethod(select, names, first, show) {
+  choose(select, names, String(first), () => show(+select.value));
+  show(first);
 }
 
 // Who wins where, and what choosing a method by its instance would gain.
@@ -167,20 +151,21 @@ function selection() {
     ["oracle, scored on seeds it was not picked on", S.oracle_apart],
     ["oracle", S.oracle],
   ].filter(([, error]) => given(error));
-  const plain = (title, show) => ({ title, show });
+  const plain = (title, show, more) => ({ title, show, ...more });
+  const text = { text: true };
   const error = plain("mean error °", (row) => twoDigits(row.error ?? row[1]));
-  const way = { ...plain("choice of a method", ([name]) => name), text: true };
   const part = plain("gap closed", (row) => (gap > 0 ? closed((S.single - row[1]) / gap) : "–"));
-  table($("choosing"), [way, error, part], ways, { name: "Ways of choosing" });
-  const won = column("instances won", (row) => row[1], whole, { down: true });
-  const taken = column("chosen by the selector", (row) => row[2], whole, { down: true });
-  const wins = [methodColumn(([m]) => m), won, ...(given(S.selector) ? [taken] : [])];
+  const choice = plain("choice of a method", ([name]) => name, text);
+  table($("choosing"), [choice, error, part], ways, { name: "Ways of choosing" });
+  const won = column("instances won", "1", whole, { down: true });
+  const taken = column("chosen by the selector", "2", whole, { down: true });
+  const wins = [methodColumn("0"), won, ...(given(S.selector) ? [taken] : [])];
   table($("wins"), wins, S.wins, { name: "Instances won" });
   if (!S.where.length) return $("where").remove();
   const where = [
-    { ...plain("where", (row) => row.part), text: true },
+    plain("where", (row) => row.part, text),
     plain("instances", (row) => whole(row.instances)),
-    { ...plain("best there", (row) => [swatch(row.method), METHODS[row.method]]), text: true },
+    plain("best there", (row) => [swatch(row.method), METHODS[row.method]], text),
     error,
     plain(`${shortened(best, 20)} behind by °`, (row) => twoDigits(row.behind)),
   ];
@@ -190,21 +175,16 @@ function selection() {
 // One method against all others, instance by instance.
 function author() {
   const first = D.leaderboard ? D.leaderboard[0].method : 0;
-  choose($("mine"), numbered(METHODS), String(first), () => against(+$("mine").value));
-  against(first);
+  chooseMethod($("mine"), numbered(METHODS), first, against);
 }
 
-// The mean error over seeds of each instance and method.
-const meanErrors = () => {
-  const sums = INSTANCES.map(() => METHODS.map(() => [0, 0]));
-  D.rows.error.forEach((error, k) => {
-    if (!given(error)) return;
-    const sum = sums[D.rows.instance[k]][D.rows.method[k]];
-    sum[0] += error;
-    sum[1] += 1;
-  });
-  return sums.map((row) => row.map(([sum, count]) => (count ? sum / count : null)));
-};
+// The mean error over seeds of each instance and method; null where there is none.
+function meanErrors() {
+  const errors = INSTANCES.map(() => METHODS.map(() => []));
+  D.rows.error.forEach((error, k) => given(error) && errors[D.rows.instance[k]][D.rows.method[k]].push(error));
+  const mean = (values) => (values.length ? values.reduce((sum, value) => sum + value, 0) / values.length : null);
+  return errors.map((row) => row.map(mean));
+}
 
 function against(m) {
   const R = D.rows;
@@ -217,51 +197,34 @@ function against(m) {
     })
     .filter((row) => given(row.mine));
   $("verdict").textContent = duels.length ? verdictText(m, duels) : "No run of it has an error.";
-  const all = duels.flatMap((row) => row.errors.filter(given)).sort((a, b) => a - b);
-  const most = all[Math.floor(0.98 * (all.length - 1))] || 1;
+  const most = usualMost(duels.flatMap((row) => row.errors));
   const skill = (name) => (row) => {
     const base = D.instances[row.instance][name];
     return given(base) && base > 0 ? 1 - row.mine / base : null;
   };
-  const instanceColumn = (of) => textColumn("instance", of, (row) => INSTANCES[of(row)]);
-  table(
-    $("duels"),
-    [
-      instanceColumn((row) => row.instance),
-      { title: "all methods", text: true, show: (row) => errorDots(row.errors, m, most) },
-      figure("error", (row) => row.mine),
-      { title: "rank", value: (row) => row.rank, show: (row) => `${row.rank} of ${row.of}` },
-      {
-        title: "best other °",
-        value: (row) => row.least,
-        show: (row) => (given(row.least) ? [number(row.least, 2), make("small", {}, METHODS[row.best])] : "–"),
-      },
-      column("behind it by °", (row) => (given(row.least) ? row.mine - row.least : null), twoDigits, { down: true }),
-      ...Object.keys(D.baseline_names).map((name) => figure(`skill_${name}`, skill(name))),
-    ],
-    duels,
-    { name: "Instance by instance", by: 5, down: true },
-  );
+  const best = (row) => [number(row.least, 2), make("small", {}, METHODS[row.best])];
+  const columns = [
+    namedColumn("instance", INSTANCES, (row) => row.instance),
+    { title: "all methods", text: true, show: (row) => errorDots(row.errors, m, most) },
+    figure("error", "mine"),
+    { title: "rank", value: (row) => row.rank, show: (row) => `${row.rank} of ${row.of}` },
+    { title: "best other °", value: (row) => row.least, show: (row) => (given(row.least) ? best(row) : "–") },
+    column("behind it by °", (row) => (given(row.least) ? row.mine - row.least : null), twoDigits, { down: true }),
+    ...Object.keys(D.baseline_names).map((name) => figure(`skill_${name}`, skill(name))),
+  ];
+  table($("duels"), columns, duels, { name: "Instance by instance", by: 5, down: true });
   const { lost, swapped } = D.columns;
   $("lost-note").textContent = `${lost.label}: ${lost.about}; ${swapped.label}: ${swapped.about}.`;
   const gone = range(R.key.length).filter((k) => R.method[k] === m && (R.lost[k] > 0 || R.swapped[k] > 0));
   if (!gone.length)
     return $("tracks").replaceChildren(make("p", {}, "None of its runs lost a frame or swapped left and right."));
-  table(
-    $("tracks"),
-    [
-      instanceColumn((k) => R.instance[k]),
-      column(
-        "seed",
-        (k) => R.seed[k],
-        (seed) => String(D.seeds[seed]),
-      ),
-      ...["lost", "swapped", "error"].map((name) => ({ ...figure(name, (k) => R[name][k]), down: true })),
-      buttonColumn("watch, or run again", runButtons),
-    ],
-    gone,
-    { name: "Lost and swapped tracks", by: 2, down: true },
-  );
+  const tracks = [
+    namedColumn("instance", INSTANCES, (k) => R.instance[k]),
+    seedColumn((k) => R.seed[k]),
+    ...["lost", "swapped", "error"].map((name) => ({ ...figure(name, (k) => R[name][k]), down: true })),
+    buttonColumn("watch, or run again", runButtons),
+  ];
+  table($("tracks"), tracks, gone, { name: "Lost and swapped tracks", by: 2, down: true });
 }
 
 function verdictText(m, duels) {

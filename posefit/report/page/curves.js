@@ -50,15 +50,17 @@ function curves() {
   }
 }
 
+// The value that 98 % of some values do not exceed.
+function usualMost(values) {
+  const known = values.filter(given).sort((a, b) => a - b);
+  return known[Math.floor(0.98 * (known.length - 1))] || 1;
+}
+
 // A chart of series {m, values, low, high} over D.evaluations, on a logarithmic scale.
 function chart(width, series, { label, under, most, stepped }) {
-  const height = Math.max(240, Math.min(380, 0.62 * width));
+  const height = between(240, 380, 0.62 * width);
   const named = width >= 420 && series.length > 0 && series.length <= LABELLED;
-  const values = series
-    .flatMap((one) => one.values)
-    .filter(given)
-    .sort((a, b) => a - b);
-  const to = most ?? 1.05 * (values[Math.floor(0.98 * (values.length - 1))] || 1);
+  const to = most ?? 1.05 * usualMost(series.flatMap((one) => one.values));
   const used = D.evaluations;
   const x = { from: used[0], to: used.at(-1), log: true, label: under, show: whole };
   const across = (value) => ((width - 170) * Math.log(value / x.from)) / Math.max(Math.log(x.to / x.from), 1e-9);
@@ -134,7 +136,7 @@ function joints() {
 
 // The dots {x, y, size, title} of each method, joined, over dashed lines between pairs of points.
 function calibration(width, name, x, y, dashed, series) {
-  const height = Math.max(240, Math.min(380, 0.72 * width));
+  const height = between(240, 380, 0.72 * width);
   const { svg, at, up } = axes({ width, height, left: 46, right: 22, top: 14, bottom: 40, name }, x, y);
   for (const [x1, y1, x2, y2] of dashed)
     svg.append(drawLine(at(x1), up(y1), at(x2), up(y2), { class: "axis", "stroke-dasharray": "4 4" }));
@@ -153,12 +155,10 @@ function certainty() {
   drawn($("reliability"), (width) => {
     const series = uncertain(visible()).map(([m, { reliability }]) => {
       const all = reliability.reduce((sum, [count]) => sum + count, 0);
-      const dots = reliability.map(([count, probability, right]) => ({
-        x: probability,
-        y: right,
-        size: 3 + 8 * Math.sqrt(count / all),
-        title: `${percents(probability)} predicted, ${percents(right)} right, of ${counted(count, "frame")}`,
-      }));
+      const dots = reliability.map(([count, probability, right]) => {
+        const title = `${percents(probability)} predicted, ${percents(right)} right, of ${counted(count, "frame")}`;
+        return { x: probability, y: right, size: 3 + 8 * Math.sqrt(count / all), title };
+      });
       return [m, dots];
     });
     const x = { ...shares, label: "probability of the likeliest mode" };
@@ -168,12 +168,10 @@ function certainty() {
     const known = uncertain(visible()).filter(([, one]) => [...one.coverage, ...one.width].every(given));
     const to = 1.08 * Math.max(10, ...known.flatMap(([, one]) => one.width));
     const series = known.map(([m, one]) => {
-      const dots = C.levels.map((level, k) => ({
-        x: one.width[k],
-        y: one.coverage[k],
-        size: 4,
-        title: `${percents(level)} nominal, ${percents(one.coverage[k])} within ${whole(one.width[k])} mm`,
-      }));
+      const dots = C.levels.map((level, k) => {
+        const [x, y] = [one.width[k], one.coverage[k]];
+        return { x, y, size: 4, title: `${percents(level)} nominal, ${percents(y)} within ${whole(x)} mm` };
+      });
       return [m, dots];
     });
     const x = { to, marks: steps(0, to, width / 90), show: whole, label: "radius of intervals, mm" };
@@ -181,24 +179,15 @@ function certainty() {
     const dashed = C.levels.map((level) => [0, level, to, level]);
     return calibration(width, "share of joints within their intervals, over their width", x, y, dashed, series);
   });
+  const within = (level) => `Share of joints whose truth lies in the ball that should hold ${percents(level)} of them`;
+  const share = (value) => `${number(100 * value, 1)} %`;
   const columns = C.levels.flatMap((level, k) => [
-    column(
-      `within ${percents(level)}`,
-      ([, one]) => one.coverage[k],
-      (value) => `${number(100 * value, 1)} %`,
-      {
-        about: `Share of joints whose truth lies in the ball that should hold ${percents(level)} of them`,
-      },
-    ),
+    column(`within ${percents(level)}`, ([, one]) => one.coverage[k], share, { about: within(level) }),
     column("mm", ([, one]) => one.width[k], whole, { about: "Mean radius of these balls" }),
   ]);
   const about = "Expected calibration error of the likeliest mode's probability: the mean distance from the diagonal";
-  const error = column(
-    "calibration error",
-    ([, one]) => one.ece,
-    (value) => number(value, 3),
-    { about },
-  );
+  const threeDigits = (value) => number(value, 3);
+  const error = column("calibration error", ([, one]) => one.ece, threeDigits, { about });
   const rows = uncertain(D.taking_part.map((m, place) => [m, place]));
-  table($("sure"), [methodColumn(([m]) => m), ...columns, error], rows, { name: "Uncertainty" });
+  table($("sure"), [methodColumn("0"), ...columns, error], rows, { name: "Uncertainty" });
 }

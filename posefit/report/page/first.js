@@ -81,10 +81,9 @@ function examples() {
   let frame = 0;
   let inView = true;
   const repaint = () => inView && stills.forEach(({ canvas, still }) => paintStill(canvas, still, frame));
-  const { step, fps } = stills[0].still.scene;
   const run = clock(
     $("moving"),
-    () => (1000 * step) / fps,
+    () => pace(stills[0].still.scene),
     (over) => {
       frame += over;
       repaint();
@@ -112,11 +111,9 @@ function trouble() {
     note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
   }
   if (H.dropped.length) {
-    const missing = H.dropped.map((one) => {
-      const why = one.missing.length
-        ? `no run of ${one.missing.map((m) => METHODS[m]).join("; ")}`
-        : "no seed in common";
-      return `${INSTANCES[one.instance]}: ${why}`;
+    const missing = H.dropped.map((gap) => {
+      const names = gap.missing.map((m) => METHODS[m]).join("; ");
+      return `${INSTANCES[gap.instance]}: ${names ? `no run of ${names}` : "no seed in common"}`;
     });
     const more = missing.length > MAX_MISSING ? [`and ${whole(missing.length - MAX_MISSING)} more`] : [];
     const text = `${counted(missing.length, "instance")} left out of the comparison, for every method:`;

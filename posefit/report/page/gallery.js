@@ -1,6 +1,7 @@
 // The gallery: a card for each instance, and the window that plays its tracks.
 const CARDS = 60; // that are added at a time
 const show = { row: null, frame: 0, camera: 0 };
+const pace = ({ step, fps }) => (1000 * step) / fps; // milliseconds of a frame
 const animated = D.animations ? Object.keys(D.animations.tracks).map(Number) : [];
 
 // The scene of a row's instance, and its track; joints are decoded once.
@@ -51,25 +52,20 @@ function silhouette(pen, camera, pixels, radii, name, opacity) {
 function gallery() {
   const R = D.rows;
   const some =
-    animated.length < R.key.length ? `; ${whole(animated.length)} of ${whole(R.key.length)} runs have one` : "";
-  const other = some
-    ? ", so that this file stays small. A report of the ledger that a row's command makes shows that row"
-    : "";
-  $("gallery-note").textContent = `Each instance opens an animation and a skeleton that can be turned${some}${other}.`;
-  const best = new Map();
-  for (const row of animated) {
-    const before = best.get(R.instance[row]);
-    if (before === undefined || (R.error[row] ?? Infinity) < (R.error[before] ?? Infinity))
-      best.set(R.instance[row], row);
-  }
+    `; ${whole(animated.length)} of ${whole(R.key.length)} runs have one, so that this file stays small. ` +
+    "A report of the ledger that a row's command makes shows that row";
+  $("gallery-note").textContent =
+    `Each instance opens an animation and a skeleton that can be turned${animated.length < R.key.length ? some : ""}.`;
+  const error = (row) => R.error[row] ?? Infinity;
+  const best = new Map(); // a row of each instance
+  for (const row of animated.toSorted((a, b) => error(b) - error(a) || b - a)) best.set(R.instance[row], row);
   const cards = [...best].sort((a, b) => a[0] - b[0]);
   const add = () => {
     for (const [instance, row] of cards.splice(0, CARDS)) {
       const canvas = make("canvas", { "aria-hidden": "true" });
-      const words = make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`);
-      $("cards").append(
-        button([canvas, make("span", {}, INSTANCES[instance], words)], () => openTrack(row), { class: "card" }),
-      );
+      const small = make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`);
+      const words = make("span", {}, INSTANCES[instance], small);
+      $("cards").append(button([canvas, words], () => openTrack(row), { class: "card" }));
       const still = stillOf(row);
       paintStill(canvas, still, Math.floor(still.scene.frames / 2));
     }
@@ -90,11 +86,9 @@ function openTrack(row) {
   const R = D.rows;
   const here = animated.filter((one) => R.instance[one] === R.instance[row]);
   const scene = sceneOf(row);
-  Object.assign(show, {
-    row,
-    frame: Math.min(show.frame, scene.frames - 1),
-    camera: Math.min(show.camera, Math.max(scene.cameras.length - 1, 0)),
-  });
+  show.row = row;
+  show.frame = Math.min(show.frame, scene.frames - 1);
+  show.camera = Math.min(show.camera, Math.max(scene.cameras.length - 1, 0));
   $("viewer-title").textContent = INSTANCES[R.instance[row]];
   const methods = [...new Set(here.map((one) => R.method[one]))].sort((a, b) => a - b);
   const names = methods.map((m) => [String(m), METHODS[m]]);
@@ -129,12 +123,10 @@ function paint() {
   sticks(turning.pen, projected(turning.camera, truth), ink("--truth"), 6);
   sticks(turning.pen, projected(turning.camera, estimate), limbs(), 3);
   $("frame").value = show.frame;
-  const states = [
-    `frame ${show.frame * scene.step}: MPJPE ${track.mpjpe[show.frame]} mm`,
-    track.lost.includes(show.frame) ? "lost" : "",
-    track.swapped.includes(show.frame) ? "left and right swapped" : "",
-  ];
-  $("reading").textContent = states.filter(Boolean).join(", ");
+  const lost = track.lost.includes(show.frame) ? ", lost" : "";
+  const swapped = track.swapped.includes(show.frame) ? ", left and right swapped" : "";
+  const error = `frame ${show.frame * scene.step}: MPJPE ${track.mpjpe[show.frame]} mm`;
+  $("reading").textContent = `${error}${lost}${swapped}`;
   $("overlay").setAttribute("aria-label", $("reading").textContent);
   $("strip").querySelector(".now").setAttribute("x", show.frame);
 }
@@ -172,7 +164,7 @@ function strip() {
 
 const play = clock(
   $("play"),
-  () => (1000 * sceneOf(show.row).step) / sceneOf(show.row).fps,
+  () => pace(sceneOf(show.row)),
   (over) => {
     show.frame = (show.frame + over) % sceneOf(show.row).frames;
     paint();

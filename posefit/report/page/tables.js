@@ -1,51 +1,59 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
 const PAGE = 50; // rows
 
-// A column: its title, or one for screen readers alone, value(row) to sort by, and what is shown of it.
-const column = (title, value, show, more) => ({
-  title,
-  value,
-  show: (row) => (given(value(row)) ? show(value(row)) : "–"),
-  ...more,
-});
-const textColumn = (title, value, show = value) => ({ title, text: true, value, show });
-const methodColumn = (of) =>
-  textColumn(
-    "method",
-    (row) => METHODS[of(row)],
-    (row) => [swatch(of(row)), METHODS[of(row)]],
-  );
+// A column: its title, or one for screen readers alone, `of` to sort by, and what is shown of it. `of` is a name in a
+// row, or a function of the row.
+const pick = (of) => (typeof of === "string" ? (row) => row[of] : of);
+const column = (title, of, show, more) => {
+  const value = pick(of);
+  return { title, value, show: (row) => (given(value(row)) ? show(value(row)) : "–"), ...more };
+};
+const textColumn = (title, of, show = pick(of), more = {}) => ({ title, text: true, value: pick(of), show, ...more });
+const namedColumn = (title, names, of) => textColumn(title, of, (row) => names[of(row)]);
+const methodColumn = (of) => {
+  const name = (row) => METHODS[pick(of)(row)];
+  return textColumn("method", name, (row) => [swatch(pick(of)(row)), name(row)]);
+};
+const seedColumn = (of) => column("seed", of, (seed) => String(D.seeds[seed]));
 const buttonColumn = (unseen, show) => ({ unseen, text: true, show });
-const badColumn = (title, of, about) => ({
-  title,
-  about,
-  value: of,
-  show: (row) => (row.base ? "" : make("span", { class: of(row) ? "bad" : null }, String(of(row)))),
-});
+const intervalColumn = (about, of, digits, none) => {
+  const ends = (row) => `${number(row.low, digits)} – ${number(row.high, digits)}`;
+  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row.low) ? ends(row) : none(row)) };
+};
+const badColumn = (title, value, about) => {
+  const show = (row) => (row.base ? "" : make("span", { class: value(row) ? "bad" : null }, String(value(row))));
+  return { title, about, value, show };
+};
 // A figure of D.columns; `of` gives it of a row.
-const figure = (name, of) => ({ ...D.columns[name], value: of, show: (row) => shownAs(name, of(row)) });
+const figure = (name, of = name) => ({
+  ...D.columns[name],
+  value: pick(of),
+  show: (row) => shownAs(name, pick(of)(row)),
+});
 
 function table(box, columns, rows, { name, by = null, down = false, kind = () => null }) {
   let [sorted, falling, start] = [by, down, 0];
   const body = make("tbody");
-  const heads = columns.map(({ title, unseen, text, value, about }, k) =>
-    make(
-      "th",
-      { scope: "col", class: text ? "text" : null },
-      value ? button(title, () => sort(k), { title: about }) : (title ?? make("span", { class: "unseen" }, unseen)),
-    ),
-  );
-  const pager = make("div", { class: "row pager" });
-  const leaf = (count) => {
-    start += count;
-    show();
-  };
-
-  function sort(k) {
+  const sort = (k) => {
     falling = sorted === k ? !falling : Boolean(columns[k].down);
     [sorted, start] = [k, 0];
     show();
-  }
+  };
+  const heads = columns.map(({ title, unseen, text, value, about }, k) => {
+    const content = title ?? make("span", { class: "unseen" }, unseen);
+    const head = value ? button(title, () => sort(k), { title: about }) : content;
+    return make("th", { scope: "col", class: text ? "text" : null }, head);
+  });
+  const pager = make("div", { class: "row pager" });
+  const leaf = (text, count, disabled) =>
+    button(
+      text,
+      () => {
+        start += count;
+        show();
+      },
+      { disabled },
+    );
 
   function ordered() {
     if (!given(sorted)) return rows;
@@ -65,18 +73,17 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
 
   function show() {
     heads.forEach((head, k) => {
-      if (columns[k].value)
-        head.setAttribute("aria-sort", k === sorted ? (falling ? "descending" : "ascending") : "none");
+      const order = k !== sorted ? "none" : falling ? "descending" : "ascending";
+      if (columns[k].value) head.setAttribute("aria-sort", order);
     });
-    const shown = ordered().slice(start, start + PAGE);
-    body.replaceChildren(
-      ...shown.map((row) => make("tr", { class: kind(row) }, ...columns.map((one) => cell(one, row)))),
-    );
     const end = Math.min(start + PAGE, rows.length);
+    const line = (row) => make("tr", { class: kind(row) }, ...columns.map((one) => cell(one, row)));
+    body.replaceChildren(...ordered().slice(start, end).map(line));
+    const places = rows.length ? `${whole(start + 1)} to ${whole(end)} of ${whole(rows.length)}` : "none";
     pager.replaceChildren(
-      button("earlier", () => leaf(-PAGE), { disabled: start === 0 }),
-      make("span", {}, rows.length ? `${whole(start + 1)} to ${whole(end)} of ${whole(rows.length)}` : "none"),
-      button("later", () => leaf(PAGE), { disabled: end >= rows.length }),
+      leaf("earlier", -PAGE, start === 0),
+      make("span", {}, places),
+      leaf("later", PAGE, end >= rows.length),
     );
   }
 
@@ -96,42 +103,33 @@ function leaderboard() {
   const name = (row) => (row.base ? `baseline: ${D.baseline_names[row.baseline]}` : row.name);
   const settings = (row) => make("small", {}, D.methods[row.method].settings || "default settings");
   const method = (row) => (row.base ? name(row) : [swatch(row.method), row.name, settings(row)]);
-  const interval = (row) => (given(row.low) ? `${number(row.low, digits)} – ${number(row.high, digits)}` : alone);
+  const width = (row) => (given(row.low) ? row.high - row.low : null);
   const pairs = counted((D.taking_part.length * (D.taking_part.length - 1)) / 2, "pair");
   const tested = `Wilcoxon's signed ranks over ${paired}, Holm over ${pairs}, 5 %`;
-  table(
-    $("leaders"),
-    [
-      textColumn("method", name, method),
-      figure(score, (row) => row[score]),
-      {
-        title: "95 % interval",
-        about: "Sorts by its width",
-        value: (row) => (given(row.low) ? row.high - row.low : null),
-        show: (row) => (row.base ? "" : interval(row)),
-      },
-      {
-        ...textColumn("group", (row) => row.letters ?? ""),
-        about: `Methods that share a letter do not differ significantly: ${tested}`,
-      },
-      ...figures.map((one) => figure(one, (row) => row[one])),
-      { title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) },
-      badColumn("failed", (row) => row.failed),
-      ...(D.warnings.length ? [badColumn("warned", (row) => warned[row.method], "Runs with a warning")] : []),
-    ],
-    [...D.leaderboard, ...bases],
-    { name: "Leaderboard", by: 1, down: D.score.better === "more", kind: (row) => (row.base ? "base" : null) },
-  );
+  const about = `Methods that share a letter do not differ significantly: ${tested}`;
+  const letters = (row) => row.letters ?? "";
+  const columns = [
+    textColumn("method", name, method),
+    figure(score),
+    intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : alone)),
+    textColumn("group", letters, letters, { about }),
+    ...figures.map((one) => figure(one)),
+    { title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) },
+    badColumn("failed", (row) => row.failed),
+    ...(D.warnings.length ? [badColumn("warned", (row) => warned[row.method], "Runs with a warning")] : []),
+  ];
+  const order = { by: 1, down: D.score.better === "more" };
+  const kind = (row) => (row.base ? "base" : null);
+  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", ...order, kind });
 }
 
 // Buttons to watch a run, if it has an animation, and for the command that runs it again.
 function runButtons(k) {
   const R = D.rows;
-  const name = `${METHODS[R.method[k]]} on ${INSTANCES[R.instance[k]]}, seed ${D.seeds[R.seed[k]]}`;
-  const place = `instance = ${D.instances[R.instance[k]].number}\nseed = ${D.seeds[R.seed[k]]}\nEND`;
-  const repeat = button("command", () => showCommand(name, `${D.heads[R.head[k]]}${place}`), {
-    title: "The command that runs it again",
-  });
+  const seed = D.seeds[R.seed[k]];
+  const name = `${METHODS[R.method[k]]} on ${INSTANCES[R.instance[k]]}, seed ${seed}`;
+  const text = `${D.heads[R.head[k]]}instance = ${D.instances[R.instance[k]].number}\nseed = ${seed}\nEND`;
+  const repeat = button("command", () => showCommand(name, text), { title: "The command that runs it again" });
   if (!D.animations.tracks[k]) return [repeat];
   return [button("watch", () => openTrack(k), { title: "Watch this track" }), repeat];
 }
@@ -141,43 +139,35 @@ function warningSign(k) {
   return make("span", { class: "bad", role: "img", title, "aria-label": `warning: ${title}` }, " ⚠");
 }
 
+// Fills selects of [value, name] pairs by their ids, and shows the rows that have the chosen values of `of`.
+function filtered(selects, rows, show) {
+  const fill = () => {
+    const fits = (row) => selects.every(([id, , , of]) => ["", String(of(row))].includes($(id).value));
+    show(rows.filter(fits));
+  };
+  for (const [id, all, names] of selects) choose($(id), [["", all], ...names], "", fill);
+  fill();
+}
+
 function allRows() {
   const R = D.rows;
+  const of = (name) => (k) => R[name][k];
   const settings = (k) => D.methods[R.method[k]].settings;
-  const fill = () => {
-    const [method, instance] = [$("of-method").value, $("of-instance").value];
-    const chosen = (k) =>
-      (method === "" || R.method[k] === +method) && (instance === "" || R.instance[k] === +instance);
-    table(
-      $("all-rows"),
-      [
-        buttonColumn("watch, or run again", runButtons),
-        textColumn(
-          "method",
-          (k) => R.method[k],
-          (k) => [METHODS[R.method[k]], D.warned[k] ? warningSign(k) : null],
-        ),
-        textColumn("settings", settings, (k) => settings(k) || "default"),
-        textColumn(
-          "instance",
-          (k) => R.instance[k],
-          (k) => INSTANCES[R.instance[k]],
-        ),
-        column(
-          "seed",
-          (k) => R.seed[k],
-          (seed) => String(D.seeds[seed]),
-        ),
-        ...Object.keys(D.columns).map((name) => figure(name, (k) => R[name][k])),
-        textColumn("key", (k) => R.key[k]),
-      ],
-      range(R.key.length).filter(chosen),
-      { name: "All runs", by: 5 },
-    );
-  };
-  choose($("of-method"), [["", "all"], ...numbered(METHODS)], "", fill);
-  choose($("of-instance"), [["", "all"], ...numbered(INSTANCES)], "", fill);
-  fill();
+  const columns = [
+    buttonColumn("watch, or run again", runButtons),
+    textColumn("method", of("method"), (k) => [METHODS[R.method[k]], D.warned[k] ? warningSign(k) : null]),
+    textColumn("settings", settings, (k) => settings(k) || "default"),
+    namedColumn("instance", INSTANCES, of("instance")),
+    seedColumn(of("seed")),
+    ...Object.keys(D.columns).map((name) => figure(name, of(name))),
+    textColumn("key", of("key")),
+  ];
+  const selects = [
+    ["of-method", "all", numbered(METHODS), of("method")],
+    ["of-instance", "all", numbered(INSTANCES), of("instance")],
+  ];
+  const show = (rows) => table($("all-rows"), columns, rows, { name: "All runs", by: 5 });
+  filtered(selects, range(R.key.length), show);
 }
 
 // Expected running times of single searches, by function and dimension; the least is bold.
@@ -199,39 +189,28 @@ function runningTimes() {
       return make(row.times[k] === least.get(place(row, k)) ? "strong" : "span", {}, whole(row.times[k]));
     },
   });
-  const fill = () => {
-    const [chosen, dimension] = [$("of-function").value, $("of-dimension").value];
-    const rows = D.times.filter(
-      (row) => (chosen === "" || row.function === +chosen) && (dimension === "" || row.dimension === +dimension),
-    );
-    table(
-      $("ert"),
-      [
-        methodColumn((row) => row.method),
-        textColumn(
-          "function",
-          (row) => row.function,
-          (row) => functions.get(row.function),
-        ),
-        column("dimension", (row) => row.dimension, String),
-        ...D.above.map(time),
-        ...["reached", "above"].map((name) => figure(name, (row) => row[name])),
-        column("runs", (row) => row.runs, whole, { down: true }),
-      ],
-      rows.sort((a, b) => a.dimension - b.dimension || a.function - b.function || b.reached - a.reached),
-      { name: "Running times" },
-    );
-  };
+  const columns = [
+    methodColumn("method"),
+    textColumn("function", "function", (row) => functions.get(row.function)),
+    column("dimension", "dimension", String),
+    ...D.above.map(time),
+    figure("reached"),
+    figure("above"),
+    column("runs", "runs", whole, { down: true }),
+  ];
   const names = [...functions].sort(([a], [b]) => a - b).map(([one, name]) => [String(one), name]);
-  choose($("of-function"), [["", "each"], ...names], "", fill);
-  choose($("of-dimension"), [["", "each"], ...dimensions.map((one) => [String(one), String(one)])], "", fill);
-  fill();
+  const selects = [
+    ["of-function", "each", names, (row) => row.function],
+    ["of-dimension", "each", dimensions.map((one) => [String(one), String(one)]), (row) => row.dimension],
+  ];
+  const rows = D.times.sort((a, b) => a.dimension - b.dimension || a.function - b.function || b.reached - a.reached);
+  filtered(selects, rows, (shown) => table($("ert"), columns, shown, { name: "Running times" }));
 }
 
 function failures() {
   const reasons = (row) => row.reasons.join("; ");
   const command = (row) => button("command", () => showCommand(row.name, row.command));
-  const columns = [textColumn("cell", (row) => row.name), textColumn("why its attempts failed", reasons)];
+  const columns = [textColumn("cell", "name"), textColumn("why its attempts failed", reasons)];
   table($("lost"), [...columns, buttonColumn("run again", command)], D.failures, { name: "Failures" });
 }
 

@@ -65,7 +65,7 @@ function chart(width, { lines, bands, label, unit, digits }) {
   svg.append(cursor);
   const follow = (event) => {
     const place = event.clientX - svg.getBoundingClientRect().left;
-    seek(Math.max(0, Math.min(shown - 1, Math.round((place - BOX.left) / across))));
+    seek(between(0, shown - 1, Math.round((place - BOX.left) / across)));
   };
   svg.addEventListener("pointerdown", (event) => {
     svg.setPointerCapture(event.pointerId);

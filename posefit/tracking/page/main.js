@@ -20,12 +20,11 @@ function header() {
 
 // A frame's time, figures and marks in words.
 function frameText(frame) {
-  const figures = ["mpjpe_mm", "iou", "cost"]
-    .filter((name) => D.columns[name])
-    .map((name) => {
-      const { label, unit } = D.columns[name];
-      return `${label} ${shownAs(name, D.rows[name][frame])} ${unit}`.trim();
-    });
+  const figureText = (name) => {
+    const { label, unit } = D.columns[name];
+    return `${label} ${shownAs(name, D.rows[name][frame])} ${unit}`.trim();
+  };
+  const figures = ["mpjpe_mm", "iou", "cost"].filter((name) => D.columns[name]).map(figureText);
   const other = otherOf(frame);
   const states = MARKS.filter(([name]) => D.marks[name].includes(frame)).map(([, , words]) => words);
   if (other) states.push(`may be the thin bones: ${whole(100 * other.weight)} %`);
@@ -47,18 +46,15 @@ function paint() {
   $("turning").setAttribute("aria-label", `The body in 3D, which arrow keys turn, ${text}`);
 }
 
-const play = clock(
-  $("play"),
-  () => (1000 * D.step) / D.fps / +$("speed").value,
-  (over) => {
-    show.frame = (show.frame + over) % shown;
-    paint();
-  },
-);
+const pace = () => (1000 * D.step) / D.fps / +$("speed").value;
+const play = clock($("play"), pace, (over) => {
+  show.frame = (show.frame + over) % shown;
+  paint();
+});
 
 function seek(frame) {
   play(false);
-  show.frame = Math.max(0, Math.min(shown - 1, frame));
+  show.frame = between(0, shown - 1, frame);
   paint();
 }
 
@@ -71,8 +67,8 @@ function seekMark(way) {
 
 const KEYS = {
   " ": () => $("play").click(),
-  ArrowLeft: (event) => seek(show.frame - (event.shiftKey ? 10 : 1)),
-  ArrowRight: (event) => seek(show.frame + (event.shiftKey ? 10 : 1)),
+  ArrowLeft: ({ shiftKey }) => seek(show.frame - (shiftKey ? 10 : 1)),
+  ArrowRight: ({ shiftKey }) => seek(show.frame + (shiftKey ? 10 : 1)),
   Home: () => seek(0),
   End: () => seek(shown - 1),
   n: () => seekMark(1),
@@ -105,14 +101,13 @@ function player() {
   $("with-mask").checked = !D.film;
   $("close-up").checked = closeness(0) > 1.4;
   $("truth-label").hidden = !truthAt;
-  for (const id of ["with-film", "with-mask", "with-body", "with-truth", "close-up"])
-    $(id).onchange = () => {
-      legends();
-      paint();
-    };
-  $("from-camera").onclick = () => look(0, 0);
-  $("from-side").onclick = () => look(Math.PI / 2, 0);
-  $("from-above").onclick = () => look(0, 1.4);
+  const repaint = () => {
+    legends();
+    paint();
+  };
+  for (const id of ["with-film", "with-mask", "with-body", "with-truth", "close-up"]) $(id).onchange = repaint;
+  const looks = { "from-camera": [0, 0], "from-side": [Math.PI / 2, 0], "from-above": [0, 1.4] };
+  for (const [id, place] of Object.entries(looks)) $(id).onclick = () => look(...place);
   $("doubtful").hidden = !marked.length;
   $("before").onclick = () => seekMark(-1);
   $("after").onclick = () => seekMark(1);

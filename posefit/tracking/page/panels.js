@@ -24,7 +24,7 @@ function solids(frame) {
   const level = D.intervals.levels.indexOf(80);
   const each = D.joints.map((_, joint) => {
     const off = radius(frame, level, joint) ?? 0;
-    return Math.max(FAINTEST, Math.min(1, (UNSURE - off) / (UNSURE - SURE)));
+    return between(FAINTEST, 1, (UNSURE - off) / (UNSURE - SURE));
   });
   return BONES.map(([parent, joint]) => Math.min(each[parent], each[joint]));
 }
@@ -68,7 +68,7 @@ const middle = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.l
 // The zoom of a camera's close-up: the body fills most of its height.
 function closeness(camera) {
   const tall = framed[camera].filter(given).map((one) => one.tall);
-  return tall.length ? Math.max(1, Math.min(6, D.cameras[camera].size[1] / (CLOSE * Math.max(middle(tall), 1)))) : 1;
+  return tall.length ? between(1, 6, D.cameras[camera].size[1] / (CLOSE * Math.max(middle(tall), 1))) : 1;
 }
 
 // The part of a camera's picture that is shown: its left and top, and its zoom.
@@ -78,7 +78,7 @@ function part(frame) {
   const about = framed[show.camera].slice(Math.max(0, frame - CALM), frame + CALM + 1).filter(given);
   if (zoom === 1 || !about.length) return { left: 0, top: 0, zoom: 1 };
   const mean = (name) => about.reduce((sum, one) => sum + one[name], 0) / about.length;
-  const within = (centre, side) => Math.max(0, Math.min(side - side / zoom, centre - side / zoom / 2));
+  const within = (centre, side) => between(0, side - side / zoom, centre - side / zoom / 2);
   return { left: within(mean("x"), wide), top: within(mean("y"), high), zoom };
 }
 
