@@ -229,7 +229,10 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "failed_by": Counter(failure["method"] for failure in runs.failures),
         "reasons": Counter(reason for failure in runs.failures for reason in failure["reasons"]).most_common(REASONS),
         "unfinished": runs.unfinished,
-        "dropped": [{"instance": i, "missing": methods} for i, methods in contest.missing] if contest else [],
+        "dropped": [
+            {"instance": runs.instances[i], "missing": [runs.methods[m] for m in methods]}
+            for i, methods in (contest.missing if contest else ())
+        ],
         "unpaired": unpaired_sentence(contest) if contest else "",
     }
 

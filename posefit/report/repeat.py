@@ -1,5 +1,6 @@
 """The command that runs one row of a ledger again: a plan of one cell, on standard input."""
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ from posefit.sweep.table import is_search
 
 LAST_FIELDS = ("instance", "seed")  # the fields that rows with the same head differ in
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
-_ESCAPES = {'"': '\\"', "\\": "\\\\"}
+_ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x2029)}  # beyond those of JSON
 
 
 def repeat_command(spec: Mapping[str, Any]) -> str:
@@ -32,8 +33,8 @@ def command_head(spec: Mapping[str, Any]) -> str:
     The shell does not interpret the plan, whatever names it holds: each of its lines begins with a field's name.
     """
     fields = {name: spec[name] for name in FIELDS if name in spec and name not in LAST_FIELDS}
-    if "settings" in fields:  # TOML has no null: settings are parsed from their text
-        fields["settings"] = {name: setting_text(value) for name, value in fields["settings"].items()}
+    # TOML has no null: settings are parsed from their text
+    fields["settings"] = {name: setting_text(value) for name, value in spec["settings"].items()}
     return _BEGIN + "[[cells]]\n" + "".join(f"{name} = {_toml(value)}\n" for name, value in fields.items())
 
 
@@ -48,8 +49,4 @@ def _toml(value: Any) -> str:
 
 
 def _string(text: str) -> str:
-    return '"' + "".join(_ESCAPES.get(sign) or _sign(sign) for sign in text) + '"'
-
-
-def _sign(sign: str) -> str:
-    return f"\\u{ord(sign):04x}" if ord(sign) < 32 or 127 <= ord(sign) < 160 or sign in "\u2028\u2029" else sign
+    return json.dumps(text, ensure_ascii=False).translate(_ESCAPES)

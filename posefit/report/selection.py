@@ -12,7 +12,7 @@ three ways of choosing:
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,8 +80,7 @@ def selected(features: Array, errors: Array) -> Array:
     on the others, and whose depth was chosen on the others.
     """
     chosen = np.zeros(len(errors), dtype=int)
-    for held_out in _folds(len(errors), len(errors) if len(errors) <= MAX_LEAVE_ONE_OUT else FOLDS):
-        train = np.setdiff1d(np.arange(len(errors)), held_out)
+    for train, held_out in _folds(len(errors), len(errors) if len(errors) <= MAX_LEAVE_ONE_OUT else FOLDS):
         depth = _depth(features[train], errors[train])
         chosen[held_out] = _predicted(features[train], errors[train], features[held_out], depth)
     return chosen
@@ -126,16 +125,17 @@ def _why_not(instances: int, names: Sequence[str]) -> str:
     return "" if names else "the plan is the same for every instance, so that a selector has no features"
 
 
-def _folds(count: int, folds: int) -> list[Array]:
+def _folds(count: int, folds: int) -> Iterator[tuple[Array, Array]]:
+    """Yield the instances to train on, and those held out."""
     order = np.random.default_rng(FOLD_SEED).permutation(count)
-    return [np.sort(order[k::folds]) for k in range(min(folds, count))]
+    for k in range(min(folds, count)):
+        yield np.sort(np.delete(order, np.s_[k::folds])), np.sort(order[k::folds])
 
 
 def _depth(features: Array, errors: Array) -> int:
     """Return the depth with the lowest error on folds of these instances, the smallest of equal ones."""
     totals = dict.fromkeys(DEPTHS, 0.0)
-    for held_out in _folds(len(errors), INNER_FOLDS):
-        train = np.setdiff1d(np.arange(len(errors)), held_out)
+    for train, held_out in _folds(len(errors), INNER_FOLDS):
         for depth in DEPTHS:
             chosen = _predicted(features[train], errors[train], features[held_out], depth)
             totals[depth] += float(errors[held_out, chosen].sum())
@@ -155,8 +155,7 @@ def _predicted(features: Array, errors: Array, queries: Array, depth: int) -> Ar
 def _oracle_apart(runs: Array) -> float:
     """Return the mean error (methods, instances, seeds) of each run's method that is best on the other seeds."""
     others = runs.sum(axis=2, keepdims=True) - runs
-    chosen = others.argmin(axis=0)
-    return float(np.take_along_axis(runs, chosen[None], axis=0).mean())
+    return float(np.take_along_axis(runs, others.argmin(axis=0)[None], axis=0).mean())
 
 
 def _best_by_part(contest: Contest, errors: Array, best: int) -> list[dict[str, Any]]:

@@ -59,18 +59,18 @@ def write_report(
         write_iohprofiler(logged_runs(ledger), iohprofiler)
     if csv is not None:
         write_csv(map(flat, ledger.all_rows()), csv)
-    missing = [
-        {"instance": runs.instances[gap["instance"]], "missing": [runs.methods[m] for m in gap["missing"]]}
-        for gap in data["header"]["dropped"]
-    ]
-    return {"out": out, **dict(plain({name: data[name] for name in PRINTED if name in data})), "gaps": missing}
+    return {
+        "out": out,
+        **dict(plain({name: data[name] for name in PRINTED if name in data})),
+        "gaps": data["header"]["dropped"],
+    }
 
 
 def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leader, what is left out, the leaderboard, and the page's place."""
     board = report.get("leaderboard") or []
     lines = [report["answer"]] if report.get("answer") else []
-    lines += _gap_lines(report["header"], report["gaps"])
+    lines += _gap_lines(report["header"])
     lines += _board_lines(board)
     if any(row["letters"] for row in board):
         pairs = counted(comb(sum(row["taking_part"] for row in board), 2), "pair")
@@ -94,7 +94,7 @@ def _board_lines(board: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
+def _gap_lines(header: dict[str, Any]) -> list[str]:
     """Return the lines about failures, and the instances that are therefore not compared."""
     lines = []
     if header["failed"]:
@@ -102,7 +102,7 @@ def _gap_lines(header: dict[str, Any], gaps: list[dict[str, Any]]) -> list[str]:
         lines.append(f"{counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
         lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
     lines += [header["unpaired"]] if header["unpaired"] else []
-    if gaps:
+    if gaps := header["dropped"]:
         lines.append(f"left out of the comparison, for every method: {counted(len(gaps), 'instance')}")
         for gap in gaps[:MAX_MISSING]:
             why = f"no run of {', '.join(gap['missing'])}" if gap["missing"] else "no seed in common"

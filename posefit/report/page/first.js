@@ -111,10 +111,8 @@ function trouble() {
     note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
   }
   if (H.dropped.length) {
-    const missing = H.dropped.map((gap) => {
-      const names = gap.missing.map((m) => METHODS[m]).join("; ");
-      return `${INSTANCES[gap.instance]}: ${names ? `no run of ${names}` : "no seed in common"}`;
-    });
+    const why = (gap) => (gap.missing.length ? `no run of ${gap.missing.join("; ")}` : "no seed in common");
+    const missing = H.dropped.map((gap) => `${gap.instance}: ${why(gap)}`);
     const more = missing.length > MAX_MISSING ? [`and ${whole(missing.length - MAX_MISSING)} more`] : [];
     const text = `${counted(missing.length, "instance")} left out of the comparison, for every method:`;
     note("warn", [text], [...missing.slice(0, MAX_MISSING), ...more]);
