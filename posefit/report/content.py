@@ -326,4 +326,4 @@ def _by_instance(runs: Runs, figure: str) -> Array:
     total, count = (
         np.bincount(runs.instance[known], weights, minlength=len(runs.instances)) for weights in (values[known], None)
     )
-    return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    return np.asarray(np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0))

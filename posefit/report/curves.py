@@ -107,7 +107,7 @@ def _certainty_of(runs: Runs, rows: Array) -> dict[str, Any] | None:
 
 def search_grid(contest: Contest) -> Array:
     """Return numbers of evaluations for each dimension (up to 61,), evenly on a log scale up to the longest run."""
-    runs = [contest.runs.searches[k] for k in contest.rows.ravel()]
+    runs = [contest.runs.searches[k] for k in map(int, contest.rows.ravel())]
     most = max(float(run.evaluations[-1]) / run.dimension for run in runs)
     return np.unique(np.geomspace(1.0, max(most, 1.0), SEARCH_POINTS))
 
@@ -139,9 +139,9 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
             "times": [score.running_times[above] for above in SHOWN],
         }
         for method in contest.methods
-        for score in suite_scores(contest.runs.searches[k] for k in shared_rows(contest, method))
+        for score in suite_scores(contest.runs.searches[k] for k in shared_rows(contest, method).tolist())
     ]
 
 
 def _traces(contest: Contest, rows: Array) -> list[Trace]:
-    return [contest.runs.traces[k] for k in rows.ravel()]
+    return [contest.runs.traces[k] for k in map(int, rows.ravel())]
