@@ -64,7 +64,7 @@ class Offer:
     def origin(self) -> str:
         """What its results depend on: its distribution with its version, and a digest of its package's source.
 
-        The packages of posefit's own plugins, which have one version, are told apart by name.
+        The packages of posefit's own plugins, which have one version, are distinguished by name.
         """
         module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
         name = module.partition(".")[0] if self.distribution == PROJECT else f"{self.distribution} {self.version}"

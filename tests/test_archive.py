@@ -1,4 +1,4 @@
-"""Arrays of strangers: damaged ones are one line, and none is larger than was said before it was unpacked."""
+"""Arrays of hostile files: damaged ones are one line, and the size of each is known before it is unpacked."""
 
 import io
 import zipfile
@@ -23,10 +23,10 @@ def path(tmp_path):
 
 
 def test_arrays_come_back_as_numpy_wrote_them(path, tmp_path):
-    found = read(path)
-    assert set(found) == {"a", "b"}
-    np.testing.assert_array_equal(found["a"], np.arange(5000.0))
-    assert found["b"].tolist() == ["x", "y"]
+    arrays = read(path)
+    assert set(arrays) == {"a", "b"}
+    np.testing.assert_array_equal(arrays["a"], np.arange(5000.0))
+    assert arrays["b"].tolist() == ["x", "y"]
     turned = np.asfortranarray(np.arange(12).reshape(3, 4))
     np.savez(tmp_path / "b.npz", a=turned)
     np.testing.assert_array_equal(read(tmp_path / "b.npz")["a"], turned)

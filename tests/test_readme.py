@@ -29,9 +29,9 @@ def test_what_it_links_to_is_there() -> None:
 
 def test_its_optimiser_keeps_every_rule() -> None:
     code = next(block for block in blocks("python") if "class Spiral" in block)
-    found: dict[str, Any] = {"__name__": "spiral"}
-    exec(code, found)
-    report = check_optimiser(found["Spiral"])
+    names: dict[str, Any] = {"__name__": "spiral"}
+    exec(code, names)
+    report = check_optimiser(names["Spiral"])
     broken = {one.name for one in report.of("failed")}
     assert broken <= {"copies"}, str(report)  # a class without a module cannot be pickled
     assert len(code.splitlines()) <= 27

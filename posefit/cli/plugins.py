@@ -52,7 +52,7 @@ def doctor(context: click.Context, verbose: bool) -> None:
     from posefit.registry import claim_plugins, command_plugins, registry
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the same is said below
+        warnings.simplefilter("ignore")  # the report below says the same
         lines, well = diagnosis(registry(), command_plugins(_own(context)), claim_plugins(), verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)

@@ -37,11 +37,11 @@ def pages() -> list[Path]:
 def blocks(page: Path) -> Iterator[Block]:
     """Yield the blocks of a page, in order; not those that are instructions to the builder."""
     text = page.read_text("utf-8")
-    for found in _BLOCK.finditer(text):
-        language = found["language"].strip()
+    for block in _BLOCK.finditer(text):
+        language = block["language"].strip()
         if language.startswith("{"):
             continue
-        before = text[: found.start()]
+        before = text[: block.start()]
         marked = _MARK.search(before)
         why = ("", "") if marked is None else (marked["mark"], marked["reason"])
-        yield Block(str(page.relative_to(ROOT)), before.count("\n") + 1, language, found["text"], *why)
+        yield Block(str(page.relative_to(ROOT)), before.count("\n") + 1, language, block["text"], *why)

@@ -61,6 +61,6 @@ def _check_posefit(command: click.Command, words: list[str]) -> None:
 def _check_extras(words: list[str]) -> None:
     known = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
     for word in words:
-        found = re.fullmatch(r"(\.|posefit)\[(.*)\]", word)
-        for extra in found[2].split(",") if found else ():
+        extras = re.fullmatch(r"(\.|posefit)\[(.*)\]", word)
+        for extra in extras[2].split(",") if extras else ():
             assert extra in known, f"no extra {extra}"

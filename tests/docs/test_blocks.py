@@ -1,4 +1,4 @@
-"""Every block of code in README and the handbook runs, or says why it does not and is right as far as can be seen."""
+"""Every block of code in README and the handbook runs, or says why it does not and is right as far as can be checked."""
 
 import os
 import subprocess
@@ -65,9 +65,9 @@ def test_blocks_are_of_a_known_language_and_those_that_are_not_run_are_right() -
         elif block.language == "toml":
             tomllib.loads(block.text)
         else:
-            found = list(shell.commands(block.text))
-            assert found, block
-            for words in found:
+            commands = list(shell.commands(block.text))
+            assert commands, block
+            for words in commands:
                 shell.check(words)
 
 

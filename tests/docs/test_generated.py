@@ -82,10 +82,10 @@ def test_every_setting_of_every_method_is_described() -> None:
 
 
 def test_every_equation_has_a_line_and_a_test() -> None:
-    found = {f"{tag.source} {tag.step}": tag for tag in equations.tags()}
-    assert len(found) > 100
-    assert {tag.source for tag in found.values()} == set(equations.SOURCES)
-    assert [name for name, tag in found.items() if not equations.tests_of(tag)] == []
+    tags = {f"{tag.source} {tag.step}": tag for tag in equations.tags()}
+    assert len(tags) > 100
+    assert {tag.source for tag in tags.values()} == set(equations.SOURCES)
+    assert [name for name, tag in tags.items() if not equations.tests_of(tag)] == []
 
 
 def test_every_joint_is_described() -> None:

@@ -4,6 +4,7 @@ import importlib
 import os
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -17,7 +18,7 @@ def test_every_study_starts_and_is_named_by_a_page() -> None:
     pages = "".join(path.read_text("utf-8") for path in DOCS.rglob("*.md"))
     for path in sorted(STUDIES.glob("*.py")):
         study = importlib.import_module(path.stem)
-        if hasattr(study, "main"):
+        if isinstance(getattr(study, "main", None), click.Command):
             result = CliRunner().invoke(study.main, ["--help"])
             assert result.exit_code == 0, path.name
             assert f"docs/studies/{path.name}" in pages, path.name
@@ -55,13 +56,13 @@ def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
 
 def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
     table, path = importlib.import_module("table"), str(tmp_path / "rows.jsonl")
-    found = {name: {"name": name, "cost": cost} for name, cost in (("one", 1.5), ("other", 2.5))}
+    rows = {name: {"name": name, "cost": cost} for name, cost in (("one", 1.5), ("other", 2.5))}
     assert table.earlier(path, lambda row: row["name"]) == {}
-    coming = table.kept(path, iter(found.items()), 2)
-    assert next(coming) == ("one", found["one"])
-    assert table.earlier(path, lambda row: row["name"]) == {"one": found["one"]}
-    assert list(coming) == [("other", found["other"])]
-    assert table.earlier(path, lambda row: row["name"]) == found
+    coming = table.kept(path, iter(rows.items()), 2)
+    assert next(coming) == ("one", rows["one"])
+    assert table.earlier(path, lambda row: row["name"]) == {"one": rows["one"]}
+    assert list(coming) == [("other", rows["other"])]
+    assert table.earlier(path, lambda row: row["name"]) == rows
 
 
 def test_an_interval_holds_the_median() -> None:

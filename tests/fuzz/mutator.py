@@ -50,10 +50,10 @@ def _changed(rng: random.Random, content: bytes, other: bytes) -> bytes:
     if kind == 4:  # a word
         return content[:start] + rng.choice(WORDS) + content[start + rng.choice((0, 1, length)) :]
     if kind == 5:  # a number
-        found = list(_NUMBER.finditer(content[:200_000]))
-        if found:
-            one = rng.choice(found)
-            return content[: one.start()] + rng.choice(NUMBERS) + content[one.end() :]
+        numbers = list(_NUMBER.finditer(content[:200_000]))
+        if numbers:
+            number = rng.choice(numbers)
+            return content[: number.start()] + rng.choice(NUMBERS) + content[number.end() :]
     if kind == 6:  # a part of another file
         begin = rng.randrange(len(other) + 1)
         return content[:start] + other[begin : begin + length] + content[start + length :]

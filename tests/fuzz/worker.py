@@ -54,8 +54,8 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         return [one.silhouettes for one in Views([read_masks(room, (None, None))])]
 
     def calibration(path: Path) -> object:
-        found = read_calibrations(path)
-        return [(one.camera((64, 48), upright(found)), one.maps((64, 48))) for one in found]
+        cameras = read_calibrations(path)
+        return [(camera.camera((64, 48), upright(cameras)), camera.maps((64, 48))) for camera in cameras]
 
     def ledger(path: Path) -> object:
         room = path.parent / f"{NAME}-ledger"
@@ -97,9 +97,9 @@ def outcome(read: Callable[[Path], object], path: Path) -> tuple[str, str]:
     try:
         read(path)
     except ValueError as error:
-        said = str(error)
-        clean = NAME in said and "\n" not in said.strip() and len(said) < LONGEST
-        return ("refused", "") if clean else ("unclean", f"{type(error).__name__}: {said[:500]}")
+        message = str(error)
+        clean = NAME in message and "\n" not in message.strip() and len(message) < LONGEST
+        return ("refused", "") if clean else ("unclean", f"{type(error).__name__}: {message[:500]}")
     except BaseException as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return "unclean", f"{type(error).__name__}: {str(error)[:300]} ({place.filename}:{place.lineno})"

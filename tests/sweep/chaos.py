@@ -1,4 +1,4 @@
-"""A sweep that somebody sabotages: `python -m tests.sweep.chaos --engine processes|dask --cells 300 --events 60 --seed 1`.
+"""A sweep under sabotage: `python -m tests.sweep.chaos --engine processes|dask --cells 300 --events 60 --seed 1`.
 
 Cells take half a second. While they run, events come at random moments: a process that runs a cell is killed, or a
 Dask worker, the driver, or the driver with its whole group; one is stopped and goes on; a log is cut off as power
@@ -16,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,10 +88,10 @@ class Chaos:
     def _start(self) -> None:
         before = len(starts(self._starts))
         words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), self.engine, str(self.count), "slow"]
-        told = {**os.environ, STARTS: str(self._starts), "PYTHONPATH": str(ROOT)}
-        with (self.folder / "said.txt").open("ab") as said:
+        environment = {**os.environ, STARTS: str(self._starts), "PYTHONPATH": str(ROOT)}
+        with (self.folder / "output.txt").open("ab") as output:
             self._driver = subprocess.Popen(
-                words, cwd=ROOT, env=told, start_new_session=True, stdout=said, stderr=subprocess.STDOUT
+                words, cwd=ROOT, env=environment, start_new_session=True, stdout=output, stderr=subprocess.STDOUT
             )
         until = time.monotonic() + PATIENCE
         while self._driver.poll() is None and len(starts(self._starts)) == before and time.monotonic() < until:
@@ -146,13 +147,12 @@ class Chaos:
         known = dict.fromkeys(process for _, process in starts(self._starts)[-8:])
         return [process for process in known if self._driver.pid in _ancestors(process)]
 
-    def _harmed(self, pattern: str, harm: object) -> bool:
-        found = [path for path in sorted(self._ledger.glob(pattern)) if not path.name.startswith(".")]
-        found = [path for path in found if path.stat().st_size]
-        if not found:
+    def _harmed(self, pattern: str, harm: Callable[[Path], object]) -> bool:
+        paths = [path for path in sorted(self._ledger.glob(pattern)) if not path.name.startswith(".")]
+        paths = [path for path in paths if path.stat().st_size]
+        if not paths:
             return False
-        assert callable(harm)
-        harm(self._random.choice(found))
+        harm(self._random.choice(paths))
         return True
 
     def _place(self, path: Path) -> int:
@@ -184,10 +184,10 @@ def _parents(processes: list[int]) -> list[int]:
 
 
 def _ancestors(process: int) -> list[int]:
-    found = []
+    ancestors = []
     while (process := _parent(process)) > 1:
-        found.append(process)
-    return found
+        ancestors.append(process)
+    return ancestors
 
 
 def main() -> None:
@@ -198,11 +198,11 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=default)
     asked = parser.parse_args()
     with TemporaryDirectory() as folder:
-        told = Chaos(Path(folder), asked.engine, asked.cells, asked.events, asked.seed).run()
-        said = (Path(folder) / "said.txt").read_text(errors="replace")
-    print(json.dumps(told, indent=1))
-    if any(told[name] for name in ("lost", "doubled", "quarantined")):
-        print(said[-4000:], file=sys.stderr)
+        result = Chaos(Path(folder), asked.engine, asked.cells, asked.events, asked.seed).run()
+        output = (Path(folder) / "output.txt").read_text(errors="replace")
+    print(json.dumps(result, indent=1))
+    if any(result[name] for name in ("lost", "doubled", "quarantined")):
+        print(output[-4000:], file=sys.stderr)
         sys.exit(1)
 
 

@@ -108,7 +108,7 @@ def test_of_two_rows_of_one_cell_the_first_counts(tmp_path: Path) -> None:
     assert path.name < "later.jsonl"
     assert Ledger(folder).row(cell.key)["cost"] == 1.0
     assert [row["cost"] for row in Ledger(folder).rows()] == [1.0]
-    # whoever reads a later log first, and the others as they come, sees in the end what everybody sees
+    # the order in which logs are read makes no difference
     path.rename(tmp_path / path.name)
     growing = Ledger(folder)
     assert growing.row(cell.key)["cost"] == 3.0
