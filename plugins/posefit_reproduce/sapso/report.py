@@ -77,7 +77,7 @@ def _label(name: str) -> str:
 
 
 def _lines_claims(report: dict[str, Any]) -> Iterator[str]:
-    yield "What the paper says. Pairs are views and seeds of one clip, of single images of all: p-values speak of these alone."
+    yield "What the paper says. Pairs are views and seeds of one clip, of single images of all; p-values are of these."
     for one in report["claims"]:
         if one["source"]:
             yield f"  {one['verdict']}: {one['text']} ({one['source']}): {one['evidence']}"
