@@ -144,16 +144,15 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._ended = np.zeros(num_envs, dtype=bool)
         self._numbers = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._episodes: list[Episode | None] = [None] * num_envs
+        self._episodes: dict[int, Episode] = {}
         self._truths = np.empty((num_envs, ANGLES))
 
     @property
     def episodes(self) -> list[Episode]:
         """What each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        episodes = [episode for episode in self._episodes if episode is not None]
-        if len(episodes) < self.num_envs:
+        if len(self._episodes) < self.num_envs:
             raise error.ResetNeeded(NOT_BEGUN)
-        return episodes
+        return [self._episodes[i] for i in range(self.num_envs)]
 
     @property
     def search_spaces(self) -> list[SearchSpace]:
@@ -173,7 +172,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
         The option "reset_mask" selects the environments that begin; the others go on.
         """
-        begun = None not in self._episodes
+        begun = len(self._episodes) == self.num_envs
         seeds, mask = _seeds(seed, self.num_envs), _reset_mask(options, self.num_envs, begun)
         numbers = _chosen_instances(options, self.num_envs)
         for i in np.flatnonzero(mask).tolist():
@@ -282,7 +281,7 @@ class SearchEnv(RenderedEnv):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
         """Make one step. Raises gymnasium.error.ResetNeeded where the episode has ended."""
         vector = self._vector
-        if vector._episodes[0] is None:
+        if not vector._episodes:
             raise error.ResetNeeded(NOT_BEGUN)
         if vector._ended[0]:
             raise error.ResetNeeded("the episode has ended: reset before the next step")

@@ -189,15 +189,13 @@ class AuditedTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield the tracker's frame for each observation. Raises BrokenRuleError where one is missing or wrong."""
-        drawn = PoseCount()
-        stream = _Stream(observations, drawn)
-        passed = (ImportError, GeneratorExit)
+        drawn, stream = PoseCount(), _Stream(observations)
+        frames: Iterator[Frame] | None = None
         reported = given = 0
-        with plugin_errors(self._name, "it", passed=passed):
-            frames = iter(self._tracker.track(stream, rng))
         while True:
             try:
-                with drawn.counting(), plugin_errors(self._name, "it", passed=passed):
+                with drawn.counting(), plugin_errors(self._name, "it", passed=(ImportError, GeneratorExit)):
+                    frames = iter(self._tracker.track(stream, rng)) if frames is None else frames
                     frame = next(frames, None)
             except BrokenRuleError as broken:
                 if stream.error is not None and broken.__cause__ is stream.error:
@@ -260,11 +258,10 @@ class AuditedTracker:
 
 
 class _Stream:
-    """The observations that a tracker takes, with silhouettes of its own, so that its drawing is counted."""
+    """The observations that a tracker takes."""
 
-    def __init__(self, observations: Iterable[Observation], drawn: PoseCount) -> None:
-        self._rest, self._drawn = iter(observations), drawn
-        self.count = 0
+    def __init__(self, observations: Iterable[Observation]) -> None:
+        self._rest, self.count = iter(observations), 0
         self.waiting: deque[Observation] = deque()  # those whose frames are still to come
         self.error: Exception | None = None
 
