@@ -86,7 +86,7 @@ def load_arrays(path: str | Path, shapes: Mapping[str, Shape]) -> dict[str, Arra
     return arrays
 
 
-def indices_of(path: str | Path, name: str, values: NDArray[np.generic], count: int) -> NDArray[np.intp]:
+def indices_of(path: str | Path, name: str, values: NDArray[Any], count: int) -> NDArray[np.intp]:
     """Return distinct indices from 0 to below `count`. Raises ValueError where numbers of a file are not such."""
     whole = (values == np.round(values)) & (values >= 0.0) & (values < count)
     if not whole.all() or len(np.unique(values)) != len(values):

@@ -52,7 +52,8 @@ def evaluated(
     usable = np.ones(len(frames), dtype=bool) if held.all() else ~held
     evaluations, seconds = [frame.evaluations for frame in frames], [frame.seconds for frame in frames]
     cpu_seconds = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
-    errors, error_measures = {}, {}
+    errors: dict[str, Array] = {}
+    error_measures: dict[str, Any] = {}
     if scene.truth is not None:
         errors, error_measures = _errors(scene, frames, prior, training, np.array(nearest_poses))
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))

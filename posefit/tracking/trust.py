@@ -78,7 +78,7 @@ def mean_acceleration(joints: Array, usable: NDArray[np.bool_], fps: float) -> f
 
 def foot_share(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
     """Return the share of usable frames in which a foot stands, of joints (T, 27, 3); None where no frame is usable."""
-    return float(standing(joints, fps).any(axis=1)[usable].mean()) if usable.any() else None
+    return float(np.any(standing(joints, fps)[usable], axis=1).mean()) if usable.any() else None
 
 
 def stance_spread(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:

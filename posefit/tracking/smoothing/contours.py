@@ -249,8 +249,8 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float, *, buil
         out = np.zeros((count, BODY_NUMBERS, BODY_NUMBERS)), np.zeros((count, BODY_NUMBERS))
         scales = np.maximum(scale * view.metres, MIN_ROBUST_SCALE)
         contours = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        body = BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii)
-        kernels.pull_to_borders(*body, *contours, scales, out)
+        drawn_body = BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii)
+        kernels.pull_to_borders(*drawn_body, *contours, scales, out)
         deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / view.metres) ** 2
         worth = 1.0 / (view.metres**3 * CORRELATION_LENGTH * deviation)
         curvature, gradient = out[0] * worth[:, None, None], out[1] * worth[:, None]
