@@ -391,8 +391,8 @@ def radii_of(doubt: Calibration, one: Kept, every: int = 1) -> tuple[Array, Arra
     for k in range(0, len(track), every):
         recalibration = doubt.recalibration(doubt.log(one.seen[k]))
         posterior = replace(track.posterior(k), recalibration=recalibration)
-        joints.append(joint_intervals(track.skeleton, posterior, track.told[k]).radii)
-        angles.append(angle_intervals(posterior, track.told[k]).halves)
+        joints.append(joint_intervals(track.skeleton, posterior, track.told[k]))
+        angles.append(angle_intervals(posterior, track.told[k]))
     return np.array(joints), np.array(angles)
 
 

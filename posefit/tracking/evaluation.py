@@ -143,7 +143,7 @@ def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> 
         if frame.posterior is None:
             continue
         sides[k] = unknown_sides(skeleton, frame.posterior, frame.pose)
-        radii = joint_intervals(skeleton, frame.posterior, frame.pose).radii[:, 1:]
+        radii = joint_intervals(skeleton, frame.posterior, frame.pose)[:, 1:]
         radii_mm.append(1e3 * radii)
         if truth is not None:
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)

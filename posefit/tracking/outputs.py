@@ -226,8 +226,8 @@ def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array
     halves = np.full((len(frames), len(LEVELS), ANGLES), np.nan)
     for k, frame in enumerate(frames):
         if frame.posterior is not None:
-            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose).radii
-            halves[k] = angle_intervals(frame.posterior, frame.pose).halves
+            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose)
+            halves[k] = angle_intervals(frame.posterior, frame.pose)
     return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
 
 

@@ -76,7 +76,7 @@ def _colours(skeleton: Skeleton, frame: Frame) -> Array:
     """Return the colour of each bone (26, 3): of its side, the darker the less sure it is."""
     colours = np.array([SIDE_COLOURS[side][::-1] for side in SIDES[1:]], dtype=np.float64)
     if frame.posterior is not None:
-        radii = joint_intervals(skeleton, frame.posterior, frame.pose).radii[DRAWN_LEVEL]
+        radii = joint_intervals(skeleton, frame.posterior, frame.pose)[DRAWN_LEVEL]
         colours *= opacities(radii)[:, None]
     return np.asarray(colours.round(), np.uint8)
 

@@ -7,8 +7,8 @@ A silhouette seldom determines one pose. What it leaves open is a `Posterior`: w
 
     for mode in modes_of(skeleton, posterior):             # the likeliest first
         print(mode.weight, mode.pose[0])
-    joints = joint_intervals(skeleton, posterior, pose)    # metres about the joints of a pose (66,)
-    print(joints.radii[1])                                 # that hold each joint in 80 of 100 cases
+    radii = joint_intervals(skeleton, posterior, pose)     # metres about the joints of a pose (66,)
+    print(radii[1])                                        # that hold each joint in 80 of 100 cases
 
 | subject | field's term | file |
 |---|---|---|

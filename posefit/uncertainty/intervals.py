@@ -1,6 +1,5 @@
 """Intervals of joints and angles from weighted poses, each blurred by the model's error."""
 
-from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -17,50 +16,27 @@ FARTHEST = 6.0  # spreads: the widest radius searched
 CLOSE = 1e-3  # spreads: the least distance that a difference is divided by
 
 
-@dataclass(frozen=True, eq=False)
-class JointIntervals:
-    """Joints relative to the root, and their intervals. Metres."""
+def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> Array:
+    """Return the radii (levels, 27), metres, of the balls about the joints of a `pose` (66,) that hold the true ones.
 
-    mean: Array = field(repr=False)  # (27, 3)
-    covariance: Array = field(repr=False)  # (27, 3, 3)
-    radii: Array = field(repr=False)  # (levels, 27) of the balls about the reported joints that hold the true ones
-
-
-@dataclass(frozen=True, eq=False)
-class AngleIntervals:
-    """Angles and their intervals. Radians."""
-
-    mean: Array = field(repr=False)  # (66,) circular
-    halves: Array = field(repr=False)  # (levels, 66): to either side of the reported angles
-
-
-def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> JointIntervals:
-    """Return the joints of weighted poses, and the balls about those of a `pose` (66,) that hold them.
-
-    A ball's radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a pose drawn by weight, with
-    a normal error along each axis, times a factor; the posterior's recalibration has both. Where two modes are likely,
-    the wider balls reach from one to the other.
+    Joints are relative to the root. A radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a
+    pose drawn by weight, with a normal error along each axis, times a factor; the posterior's recalibration has both.
+    Where two modes are likely, the wider balls reach from one to the other.
     """
     model = posterior.recalibration or Recalibration()
-    joints, centre = skeleton.joints(posterior.poses), skeleton.joints(pose)
-    mean = np.einsum("k,kjd->jd", posterior.weights, joints)
-    off = joints - mean
-    covariance = np.einsum("k,kjd,kje->jde", posterior.weights, off, off)
-    covariance += (model.joint_spreads**2)[:, None, None] * np.eye(3)
-    radii = _quantiles(np.linalg.norm(joints - centre, axis=2), posterior.weights, model.joint_spreads, 3)
-    return JointIntervals(mean, covariance, model.joint_factors * radii)
+    distances = np.linalg.norm(skeleton.joints(posterior.poses) - skeleton.joints(pose), axis=2)
+    return np.asarray(model.joint_factors * _quantiles(distances, posterior.weights, model.joint_spreads, 3))
 
 
-def angle_intervals(posterior: Posterior, pose: Array) -> AngleIntervals:
-    """Return the circular means of angles, and their intervals to either side of those of a `pose` (66,).
+def angle_intervals(posterior: Posterior, pose: Array) -> Array:
+    """Return the intervals (levels, 66), radians, to either side of the angles of a `pose` (66,) for the true ones.
 
     As for joints, but an interval is never more than half a turn to either side.
     """
     model = posterior.recalibration or Recalibration()
-    turns = np.einsum("k,ka->a", posterior.weights, np.exp(1j * posterior.poses))
-    off = np.abs(wrapped(posterior.poses - pose))
-    halves = model.angle_factors * _quantiles(off, posterior.weights, model.angle_spreads, 1)
-    return AngleIntervals(np.angle(turns), np.minimum(halves, np.pi))
+    distances = np.abs(wrapped(posterior.poses - pose))
+    halves = model.angle_factors * _quantiles(distances, posterior.weights, model.angle_spreads, 1)
+    return np.asarray(np.minimum(halves, np.pi))
 
 
 def _quantiles(distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]) -> Array:
