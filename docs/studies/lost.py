@@ -1,7 +1,7 @@
-"""Which frames are lost, in which are left and right swapped, and does the tracker know?
+"""Which frames are lost, in which left and right are exchanged, and how well the tracker detects it.
 
 Follows recorded clips of many motions from all sides, with clean and with realistic masks, fits the logistic models of
-`posefit_exemplars`, and judges them on people they were not fitted to.
+`posefit_exemplars`, and evaluates them on people they were not fitted to.
 """
 
 import json
@@ -16,62 +16,60 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from people import CHANGES, GROUPS, PAIRS, SIDES, TOLD, WALKS, Piece, Views
+from clips import GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from people import CHANGES
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.tracker import Observation
-from posefit.footage.training import training_clips, training_motions
 from posefit.reading import parsed_json, read_text
 from posefit.silhouette.corruption import shadow, wandering
 from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.evaluation import LOST
-from posefit.tracking.options import TrackOptions
-from posefit.tracking.pipeline import track_scene
 from posefit.uncertainty.calibration import calibration_error
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.jobs import Progress, each
 from scores import auroc, false_alarms, kept_errors
 from table import WORKERS, bar, markdown, percent
 
-SALT = 2026  # part of every seed
-HELD = 10  # frames for which the same is wrong: a third of a second, as all clips of the experiment have 30 a second
+RNG_STREAM = 2026  # part of every seed
+LASTING = 10  # frames of a lasting error: a third of a second
 RIM = 0.006  # of the person's height: the standard deviation of how far all borders of a track are outside
-EDGE = 0.004  # and of how far a border wanders besides, in each frame anew
-SMOOTH = 0.02  # over which length it does
-BITES, BULGES = 0.8, 0.8  # how many there are, the mean of a Poisson distribution
+EDGE = 0.004  # and of a border's own deviation, drawn for each frame
+SMOOTH = 0.02  # its correlation length
+BITES, BULGES = 0.8, 0.8  # means of their numbers, Poisson
 SIZES = (0.02, 0.06)  # radii of these and of missing ends, as shares of the person's height
-MISSING, SHADOW = 0.3, 0.3  # how likely an end is missing, and a shadow there
+MISSING, SHADOW = 0.3, 0.3  # probabilities of a missing end and of a shadow
 SHADOWS = (0.1, 0.25)  # strengths of shadows
 
 
-def worn(mask: Mask, rim: float, held: np.random.Generator, fresh: np.random.Generator) -> Mask:
-    """Return a mask (height, width) as a camera's is; one of which little would be left stays as it was.
+def noisy_mask(mask: Mask, rim: float, lasting: np.random.Generator, fresh: np.random.Generator) -> Mask:
+    """Return a mask (height, width) with errors of a camera's; one of which little would be left is unchanged.
 
-    What stays for a while is drawn from `held`, in the same order whatever the mask; the rest from `fresh`.
+    Lasting errors are drawn from `lasting`, in the same order whatever the mask; the rest from `fresh`.
     """
     if not mask.any():
         return mask
     rows, columns = np.nonzero(mask)
     top, tall = int(rows.min()), int(np.ptp(rows)) + 1
     left, wide = int(columns.min()), int(np.ptp(columns)) + 1
-    spoilt = mask.copy()
-    if held.random() < SHADOW:
-        spoilt = shadow(spoilt, held.uniform(*SHADOWS), held)
-    for count, value in ((held.poisson(BULGES), True), (held.poisson(BITES), False)):
-        for across, down, size in held.random((count, 3)):
+    noisy = mask.copy()
+    if lasting.random() < SHADOW:
+        noisy = shadow(noisy, lasting.uniform(*SHADOWS), lasting)
+    for count, value in ((lasting.poisson(BULGES), True), (lasting.poisson(BITES), False)):
+        for across, down, size in lasting.random((count, 3)):
             near = np.hypot(columns - left - across * wide, rows - top - down * tall).argmin()
-            _disc(spoilt, columns[near], rows[near], _radius(size, tall), value)
-    gone, end, size = held.random(3)
+            _disc(noisy, columns[near], rows[near], _radius(size, tall), value)
+    gone, end, size = lasting.random(3)
     if gone < MISSING:
         ends = (columns.argmin(), columns.argmax(), rows.argmax())
         where = ends[int(end * len(ends))]
-        _disc(spoilt, columns[where], rows[where], _radius(size, tall), False)
-    spoilt = wandering(spoilt, rim * tall, EDGE * tall, SMOOTH * tall, fresh)
-    return spoilt if spoilt.sum() > 0.5 * mask.sum() else mask
+        _disc(noisy, columns[where], rows[where], _radius(size, tall), False)
+    noisy = wandering(noisy, rim * tall, EDGE * tall, SMOOTH * tall, fresh)
+    return noisy if noisy.sum() > 0.5 * mask.sum() else mask
 
 
 def _radius(share: float, tall: int) -> int:
@@ -85,8 +83,8 @@ def _disc(mask: Mask, x: int, y: int, radius: int, value: bool) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Worn(Sequence[Observation]):
-    """Observations whose silhouettes are as a camera's masks are, each camera's on its own; the same each time."""
+class MaskNoise(Sequence[Observation]):
+    """Observations with errors in the masks, independent for each camera and reproducible."""
 
     observations: Sequence[Observation] = field(repr=False)
     seed: Sequence[int]
@@ -95,95 +93,85 @@ class Worn(Sequence[Observation]):
         return len(self.observations)
 
     def __getitem__(self, k):  # type: ignore[no-untyped-def]
-        seen = self.observations[k]
-        masks = [self._worn(silhouette.mask, k, camera) for camera, silhouette in enumerate(seen.silhouettes)]
-        return replace(seen, silhouettes=[Silhouette.of(mask) for mask in masks])
+        observation = self.observations[k]
+        masks = [self._noisy(silhouette.mask, k, camera) for camera, silhouette in enumerate(observation.silhouettes)]
+        return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks])
 
     def __iter__(self) -> Iterator[Observation]:
         return (self[k] for k in range(len(self)))
 
-    def _worn(self, mask: Mask, k: int, camera: int) -> Mask:
-        whole = np.random.default_rng([SALT, *self.seed, camera])
-        begins = int(whole.integers(HELD))
-        held = np.random.default_rng([SALT, *self.seed, camera, 1, (k + begins) // HELD])
-        fresh = np.random.default_rng([SALT, *self.seed, camera, 2, k])
-        return worn(mask, RIM * whole.standard_normal(), held, fresh)
+    def _noisy(self, mask: Mask, k: int, camera: int) -> Mask:
+        whole = np.random.default_rng([RNG_STREAM, *self.seed, camera])
+        begins = int(whole.integers(LASTING))
+        lasting = np.random.default_rng([RNG_STREAM, *self.seed, camera, 1, (k + begins) // LASTING])
+        fresh = np.random.default_rng([RNG_STREAM, *self.seed, camera, 2, k])
+        return noisy_mask(mask, RIM * whole.standard_normal(), lasting, fresh)
 
 
 CLEAN, MASKS = "as they are", "as masks are"
-CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES}
-WORN = CHANGES["all of these"]["corruption"]
-UNTOLD = {name: value for name, value in CHANGES["all of these"].items() if value is not WORN}
+ALL_CHANGES = {name: value for name, value in CHANGES["all of these"].items() if name != "corruption"}
+CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES, MASKS: ALL_CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
 FRAMES = 48  # of a clip at most
 QUICK_CLIPS = 2  # of a group, in a quick look, which are two people's
-ON_THE_SPOT: dict[str, tuple[Piece, ...]] = {
+ON_THE_SPOT: dict[str, tuple[Clip, ...]] = {
     "gestures": (
-        Piece("29_05", FRAMES, 1, "moves his arms"),
-        Piece("14_24", FRAMES, 2, "moves his arms"),
-        Piece("02_10", FRAMES, 4, "washes himself"),
-        Piece("29_20", FRAMES, 0, "moves his arms and turns"),
-        Piece("14_10", FRAMES, 1, "does something with his hands"),
-        Piece("135_02", FRAMES, 2, "a form of a martial art, on the spot"),
-        Piece("02_07", FRAMES, 4, "swings something"),
-        Piece("49_20", FRAMES, 1, "lifts his arms"),
+        Clip("29_05", FRAMES, 1, "moves their arms"),
+        Clip("14_24", FRAMES, 2, "moves their arms"),
+        Clip("02_10", FRAMES, 4, "washes himself"),
+        Clip("29_20", FRAMES, 0, "moves their arms and turns"),
+        Clip("14_10", FRAMES, 1, "does something with their hands"),
+        Clip("135_02", FRAMES, 2, "a form of a martial art, on the spot"),
+        Clip("02_07", FRAMES, 4, "swings something"),
+        Clip("49_20", FRAMES, 1, "lifts their arms"),
     ),
     "stands": (
-        Piece("49_15", 41, 1, "stands"),
-        Piece("29_02", FRAMES, 3, "stands"),
-        Piece("14_05", FRAMES, 2, "stands"),
-        Piece("05_12", FRAMES, 2, "stands"),
-        Piece("135_06", FRAMES, 0, "stands"),
-        Piece("29_24", FRAMES, 4, "stands"),
+        Clip("49_15", 41, 1, "stands"),
+        Clip("29_02", FRAMES, 3, "stands"),
+        Clip("14_05", FRAMES, 2, "stands"),
+        Clip("05_12", FRAMES, 2, "stands"),
+        Clip("135_06", FRAMES, 0, "stands"),
+        Clip("29_24", FRAMES, 4, "stands"),
     ),
 }
 EVERY = {**GROUPS, **ON_THE_SPOT}
-USUAL = (WALKS, *ON_THE_SPOT)  # what most footage is of
+COMMON = (WALKS, *ON_THE_SPOT)  # most footage
 
 
-class Turn(NamedTuple):
-    """One track: what of, and under which condition."""
+class Case(NamedTuple):
+    """One track: its clip, views and condition."""
 
     group: str
-    clip: Piece
+    clip: Clip
     views: Views
     condition: str
 
-    def spec(self, method: str, evaluations: int) -> dict[str, Any]:
-        """Return the cell of the track, followed by a method; that masks are a camera's is not in it."""
-        return {
-            "method": method,
-            "motion": self.clip.name,
-            "train": [self.clip.library],
-            "view_degrees": self.views,
-            "frames": min(self.clip.frames, FRAMES),
-            "instance": self.clip.instance,
-            "evaluations": evaluations,
-            **TOLD,
-            **(UNTOLD if self.condition == MASKS else CONDITIONS[self.condition]),
-        }
+    @property
+    def spec(self) -> dict[str, Any]:
+        """The fields of the cell, without the noise of masks."""
+        return cell_fields(self.clip, self.views, FRAMES, **CONDITIONS[self.condition])
 
 
-def turns(quick: bool) -> list[Turn]:
-    """Return the tracks, those of one person together, since they learn from one library."""
-    clips = [(group, clip) for group, found in EVERY.items() for clip in found[: QUICK_CLIPS if quick else None]]
-    conditions, tracks = list(CONDITIONS), []
+def cases(quick: bool) -> list[Case]:
+    """Return the tracks, those of one person together, since they share a library."""
+    clips = [(group, clip) for group, some in EVERY.items() for clip in some[: QUICK_CLIPS if quick else None]]
+    conditions, tracks = [name for name in CONDITIONS if name != MASKS], []
     for k, (group, clip) in enumerate(clips):
-        tracks.append(Turn(group, clip, VIEWS[k % len(VIEWS)], conditions[(3 * k + k // len(VIEWS)) % len(conditions)]))
-        tracks.append(Turn(group, clip, VIEWS[(k + 2) % len(VIEWS)], MASKS))
-        if group in USUAL and not quick:
-            tracks.append(Turn(group, clip, SIDES[(k + 4) % len(SIDES)], MASKS))
+        tracks.append(Case(group, clip, VIEWS[k % len(VIEWS)], conditions[(3 * k + k // len(VIEWS)) % len(conditions)]))
+        tracks.append(Case(group, clip, VIEWS[(k + 2) % len(VIEWS)], MASKS))
+        if group in COMMON and not quick:
+            tracks.append(Case(group, clip, SIDES[(k + 4) % len(SIDES)], MASKS))
     return sorted(set(tracks), key=lambda track: (track.clip.subject, track))
 
 
 Row = Mapping[str, Any]
 Flags = NDArray[np.bool_]
 
-STRENGTH = 0.03  # of the weights' prior, a normal one: its variance
-SWAPPED = 0.05  # of the frames whose sides are not called unknown: about, for `BOUNDS` come first, and footage differs
-BOUNDS = (0.01, 0.5)  # of how likely exchanged sides have to be for that; from a half on they are likelier than not
+STRENGTH = 0.03  # variance of the normal prior of weights
+SWAPPED = 0.05  # share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow it
+BOUNDS = (0.01, 0.5)  # of the probability from which sides are unknown
 DIGITS = 6
-# What each model looks at, of the evidence of a frame: now, and its means
+# The features of each model: evidence of a frame, and its means
 LOST_SIGNS = ("cost", "cost, lately", "farthest", "farthest, lately", "views")
 SIDES_SIGNS = (
     *(f"{name}{mean}" for name in ("cost", "reflected", "mirrored", "second") for mean in ("", ", in general")),
@@ -192,17 +180,17 @@ SIDES_SIGNS = (
 
 
 class Predictions(NamedTuple):
-    """What is said of the frames of a row."""
+    """The predictions for the frames of a row."""
 
-    lost: Array  # (T,) how likely each is lost
-    exchanged: Array  # (T,) how likely its sides are exchanged
+    lost: Array  # (T,) probability that each is lost
+    exchanged: Array  # (T,) probability that its sides are exchanged
     unknown: Flags  # (T,)
 
 
 def features(row: Row) -> Array:
     """Return the features (T, F) of a track's frames, as the tracker has them."""
     memory = EvidenceMeans(row["fps"])
-    return np.array([memory.features(told) for told in row["evidence"]])
+    return np.array([memory.features(values) for values in row["evidence"]])
 
 
 def lost_frames(rows: Sequence[Row]) -> Flags:
@@ -216,78 +204,75 @@ def swapped_frames(rows: Sequence[Row]) -> Flags:
 
 
 def fit(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return the models that are fitted to rows, as JSON holds them. Raises ValueError where they are of one person."""
+    """Return the models fitted to rows, as JSON holds them. Raises ValueError where they are of one person."""
     return _fitted(rows, [features(row) for row in rows])
 
 
 def judge(rows: Sequence[Row]) -> list[Predictions]:
-    """Return what is said of each row by models that were fitted to other people.
+    """Return the predictions for each row by models that were fitted to other people.
 
     Raises ValueError where there are fewer than three: of the others, too, each is left out once.
     """
     if len(people := dict.fromkeys(row["subject"] for row in rows)) < 3:
         raise InputError(f"rows must be of three people or more, got those of {', '.join(people)}")
     known = [features(row) for row in rows]
-    found: list[Predictions] = [Predictions(np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))] * len(rows)
-    for his, others in _left_out(rows):
+    predictions: dict[int, Predictions] = {}
+    for own, others in _left_out(rows):
         models = FailureClassifier.from_dict(_fitted([rows[k] for k in others], [known[k] for k in others]))
-        for k in his:
-            exchanged = np.array([models.sides.probability(one) for one in known[k]])
-            lost = np.array([models.lost.probability(one) for one in known[k]])
-            found[k] = Predictions(lost, exchanged, exchanged >= models.unknown)
-    return found
+        for k in own:
+            exchanged, lost = (
+                np.array([model.probability(values) for values in known[k]]) for model in (models.sides, models.lost)
+            )
+            predictions[k] = Predictions(lost, exchanged, exchanged >= models.unknown)
+    return [predictions[k] for k in range(len(rows))]
 
 
 def _left_out(rows: Sequence[Row]) -> list[tuple[list[int], list[int]]]:
     """Return the rows of each person, and those of the others."""
     people = list(dict.fromkeys(row["subject"] for row in rows))
     each = [[k for k, row in enumerate(rows) if row["subject"] == person] for person in people]
-    return [(his, [k for k in range(len(rows)) if k not in his]) for his in each]
+    return [(own, [k for k in range(len(rows)) if k not in own]) for own in each]
 
 
 def _fitted(rows: Sequence[Row], known: Sequence[Array]) -> dict[str, Any]:
-    """Return both models, and from where on sides are unknown: judged on each person by what the others say."""
+    """Return both models, and the probability from which sides are unknown, by models without each person in turn."""
     lost = _logistic("lost", np.concatenate(known), lost_frames(rows), LOST_SIGNS)
     sides = _logistic("swapped", np.concatenate(known), swapped_frames(rows), SIDES_SIGNS)
     exchanged, swapped = list[Array](), list[Flags]()
-    for his, others in _left_out(rows):
-        mine = [rows[k] for k in others]
-        told = _logistic("swapped", np.concatenate([known[k] for k in others]), swapped_frames(mine), SIDES_SIGNS)
-        detector = LogisticModel.from_dict(told)
-        exchanged.append(np.array([detector.probability(one) for k in his for one in known[k]]))
-        swapped.append(swapped_frames([rows[k] for k in his]))
+    for own, others in _left_out(rows):
+        truth = swapped_frames([rows[k] for k in others])
+        fitted = _logistic("swapped", np.concatenate([known[k] for k in others]), truth, SIDES_SIGNS)
+        model = LogisticModel.from_dict(fitted)
+        exchanged.append(np.array([model.probability(values) for k in own for values in known[k]]))
+        swapped.append(swapped_frames([rows[k] for k in own]))
     return {"lost": lost, "sides": sides, "unknown": _unknown(np.concatenate(exchanged), np.concatenate(swapped))}
 
 
 def _unknown(exchanged: Array, swapped: Flags) -> float:
-    """Return from which probability of exchanged sides on they are unknown: of the rest about `SWAPPED` are swapped."""
+    """Return the probability of exchanged sides from which they are unknown: of the rest about `SWAPPED` are."""
     order = np.argsort(exchanged, kind="stable")
     shares = np.cumsum(swapped[order]) / np.arange(1, len(order) + 1)
     few = np.flatnonzero(shares <= SWAPPED)
     return round(float(np.clip(exchanged[order][few[-1]] if len(few) else 0.0, *BOUNDS)), DIGITS)
 
 
-def _logistic(name: str, known: Array, came: Flags, signs: Sequence[str]) -> dict[str, Any]:
+def _logistic(name: str, known: Array, truth: Flags, signs: Sequence[str]) -> dict[str, Any]:
     """Return a logistic model of some of the features (n, F), as JSON holds it."""
     from sklearn.linear_model import LogisticRegression
 
-    if came.all() or not came.any():
-        raise InputError(
-            f"frames must be {name} and not {name}, to be told apart, got {int(came.sum())} of {len(came)}"
-        )
+    if truth.all() or not truth.any():
+        raise InputError(f"frames must be {name} and not {name}, got {int(truth.sum())} of {len(truth)}")
     mean, spread = known.mean(axis=0), known.std(axis=0)
     used = [k for k, sign in enumerate(NAMES) if sign in signs and spread[k] > 1e-9]
     model = LogisticRegression(C=STRENGTH, max_iter=2000)
-    model.fit((known[:, used] - mean[used]) / spread[used], came)
+    model.fit((known[:, used] - mean[used]) / spread[used], truth)
     weights = model.coef_[0] / spread[used]
     bias = float(model.intercept_[0] - weights @ mean[used])
     named = {NAMES[row]: round(float(weight), DIGITS) for row, weight in zip(used, weights, strict=True)}
     return {"weights": named, "bias": round(bias, DIGITS)}
 
 
-METHOD = "exemplars"
-EVALUATIONS = 2440  # of a frame
-LARGEST = 200_000_000  # bytes of such a file
+MAX_BYTES = 200_000_000  # of a file of rows
 
 
 def lost(
@@ -298,52 +283,43 @@ def lost(
     out: str | None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Return how well it is told which frames are lost and swapped, of people whom neither model nor library has seen.
+    """Return how well lost frames and exchanged sides are detected, of people in neither models nor library.
 
-    `out` is a new file for a row a track, and `rows` such a file, from which the models are fitted without following
-    anybody again. `store` is a new file for the models that are fitted to all of them, for `exemplars` to read.
+    `out` is a new file for a row a track, and `rows` such a file, from which the models are fitted without tracking
+    again. `store` is a new file for the models fitted to all rows, for `exemplars` to read.
     """
     if store and quick:
-        raise InputError("store must be asked for with all tracks, got --store with --quick")
+        raise InputError("store must be given for all tracks, got --store with --quick")
     if rows is not None and out is not None:
-        raise InputError("out must be given for tracks that are followed, got --out with --rows")
-    with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as kept:
-        found = (
-            [parsed_json(line) for line in read_text(rows, LARGEST).splitlines()]
+        raise InputError("out must be given for new tracks, got --out with --rows")
+    with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as stored:
+        tracks = (
+            [parsed_json(line) for line in read_text(rows, MAX_BYTES).splitlines()]
             if rows is not None
-            else _followed(turns(quick), workers, progress)
+            else _rows(cases(quick), workers, progress)
         )
         if file is not None:
-            file.write_text("".join(f"{json.dumps(row)}\n" for row in found), encoding="utf-8")
-        told = {"tracks": len(found)}
-        said, model = judge(found), fit(found)
-        if kept is not None:
-            kept.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
-    tables = lost_tables(found, [one.lost for one in said]) | {"sides": sides_table(found, said)}
-    return told | {"model": model} | tables
+            file.write_text("".join(f"{json.dumps(row)}\n" for row in tracks), encoding="utf-8")
+        predictions, model = judge(tracks), fit(tracks)
+        if stored is not None:
+            stored.write_text(json.dumps(model, indent=1) + "\n", encoding="utf-8")
+    tables = lost_tables(tracks, [row.lost for row in predictions]) | {"sides": sides_table(tracks, predictions)}
+    return {"tracks": len(tracks), "model": model} | tables
 
 
-def _followed(tracks: Sequence[Turn], workers: int | None, progress: Progress | None) -> list[dict[str, Any]]:
+def _rows(tracks: Sequence[Case], workers: int | None, progress: Progress | None) -> list[dict[str, Any]]:
     # all cells are made, and so checked, before any runs
-    cells = {track: cell_of(track.spec(METHOD, EVALUATIONS)) for track in tracks}
-    found = each({track: partial(_tracked, cell, track) for track, cell in cells.items()}, workers, progress)
-    return [found[track] for track in tracks]
+    cells = {track: cell_of(track.spec) for track in tracks}
+    return list(each({track: partial(_row, cell, track) for track, cell in cells.items()}, workers, progress).values())
 
 
-def _tracked(cell: TrackCell, track: Turn) -> dict[str, Any]:
-    """Return a row of a track: its frames' errors, costs, and evidence where the tracker tells it."""
+def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
+    """Return the row of a track: its frames' errors, costs, and evidence where the tracker has it."""
     scene = cell_scene(cell)
     if track.condition == MASKS:
         seed = [track.clip.instance, *track.clip.name.encode()]
-        scene = replace(scene, observations=Worn(scene.observations, seed))
-    training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
-    options = TrackOptions(
-        method=cell.method,
-        evaluations=cell.evaluations,
-        translation=cell.translation,  # type: ignore[arg-type]
-        seed=cell.seed,
-    )
-    told = track_scene(scene, training, options)
+        scene = replace(scene, observations=MaskNoise(scene.observations, seed))
+    result = track_of(cell, scene)
     row = {
         "subject": track.clip.subject,
         "group": track.group,
@@ -351,42 +327,42 @@ def _tracked(cell: TrackCell, track: Turn) -> dict[str, Any]:
         "views_degrees": list(track.views),
         "condition": track.condition,
         "fps": scene.fps,
-        "mpjpe_mm": [round(one["mpjpe_mm"], 2) for one in told.frames],
-        "swapped": [int(one["swapped"]) for one in told.frames],
-        "cost": [round(one["cost"], DIGITS) for one in told.frames],
+        "mpjpe_mm": [round(frame["mpjpe_mm"], 2) for frame in result.frames],
+        "swapped": [int(frame["swapped"]) for frame in result.frames],
+        "cost": [round(frame["cost"], DIGITS) for frame in result.frames],
     }
-    evidence = [frame.details.get("evidence", {}) for frame in told.estimates]
+    evidence = [frame.details.get("evidence", {}) for frame in result.estimates]
     if all(evidence):
-        row["evidence"] = [{name: round(value, DIGITS) for name, value in one.items()} for one in evidence]
+        row["evidence"] = [{name: round(value, DIGITS) for name, value in values.items()} for values in evidence]
     return row
 
 
 T = TypeVar("T")
 
 RECALLS = (0.9, 0.95)
-SHARES = (0.25, 0.5, 0.75, 0.9, 1.0)  # of frames that are kept, the least doubted first
+SHARES = (0.25, 0.5, 0.75, 0.9, 1.0)  # of the frames with the least probabilities
 NEAR_MM = (100.0, 200.0)  # frames in between are neither clearly lost nor clearly not
 
 
-def lost_tables(rows: Sequence[Row], doubts: Sequence[Array]) -> dict[str, Any]:
-    """Return the tables of rows whose frames have such doubts (T,): probabilities, or else whatever grows with them."""
-    every = list(zip(rows, doubts, strict=True))
+def lost_tables(rows: Sequence[Row], scores: Sequence[Array]) -> dict[str, Any]:
+    """Return the tables of rows whose frames have scores (T,): probabilities, or figures that grow with them."""
+    every = list(zip(rows, scores, strict=True))
     return {
-        "frames": sum(len(one) for one in doubts),
+        "frames": sum(map(len, scores)),
         "lost": [_figures(name, part) for name, part in _parted(every)],
         "kept": {
             f"{share:g}": float(error)
-            for share, error in zip(SHARES, kept_errors(_errors(rows), np.concatenate(doubts), SHARES), strict=True)
+            for share, error in zip(SHARES, kept_errors(_errors(rows), np.concatenate(scores), SHARES), strict=True)
         },
     }
 
 
 def _parted(every: Sequence[tuple[Row, T]]) -> Iterator[tuple[str, list[tuple[Row, T]]]]:
-    """Yield all rows with what is said of them; then those of each group, number of views and condition, by name."""
+    """Yield all rows with their predictions, then those of each group, number of views and condition, by name."""
     yield "all", list(every)
-    for of in (_group, _cameras, _condition):
-        for name in dict.fromkeys(of(row) for row, _ in every):
-            yield name, [one for one in every if of(one[0]) == name]
+    for part in (_group, _cameras, _condition):
+        for name in dict.fromkeys(part(row) for row, _ in every):
+            yield name, [pair for pair in every if part(pair[0]) == name]
 
 
 def _group(row: Row) -> str:
@@ -402,23 +378,23 @@ def _condition(row: Row) -> str:
     return str(row["condition"])
 
 
-def _figures(name: str, found: Sequence[tuple[Row, Array]]) -> dict[str, Any]:
-    rows, told = [row for row, _ in found], np.concatenate([doubts for _, doubts in found])
+def _figures(name: str, pairs: Sequence[tuple[Row, Array]]) -> dict[str, Any]:
+    rows, scores = [row for row, _ in pairs], np.concatenate([values for _, values in pairs])
     lost, errors = lost_frames(rows), _errors(rows)
     clear = (errors < NEAR_MM[0]) | (errors > NEAR_MM[1])
-    likely = bool(told.min() >= 0.0 and told.max() <= 1.0)
-    said = told >= LOST
+    probable = bool(scores.min() >= 0.0 and scores.max() <= 1.0)
+    reported = scores >= LOST
     return {
         "name": name,
         "tracks": len(rows),
         "frames": len(lost),
         "lost_rate": float(lost.mean()),
-        "auroc": auroc(told, lost),
-        "auroc_clear": auroc(told[clear], lost[clear]) if clear.any() else None,
-        **{f"false_alarms_{100 * recall:.0f}": false_alarms(told, lost, recall) for recall in RECALLS},
-        "said_recall": float(said[lost].mean()) if likely and lost.any() else None,
-        "said_false_alarms": float(said[~lost].mean()) if likely and not lost.all() else None,
-        "calibration_error": calibration_error(told, lost) if likely else None,
+        "auroc": auroc(scores, lost),
+        "auroc_clear": auroc(scores[clear], lost[clear]) if clear.any() else None,
+        **{f"false_alarms_{100 * recall:.0f}": false_alarms(scores, lost, recall) for recall in RECALLS},
+        "reported_recall": float(reported[lost].mean()) if probable and lost.any() else None,
+        "reported_false_alarms": float(reported[~lost].mean()) if probable and not lost.all() else None,
+        "calibration_error": calibration_error(scores, lost) if probable else None,
     }
 
 
@@ -426,22 +402,22 @@ def _errors(rows: Sequence[Row]) -> Array:
     return np.concatenate([np.array(row["mpjpe_mm"]) for row in rows])
 
 
-def sides_table(rows: Sequence[Row], said: Sequence[Predictions]) -> list[dict[str, Any]]:
+def sides_table(rows: Sequence[Row], predictions: Sequence[Predictions]) -> list[dict[str, Any]]:
     """Return how often sides are exchanged, called unknown, and both, of all rows and of parts of them."""
-    every = list(zip(rows, said, strict=True))
+    every = list(zip(rows, predictions, strict=True))
     return [_sides_figures(name, part) for name, part in _parted(every)]
 
 
-def _sides_figures(name: str, found: Sequence[tuple[Row, Predictions]]) -> dict[str, Any]:
-    swapped = swapped_frames([row for row, _ in found])
-    exchanged, unknown = (np.concatenate([getattr(one, key) for _, one in found]) for key in ("exchanged", "unknown"))
+def _sides_figures(name: str, pairs: Sequence[tuple[Row, Predictions]]) -> dict[str, Any]:
+    swapped = swapped_frames([row for row, _ in pairs])
+    exchanged, unknown = (np.concatenate([getattr(row, key) for _, row in pairs]) for key in ("exchanged", "unknown"))
 
     def share(flags: Any, of: Any) -> float | None:
         return float(flags[of].mean()) if of.any() else None
 
     return {
         "name": name,
-        "tracks": len(found),
+        "tracks": len(pairs),
         "frames": len(swapped),
         "swapped": float(swapped.mean()),
         "auroc": auroc(exchanged, swapped),
@@ -453,32 +429,31 @@ def _sides_figures(name: str, found: Sequence[tuple[Row, Predictions]]) -> dict[
     }
 
 
-def lost_lines(told: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the tables as they are printed."""
+def lost_lines(tables: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the printed tables."""
     heads = ["tracks", "frames", "lost %", "AUROC", "AUROC, clear cases"]
     heads += [f"false alarms at {100 * recall:.0f} % recall, %" for recall in RECALLS]
     heads += ["called lost: recall %", "false alarms %", "calibration error"]
     table = []
-    for one in told["lost"]:
-        shares = [one[f"false_alarms_{100 * recall:.0f}"] for recall in RECALLS]
-        cells = [one["name"], str(one["tracks"]), str(one["frames"]), percent(one["lost_rate"])]
-        cells += [_number(one["auroc"]), _number(one["auroc_clear"]), *(percent(share) for share in shares)]
-        cells += [percent(one["said_recall"]), percent(one["said_false_alarms"]), _number(one["calibration_error"])]
-        table.append(cells)
+    for part in tables["lost"]:
+        shares = [part[f"false_alarms_{100 * recall:.0f}"] for recall in RECALLS]
+        shares += [part["reported_recall"], part["reported_false_alarms"]]
+        cells = [part["name"], str(part["tracks"]), str(part["frames"]), percent(part["lost_rate"])]
+        cells += [_number(part["auroc"]), _number(part["auroc_clear"]), *map(percent, shares)]
+        table.append([*cells, _number(part["calibration_error"])])
     yield from markdown(["", *heads], table)
     yield ""
-    kept = (f"{100 * float(share):g} % kept {error:.0f} mm" for share, error in told["kept"].items())
-    yield f"mean MPJPE, least doubted frames first: {', '.join(kept)}"
+    kept = (f"{100 * float(share):g} % kept {error:.0f} mm" for share, error in tables["kept"].items())
+    yield f"mean MPJPE, least probably lost frames first: {', '.join(kept)}"
     yield ""
     heads = ["tracks", "frames", "swapped %", "AUROC", "calibration error", "unknown %", "unknown of right ones %"]
     heads += ["swapped of unknown ones %", "swapped of known ones %"]
     table = []
-    for one in told["sides"]:
-        cells = [one["name"], str(one["tracks"]), str(one["frames"]), percent(one["swapped"])]
-        cells += [_number(one["auroc"]), _number(one["calibration_error"])]
-        table.append(
-            [*cells, *(percent(one[key]) for key in ("unknown", "unknown_right", "swapped_unknown", "swapped_known"))]
-        )
+    for part in tables["sides"]:
+        cells = [part["name"], str(part["tracks"]), str(part["frames"]), percent(part["swapped"])]
+        cells += [_number(part["auroc"]), _number(part["calibration_error"])]
+        shares = [part[key] for key in ("unknown", "unknown_right", "swapped_unknown", "swapped_known")]
+        table.append([*cells, *map(percent, shares)])
     yield from markdown(["", *heads], table)
 
 
@@ -488,12 +463,12 @@ def _number(value: float | None) -> str:
 
 @click.command(help=__doc__)
 @click.option("--quick", is_flag=True, help="Two clips of each group: a look, not a measurement.")
-@click.option("--store", metavar="FILE.json", help="New file for the models that are fitted, for exemplars to read.")
-@click.option("--rows", metavar="FILE", help="Fit to what --out wrote, instead of following.")
+@click.option("--store", metavar="FILE.json", help="New file for the fitted models, for exemplars to read.")
+@click.option("--rows", metavar="FILE", help="Fit to rows of --out, without tracking.")
 @click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")
 @WORKERS
-def main(**asked: Any) -> None:
-    for line in lost_lines(lost(**asked, progress=bar)):
+def main(**arguments: Any) -> None:
+    for line in lost_lines(lost(**arguments, progress=bar)):
         click.echo(line)
 
 
