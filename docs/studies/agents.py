@@ -1,6 +1,6 @@
 """Baseline agents of the environments on held-out instances.
 
-Chance, constants, schedules, a bandit, CMA-ES over settings, and PPO and SAC of Stable-Baselines3 as they come.
+Chance, constants, schedules, a bandit, CMA-ES over settings, and PPO and SAC of Stable-Baselines3 with their defaults.
 """
 
 import time
@@ -41,13 +41,13 @@ INSTANCES, SEEDS, STEPS = 40, 5, 20_000
 QUICK_INSTANCES, QUICK_STEPS = 4, 300
 CURVE = 5  # looks at an agent while it learns
 CURVE_INSTANCES = 16  # that each look takes, the first of those held out
-STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method, and its budget, for what is best known
+STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method and budget of the best known costs
 UNTRAINED = 0  # steps of training of a reference
 
 
 @dataclass(frozen=True)
 class Contested:
-    """An environment, the budget of its episodes in evaluations and in steps, and who plays it."""
+    """An environment, the budget of its episodes in evaluations and in steps, and its agents."""
 
     name: str
     evaluations: int
@@ -74,7 +74,7 @@ TASKS = {"configure": CONFIGURE, "fit": FIT}
 
 
 class Training(NamedTuple):
-    """One row: an agent in an environment, a seed of its training and evaluation, and the steps it is asked to take."""
+    """One row: an agent in an environment, a seed of its training and evaluation, and its steps."""
 
     task: str
     agent: str
@@ -86,7 +86,7 @@ class Training(NamedTuple):
 def agent_turns(
     tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int
 ) -> list[Training]:
-    """Return the rows that are asked for, of each agent that a task has."""
+    """Return the rows of the chosen agents of each task."""
     turns = []
     for name in tasks:
         task = TASKS[name]
@@ -244,25 +244,25 @@ def agents(
 ) -> dict[str, Any]:
     """Return the table of agents: normalised scores on held-out instances, with intervals, and learning curves.
 
-    `rows` is a file for a row a line as they come; what it holds already is not measured again. Raises ValueError where
-    something asked for is not there.
+    `rows` is a file for a row a line as they come; rows in it already are not measured again. Raises ValueError where an
+    agent or environment is unknown.
     """
-    asked = tuple(dict.fromkeys(environments)) or tuple(TASKS)
+    chosen = tuple(dict.fromkeys(environments)) or tuple(TASKS)
     if quick:
         seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
-    turns = agent_turns(asked, names, seeds, steps, instances)
+    turns = agent_turns(chosen, names, seeds, steps, instances)
     check_learners({turn.agent for turn in turns})
-    turns += [Training(name, BEST, 0, 0, instances) for name in asked]
+    turns += [Training(name, BEST, 0, 0, instances) for name in chosen]
     done = earlier(rows, turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
     done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    found = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
-    return {"seeds": seeds, "steps": steps, "instances": instances, "rows": found} | agent_tables(found)
+    results = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
+    return {"seeds": seeds, "steps": steps, "instances": instances, "rows": results} | agent_tables(results)
 
 
 def agent_row(turn: Training) -> dict[str, Any]:
     """Return a row: the best costs that an agent reached on held-out instances, and what it learned on the way."""
-    began = time.perf_counter()
+    start = time.perf_counter()
     numbers = range(HELD_OUT, HELD_OUT + turn.instances)
     row: dict[str, Any] = turn._asdict() | {"curve": []}
     evaluations = TASKS[turn.task].evaluations
@@ -275,7 +275,7 @@ def agent_row(turn: Training) -> dict[str, Any]:
         if row["curve"]:
             last = [steps_taken(turn), row["costs"][:CURVE_INSTANCES]]
             row["curve"] = [look for look in row["curve"] if look[0] < last[0]] + [last]
-    return row | {"minutes": round((time.perf_counter() - began) / 60.0, 2)}
+    return row | {"minutes": round((time.perf_counter() - start) / 60.0, 2)}
 
 
 def _is_policy(turn: Training) -> bool:
@@ -341,21 +341,21 @@ def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> li
 
 
 def turn_of(row: Mapping[str, Any]) -> Training:
-    """Return whose row it is."""
+    """Return the training of a row."""
     return Training(*(row[name] for name in Training._fields))
 
 
 Row = Mapping[str, Any]
 
-RESAMPLES, LEVEL, SALT = 2000, 0.95, 67
-LEAST_GAP = 0.1  # of a cost, between random search and what is best known: an instance without one says nothing
+RESAMPLES, LEVEL, RNG_STREAM = 2000, 0.95, 67
+MIN_GAP = 0.1  # of a cost between random search and the best known: instances without it are left out
 
 
 def agent_tables(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return for each environment its agents' scores: 0 is random search on the instance, 1 what is best known.
+    """Return for each environment its agents' scores: 0 is random search on the instance, 1 the best known cost.
 
-    What is best known is the lowest cost in any row. A score is the mean over seeds and instances; its interval is a
-    bootstrap of seeds and instances, each drawn anew. `steps` are those of training that were taken, `taken` of a row.
+    The best known is the lowest cost in any row. A score is the mean over seeds and instances; its interval is a
+    bootstrap of both. `steps` are those of training, `taken` of a row.
     """
     return {"tables": {task: _table([row for row in rows if row["task"] == task]) for task in _tasks(rows)}}
 
@@ -368,26 +368,26 @@ def _table(rows: Sequence[Row]) -> list[dict[str, Any]]:
     costs = {name: np.array([row["costs"] for row in rows if row["agent"] == name]) for name in _agents(rows)}
     chance = costs["random search"].mean(axis=0)
     best = np.concatenate(list(costs.values())).min(axis=0)
-    told = []
-    for name, found in costs.items():
-        scores = normalised(found, chance, best)
+    table = []
+    for name, of_agent in costs.items():
+        scores = normalised(of_agent, chance, best)
         low, high = score_interval(scores)
-        mine = [row for row in rows if row["agent"] == name]
-        told.append(
+        own = [row for row in rows if row["agent"] == name]
+        table.append(
             {
                 "agent": name,
-                "steps": mine[0]["taken"],
-                "seeds": len(found),
-                "cost": float(found.mean()),
-                "median_cost": float(np.median(found)),
+                "steps": own[0]["taken"],
+                "seeds": len(of_agent),
+                "cost": float(of_agent.mean()),
+                "median_cost": float(np.median(of_agent)),
                 "score": float(scores.mean()),
                 "low": low,
                 "high": high,
-                "minutes": float(np.mean([row["minutes"] for row in mine])),
-                "curve": _curve([row["curve"] for row in mine], chance, best),
+                "minutes": float(np.mean([row["minutes"] for row in own])),
+                "curve": _curve([row["curve"] for row in own], chance, best),
             }
         )
-    return sorted(told, key=lambda one: one["score"])
+    return sorted(table, key=lambda row: row["score"])
 
 
 def _agents(rows: Sequence[Row]) -> list[str]:
@@ -399,7 +399,7 @@ def normalised(costs: Array, chance: Array, best: Array) -> Array:
 
     Instances where both are nearly equal are left out. Raises ValueError where all are.
     """
-    apart = chance - best >= LEAST_GAP
+    apart = chance - best >= MIN_GAP
     if not apart.any():
         raise InputError(f"best known must lie below random search, got none of {len(best)} instances that do")
     return ((chance - costs) / np.where(apart, chance - best, 1.0))[:, apart]
@@ -407,49 +407,49 @@ def normalised(costs: Array, chance: Array, best: Array) -> Array:
 
 def score_interval(scores: Array) -> tuple[float, float]:
     """Return the ends of the 95 % interval of the mean of scores (seeds, instances), by a bootstrap of both."""
-    rng = np.random.default_rng(SALT)
+    rng = np.random.default_rng(RNG_STREAM)
     seeds, instances = scores.shape
-    one = rng.integers(seeds, size=(RESAMPLES, seeds))
-    other = rng.integers(instances, size=(RESAMPLES, instances))
-    means = [scores[np.ix_(rows, columns)].mean() for rows, columns in zip(one, other, strict=True)]
+    rows = rng.integers(seeds, size=(RESAMPLES, seeds))
+    columns = rng.integers(instances, size=(RESAMPLES, instances))
+    means = [scores[np.ix_(*drawn)].mean() for drawn in zip(rows, columns, strict=True)]
     low, high = np.quantile(means, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
     return float(low), float(high)
 
 
 def _curve(curves: Sequence[Any], chance: Array, best: Array) -> list[dict[str, float]]:
     """Return the score at each look of all seeds, with its interval."""
-    told = []
+    points = []
     for looks in zip(*curves, strict=False):
         costs = np.array([costs for _, costs in looks])
         few = costs.shape[1]
         scores = normalised(costs, chance[:few], best[:few])
         low, high = score_interval(scores)
         steps = float(np.mean([steps for steps, _ in looks]))
-        told.append({"steps": steps, "score": float(scores.mean()), "low": low, "high": high})
-    return told
+        points.append({"steps": steps, "score": float(scores.mean()), "low": low, "high": high})
+    return points
 
 
-def agents_lines(told: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the tables as they are printed."""
-    for task, table in told["tables"].items():
-        yield f"{TASKS[task].name}, {TASKS[task].evaluations} evaluations, {told['instances']} held-out instances"
+def agents_lines(results: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the printed tables."""
+    for task, table in results["tables"].items():
+        yield f"{TASKS[task].name}, {TASKS[task].evaluations} evaluations, {results['instances']} held-out instances"
         yield ""
         lines = []
-        for one in table:
-            interval = f"{one['low']:.3f} to {one['high']:.3f}"
-            cells = [one["agent"], str(one["steps"]), str(one["seeds"]), f"{one['score']:.3f}", interval]
-            cells += [f"{one['cost']:.2f}", f"{one['median_cost']:.2f}", f"{one['minutes']:.1f}"]
+        for row in table:
+            interval = f"{row['low']:.3f} to {row['high']:.3f}"
+            cells = [row["agent"], str(row["steps"]), str(row["seeds"]), f"{row['score']:.3f}", interval]
+            cells += [f"{row['cost']:.2f}", f"{row['median_cost']:.2f}", f"{row['minutes']:.1f}"]
             lines.append(cells)
         heads = ["agent", "trained steps", "seeds", "score", "95 % interval", "mean cost", "median cost", "minutes"]
         yield from markdown(heads, lines)
         yield ""
-        for one in table:
-            if one["curve"]:
+        for row in table:
+            if row["curve"]:
                 looks = ", ".join(
                     f"{look['steps']:.0f}: {look['score']:.2f} ({look['low']:.2f} to {look['high']:.2f})"
-                    for look in one["curve"]
+                    for look in row["curve"]
                 )
-                yield f"{one['agent']} learns: {looks}"
+                yield f"{row['agent']} learns: {looks}"
         yield ""
 
 
