@@ -244,8 +244,8 @@ def agents(
 ) -> dict[str, Any]:
     """Return the table of agents: normalised scores on held-out instances, with intervals, and learning curves.
 
-    `rows` is a file for a row a line as they come; rows in it already are not measured again. Raises ValueError where an
-    agent or environment is unknown.
+    `rows` is a file for a row a line as they come; rows in it already are not measured again. Raises ValueError where
+    an agent or environment is unknown.
     """
     chosen = tuple(dict.fromkeys(environments)) or tuple(TASKS)
     if quick:
