@@ -3,7 +3,7 @@
 - `particle.Particle` is the bootstrap filter of Gordon, Salmond and Smith (1993), the SAPSO paper's opponent.
 - `annealed.Annealed` is the annealed particle filter of Deutscher and Reid (2005).
 
-`resampling` weighs particles and resamples them; `kernels` finds how sharply.
+`weighting` weighs particles, and computes how sharply.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="annealed", frames=(0, 3))

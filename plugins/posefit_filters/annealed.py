@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.box import Space, converted, displacement, draw_population, sample_normal
 from posefit.fitting.check import at_least, between, positive
-from posefit_filters.weighting import sharpness, systematic, weigh
+from posefit.uncertainty.smc import systematic_rows
+from posefit_filters.weighting import sharpness, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10
@@ -81,7 +82,7 @@ class Annealed:
     def _survivors(self) -> tuple[NDArray[np.int64], Array]:
         """Return which rows (n,) survive, and the weights (n,) of all."""
         weights = weigh(self._costs, sharpness(self._costs, self._survival))
-        return systematic(weights, self._rng.random()), weights
+        return systematic_rows(weights, self._rng.random(), len(weights)), weights
 
     def _descend(self) -> None:
         rows, weights = self._survivors()

@@ -9,7 +9,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space, converted, draw_population, repair, sample_normal
 from posefit.fitting.check import at_least, positive
-from posefit_filters.weighting import systematic, weigh
+from posefit.uncertainty.smc import systematic_rows
+from posefit_filters.weighting import weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost
@@ -62,11 +63,10 @@ class Particle:
 
     def advance(self, space: Space) -> None:
         """Let the particles survive by their weights, and move into the next frame."""
-        rows = systematic(self._weights, self._rng.random())
+        rows = systematic_rows(self._weights, self._rng.random(), len(self._weights))  # GORDON1993 (resampling)
         moved = converted(space, self._particles[rows], self._space)
         if self._drift and space.start is not None:
-            drifted = repair(space, moved + self._drift * space.start.velocity, moved[0])
-            moved = drifted
+            moved = repair(space, moved + self._drift * space.start.velocity, moved[0])
         spread = np.full(space.dimensions, self._noise)
         self._particles = sample_normal(space, self._rng, moved, spread)  # GORDON1993 (motion)
         self._space, self._due = space, True

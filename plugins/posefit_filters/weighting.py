@@ -1,9 +1,8 @@
-"""From costs to weights, how sharply costs are weighed, and which particles survive by their weights."""
+"""From costs to weights, and how sharply costs are weighed."""
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array, jit
 
@@ -16,16 +15,6 @@ def weigh(costs: Array, beta: float) -> Array:
     rises = np.where(known, costs, np.inf) - costs[known].min()
     weights: Array = np.exp(-beta * rises) if beta else known.astype(np.float64)  # GORDON1993 (likelihood)
     return np.asarray(weights / weights.sum())
-
-
-def systematic(weights: Array, u: float) -> NDArray[np.int64]:
-    """Return which rows (n,) survive: as often as their weight asks, one of the two whole numbers next to n times it.
-
-    This is systematic resampling. `u` in [0, 1) is where the comb of n evenly spaced teeth begins.
-    """
-    teeth = (np.arange(weights.size) + u) / weights.size
-    rows = weights.cumsum().searchsorted(teeth, side="right")  # GORDON1993 (resampling)
-    return np.minimum(rows, weights.size - 1)
 
 
 HALVINGS = 60  # ours: bisection steps; a double has 53 bits

@@ -8,9 +8,10 @@ import pytest
 from posefit import Start
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
+from posefit.uncertainty.smc import systematic_rows
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
-from posefit_filters.weighting import sharpness, survival, systematic, weigh
+from posefit_filters.weighting import sharpness, survival, weigh
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)
@@ -24,10 +25,10 @@ def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (like
 def test_resampling_gives_each_particle_its_share() -> None:  # GORDON1993 (resampling)
     weights = np.array([0.5, 0.3, 0.15, 0.05])
     teeth = np.linspace(0.0, 1.0, 2000, endpoint=False)
-    counts = np.array([np.bincount(systematic(weights, u), minlength=4) for u in teeth])
+    counts = np.array([np.bincount(systematic_rows(weights, u, 4), minlength=4) for u in teeth])
     np.testing.assert_allclose(counts.mean(axis=0), 4 * weights, atol=2e-3)
     assert (np.abs(counts - 4 * weights) < 1.0 + 1e-12).all()  # never off by a whole particle
-    assert systematic(np.array([0.0, 1.0, 0.0]), 0.999).tolist() == [1, 1, 1]
+    assert systematic_rows(np.array([0.0, 1.0, 0.0]), 0.999, 3).tolist() == [1, 1, 1]
 
 
 def test_particles_move_by_normal_noise() -> None:  # GORDON1993 (motion)

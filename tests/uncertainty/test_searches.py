@@ -7,7 +7,6 @@ from posefit.arrays import Array
 from posefit.testing.toy import Toy
 from posefit.uncertainty.landscape import Landscape
 from posefit.uncertainty.searches import best_of_each, boltzmann_weights, weighed, widths
-from posefit.uncertainty.smc import NormalMixture, tempered
 from tests.cases import each
 
 WEIGHTS = np.array([0.6, 0.3, 0.1])
@@ -48,16 +47,6 @@ def test_modes_have_their_weights(dimensions: int, off: float) -> None:
         assert set(nearest) == {0, 1, 2}
         wrong.append(0.5 * np.abs(np.bincount(nearest, sample.mode_weights, 3) - WEIGHTS).sum())
     assert np.mean(wrong) < off
-
-
-def test_a_sampler_that_starts_anywhere_fails_in_ten_dimensions() -> None:
-    wrong = []
-    for seed in range(8):
-        start = NormalMixture.anywhere(10)
-        sample = tempered(Landscape(Toy(10), mixture), start, 1.0, np.random.default_rng(seed))
-        nearest = ((sample.proposals[:, None] - means(10)) ** 2).sum(axis=2).argmin(axis=1)
-        wrong.append(0.5 * np.abs(np.bincount(nearest, sample.weights, 3) - WEIGHTS).sum())
-    assert np.mean(wrong) > 0.3
 
 
 def test_even_rows_have_the_shares_of_the_modes() -> None:
