@@ -8,7 +8,7 @@
 | when feet strike and lift off | events.py |
 | cadence, step, stride, speed, stance, and whether it is a walk | gait.py |
 | in which frames the person walks backwards | heading.py |
-| tables, and files for other programs | tables.py, trc.py, c3d.py |
+| tables, and files for other programs | tables.py, c3d.py |
 
     from posefit.measuring.angles import clinical_angles
     from posefit.measuring.gait import gait_of

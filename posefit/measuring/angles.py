@@ -88,8 +88,8 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     for side in SIDES:
         # a left side is measured as the right one that it is in the mirror
         axes = {
-            name.removeprefix(f"{side}_"): _ACROSS @ one @ _ACROSS if side == "left" else one
-            for name, one in segments.items()
+            name.removeprefix(f"{side}_"): _ACROSS @ rotation @ _ACROSS if side == "left" else rotation
+            for name, rotation in segments.items()
         }
         by_joint = {
             "hip": hip_angles(axes["pelvis"], axes["thigh"]),
@@ -98,11 +98,8 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
             "shoulder": shoulder_angles(axes["thorax"], axes["upper_arm"]),
             "elbow": elbow_angles(axes["upper_arm"], axes["forearm"]),
         }
-        by_joint["shoulder"][np.sin(by_joint["shoulder"][:, 1]) < np.sin(np.radians(NEAR_POLE))] *= [
-            np.nan,
-            1.0,
-            np.nan,
-        ]
+        near_pole = np.sin(by_joint["shoulder"][:, 1]) < np.sin(np.radians(NEAR_POLE))
+        by_joint["shoulder"][near_pole] *= [np.nan, 1.0, np.nan]
         for joint, values in by_joint.items():
             for k, angle in enumerate(MEANINGS[joint]):
                 columns[f"{side}_{joint}_{angle}"] = np.degrees(values[:, k])

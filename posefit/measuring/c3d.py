@@ -18,8 +18,8 @@ from posefit.version import __version__
 
 BLOCK = 512  # bytes
 MAGIC, INTEL = 0x50, 84
-MOST = 0xFFFF  # frames that the header can count; more are in TRIAL
-EVENTS = 255  # that a parameter can hold
+MAX_FRAMES = 0xFFFF  # frames that the header can count; more are in TRIAL
+MAX_EVENTS = 255  # that a parameter can hold
 MILLIMETRES = 1e3  # in a metre
 _ICONS = {"Foot Strike": 1, "Foot Off": 2}
 
@@ -38,17 +38,10 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
     while start != 2 + len(parameters) // BLOCK:  # where the points start is a parameter itself
         start = 2 + len(parameters) // BLOCK
         parameters = _section(_parameters(motion, start, gait))
-    with Path(path).open("wb") as file:
-        file.write(_header(motion, start))
-        file.write(parameters)
-        data = points.tobytes()
-        file.write(data + bytes(-len(data) % BLOCK))
-
-
-def _header(motion: Motion, start: int) -> bytes:
-    last = min(len(motion), MOST)
-    words = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, 1, last, 0, -1.0, start, 1, motion.fps)
-    return words.ljust(BLOCK, b"\0")
+    last = min(len(motion), MAX_FRAMES)
+    header = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, 1, last, 0, -1.0, start, 1, motion.fps)
+    data = points.tobytes()
+    Path(path).write_bytes(header.ljust(BLOCK, b"\0") + parameters + data + bytes(-len(data) % BLOCK))
 
 
 def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict[str, Value]]:
@@ -57,7 +50,7 @@ def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict
     groups: dict[str, dict[str, Value]] = {
         "POINT": {
             "USED": len(PLACES),
-            "FRAMES": min(frames, MOST),
+            "FRAMES": min(frames, MAX_FRAMES),
             "DATA_START": start,
             "SCALE": -1.0,
             "RATE": motion.fps,
@@ -71,12 +64,12 @@ def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict
         "FORCE_PLATFORM": {"USED": 0},
         "TRIAL": {
             "ACTUAL_START_FIELD": [1, 0],
-            "ACTUAL_END_FIELD": [frames & MOST, frames >> 16],
+            "ACTUAL_END_FIELD": [frames & MAX_FRAMES, frames >> 16],
             "CAMERA_RATE": motion.fps,
         },
         "MANUFACTURER": {"SOFTWARE": "posefit", "VERSION": __version__},
     }
-    if events := sorted(_events(gait))[:EVENTS] if gait and not gait.why else []:
+    if events := sorted(_events(gait))[:MAX_EVENTS] if gait and not gait.why else []:
         groups["EVENT"] = {
             "USED": len(events),
             "CONTEXTS": [foot.title() for _, foot, _ in events],

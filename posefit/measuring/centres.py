@@ -36,11 +36,8 @@ def place_name(joint: str) -> str:
 
 
 PLACES = tuple(place_name(joint) for joint in JOINTS)  # (27,) in the order of JOINTS
-CENTRES = tuple(
-    f"{which}_{joint}"
-    for joint in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-    for which in ("left", "right")
-)
+_LARGE = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+CENTRES = tuple(f"{which}_{joint}" for joint in _LARGE for which in ("left", "right"))
 
 
 def joint_centres(motion: Motion) -> dict[str, Array]:

@@ -17,11 +17,13 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.segments import FORWARDS, SIDES
 from posefit.motion.motion import Motion
 
-CUTOFF = 6.0  # hertz: of a walk nothing to speak of is faster. Winter, Biomechanics and motor control, 2009
-SLOWEST = 2.0 * CUTOFF  # frames a second, the fewest that show it
-SWAY = 0.3  # hertz: the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
-LEAST = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
-SHARE = 0.2  # of the whole range of that, which it moves at least
+CUTOFF_HZ = 6.0  # of a walk nothing to speak of is faster. Winter, Biomechanics and motor control, 2009
+MIN_FPS = 2.0 * CUTOFF_HZ  # frames a second, the fewest that show it
+SWAY_HZ = (
+    0.3  # hertz: the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
+)
+MIN_FOOT_SWING = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
+MIN_SWING_SHARE = 0.2  # of the whole range of that, which it moves at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +42,12 @@ def gait_events(motion: Motion) -> GaitEvents:
 
     Raises ValueError where there are too few frames a second.
     """
-    if motion.fps < SLOWEST:
-        raise InputError(f"fps must be at least {SLOWEST:g} to find the events of gait, got {motion.fps:g}")
+    if motion.fps < MIN_FPS:
+        raise InputError(f"fps must be at least {MIN_FPS:g} to find the events of gait, got {motion.fps:g}")
     joints = motion.joints[:, :, ::2]
-    joints = low_pass(joints, CUTOFF, motion.fps)
+    joints = low_pass(joints, CUTOFF_HZ, motion.fps)
     facing = rotation_from_root_angles(motion.poses[:, :3]) @ FORWARDS
-    heading = low_pass(facing[:, ::2], SWAY, motion.fps)
+    heading = low_pass(facing[:, ::2], SWAY_HZ, motion.fps)
     heading /= np.maximum(np.linalg.norm(heading, axis=1, keepdims=True), 1e-9)
     pelvis = joints[:, 0]
 
@@ -80,10 +82,10 @@ def low_pass(series: Array, cutoff: float, fps: float) -> Array:
 def _tops(series: Array) -> Array:
     """Return where a series is at its tops, in frames and between them.
 
-    A top is the highest place between two where it is lower by a fifth of the whole range, and by `LEAST`.
+    A top is the highest place between two where it is lower by a fifth of the whole range, and by `MIN_FOOT_SWING`.
     """
     lowest, highest = np.percentile(series, [2, 98])
-    step = max(LEAST, SHARE * float(highest - lowest))
+    step = max(MIN_FOOT_SWING, MIN_SWING_SHARE * float(highest - lowest))
     tops: list[int] = []
     climbing, best, worst = False, 0, 0
     for k in range(1, len(series)):

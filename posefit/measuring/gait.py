@@ -12,17 +12,17 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES, both
-from posefit.measuring.events import SLOWEST, GaitEvents, at_frames, gait_events
+from posefit.measuring.events import MIN_FPS, GaitEvents, at_frames, gait_events
 from posefit.measuring.segments import SIDES
 from posefit.motion.motion import Motion
 
 STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
-LEAST_SPEED = 0.2  # metres a second
-LEAST_STEPS = 2  # of a walk
-LEAST_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
-WIDEST = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
-RUNS = 0.5  # the Froude number from which people run rather than walk
-STANDS = 0.57  # share of a stride; a runner's foot stands shorter, judged by the rearmost toes
+MIN_SPEED = 0.2  # metres a second
+MIN_STEPS = 2  # of a walk
+MIN_STEPS_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
+MAX_STEP_WIDTH = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
+RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
+MIN_STANCE_SHARE = 0.57  # share of a stride; a runner's foot stands shorter, judged by the rearmost toes
 GRAVITY = 9.81  # metres a second squared
 
 
@@ -63,30 +63,25 @@ class Gait:
     def as_dict(self) -> dict[str, object]:
         """Return the gait as summary.json holds it."""
         counted = len(_values(self.steps, "step_seconds"))
-        measures = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("steps", "why")}
+        names = [field.name for field in fields(self) if field.name not in ("steps", "why")]
+        measures = {name: getattr(self, name) for name in names}
         return {"walk": not self.why, "why": self.why or None, "steps": counted, **measures}
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     """Return the gait of a motion; `unknown` frames, such as held or lost ones, count for nothing."""
-    if motion.fps < SLOWEST:
-        return Gait(why=f"fewer than {SLOWEST:g} frames a second")
+    if motion.fps < MIN_FPS:
+        return Gait(why=f"fewer than {MIN_FPS:g} frames a second")
     events = gait_events(motion)
     steps = list(_steps(events, motion.fps, set(unknown)))
     if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
         return Gait(steps=steps, why=why)
-    timed, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
-    assert timed is not None
+    means = {name: _mean(steps, name) for name in ("step_length", "stride_length", "step_width", "stance_share")}
+    seconds, length = _mean(steps, "step_seconds"), means["step_length"]
+    assert seconds is not None
     assert length is not None
-    return Gait(
-        steps=steps,
-        cadence=cadence(timed),
-        speed=walking_speed(length, cadence(timed)),
-        step_length=length,
-        stride_length=_mean(steps, "stride_length"),
-        step_width=_mean(steps, "step_width"),
-        stance_share=_mean(steps, "stance_share"),
-    )
+    pace = cadence(seconds)
+    return Gait(steps=steps, cadence=pace, speed=walking_speed(length, pace), **means)
 
 
 def cadence(step_seconds: float) -> float:
@@ -114,8 +109,8 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
     strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
         measures: dict[str, float] = {}
-        again = next((one for one, side in strikes[k + 1 :] if side == foot), np.inf)
-        offs = [one for one in _known(events.offs[foot], unknown) if time < one < again]
+        again = next((later for later, side in strikes[k + 1 :] if side == foot), np.inf)
+        offs = [off for off in _known(events.offs[foot], unknown) if time < off < again]
         if offs:
             measures["toe_off_seconds"] = offs[0] / fps
         if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown):
@@ -129,7 +124,7 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
             measures["step_width"] = abs(float(beside @ (z, -x)))
         following = strikes[k + 1 : k + 3]
         in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
-        times = [time, *(one for one, _ in following)]
+        times = [time, *(later for later, _ in following)]
         if in_turn and all(_walked(events, fps, *pair, unknown) for pair in pairwise(times)):
             end = times[-1]
             moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], time)
@@ -150,7 +145,7 @@ def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: s
     seconds = (end - start) / fps
     if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(range(int(start), int(end) + 2)):
         return False
-    return _forwards(events, start, end) >= LEAST_SPEED * seconds
+    return _forwards(events, start, end) >= MIN_SPEED * seconds
 
 
 def _forwards(events: GaitEvents, start: float, end: float) -> float:
@@ -162,21 +157,21 @@ def _forwards(events: GaitEvents, start: float, end: float) -> float:
 def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float) -> str:
     """Return why a motion of which so many seconds are known is no walk; empty where it is one."""
     strikes = sum(len(events.strikes[side]) for side in SIDES)
-    if strikes <= LEAST_STEPS:
+    if strikes <= MIN_STEPS:
         return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot detected"
     speed = float(((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum(axis=1).mean() * motion.fps)
-    if speed < LEAST_SPEED:
-        return f"the person moves {'forwards' if speed > -LEAST_SPEED else 'backwards'} at {abs(speed):.2f} m/s"
+    if speed < MIN_SPEED:
+        return f"the person moves {'forwards' if speed > -MIN_SPEED else 'backwards'} at {abs(speed):.2f} m/s"
     stance = _values(steps, "stance_share")
-    if froude_number(speed, _leg(motion)) > RUNS or (stance and np.mean(stance) < STANDS):
+    if froude_number(speed, _leg(motion)) > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
         return f"the person runs, at {speed:.1f} m/s"
     timed = _values(steps, "step_seconds")
-    if len(timed) < LEAST_STEPS:
+    if len(timed) < MIN_STEPS:
         return "the feet do not strike in turn at the pace of a walk, or too little is known"
-    if sum(timed) < LEAST_SHARE * known:
+    if sum(timed) < MIN_STEPS_SHARE * known:
         return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
     width = _mean(steps, "step_width")
-    return f"steps are {width:.2f} m wide" if width is not None and width > WIDEST else ""
+    return f"steps are {width:.2f} m wide" if width is not None and width > MAX_STEP_WIDTH else ""
 
 
 def _leg(motion: Motion) -> float:
@@ -186,7 +181,7 @@ def _leg(motion: Motion) -> float:
 
 
 def _values(steps: list[Step], name: str) -> list[float]:
-    return [value for one in steps if (value := getattr(one, name)) is not None]
+    return [value for step in steps if (value := getattr(step, name)) is not None]
 
 
 def _mean(steps: list[Step], name: str) -> float | None:

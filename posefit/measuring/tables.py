@@ -1,4 +1,4 @@
-"""The tables of a measured motion: clinical angles, and the steps of a walk."""
+"""A measured motion as tables: clinical angles, the steps of a walk, and joints as a .trc file."""
 
 import csv
 from collections.abc import Collection
@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from posefit.measuring.angles import clinical_angles
+from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait, Step
 from posefit.motion.motion import Motion
 
-STEP_COLUMNS = tuple(one.name for one in fields(Step))
+STEP_COLUMNS = tuple(field.name for field in fields(Step))
 
 
 def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
@@ -32,3 +33,25 @@ def write_gait(path: str | Path, gait: Gait) -> None:
         writer.writerow(STEP_COLUMNS)
         for step in [] if gait.why else gait.steps:
             writer.writerow(["" if v is None else v if isinstance(v, str) else f"{v:.6f}" for v in astuple(step)])
+
+
+def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
+    """Write the 27 joints of every frame as markers, in metres and y up; of `blank` frames nothing but the time.
+
+    Markers are named by `PLACES`. OpenSim and similar programs take an empty field for an unobserved marker.
+    """
+    path = Path(path)
+    count, fps = len(motion), f"{motion.fps:g}"
+    head = ("DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame")
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "\t".join([*head, "OrigNumFrames"]),
+        "\t".join([fps, fps, str(count), str(len(PLACES)), "m", fps, "1", str(count)]),
+        "Frame#\tTime\t" + "\t".join(f"{place}\t\t" for place in PLACES),
+        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(PLACES) + 1) for axis in "XYZ"),
+        "",
+    ]
+    for k, points in enumerate(motion.joints):
+        values = "\t".join("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))
+        lines.append(f"{k + 1}\t{k / motion.fps:.6f}\t{values}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -243,8 +243,7 @@ def _write_formats(
     from posefit.measuring.c3d import write_c3d
     from posefit.measuring.centres import PLACES
     from posefit.measuring.gait import gait_of
-    from posefit.measuring.tables import write_angles, write_gait
-    from posefit.measuring.trc import write_trc
+    from posefit.measuring.tables import write_angles, write_gait, write_trc
     from posefit.motion.amc import write_amc
     from posefit.motion.asf import write_asf
     from posefit.motion.bvh import write_bvh

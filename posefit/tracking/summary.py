@@ -9,7 +9,7 @@ import numpy as np
 from posefit.fitting.shape import NAMES
 from posefit.fitting.tracker import Frame, Task
 from posefit.measuring.gait import gait_of
-from posefit.measuring.heading import backwards, warned
+from posefit.measuring.heading import backwards, backwards_warning
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.tracking.evaluation import LOST, evaluated, unseen
@@ -67,7 +67,7 @@ def evaluate(
     estimate = motion_of(scene, frames)
     walks_back = backwards(estimate, unseen(rows))
     warnings = [*scene.warnings, *method.audit.warnings]
-    if scene.truth is None and (warning := warned(walks_back)):
+    if scene.truth is None and (warning := backwards_warning(walks_back)):
         progress.warn(warning)
         warnings.append(warning)
     summary = {

@@ -1,4 +1,4 @@
-"""Two tracks are the same where what they were told has the same content, whatever its objects are called."""
+"""Two tracks are the same where their arguments have the same content, whatever the objects are."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200
 
 
 class StopError(Exception):
-    """Somebody pulled the plug."""
+    """The track ends too early."""
 
 
 def stopping(frames: Any, count: int) -> Any:
@@ -68,7 +68,7 @@ def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
 
 
 @each(
-    ("one", "other"),
+    ("first", "second"),
     [
         (1, 1.5),
         (0, False),
@@ -82,14 +82,14 @@ def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
         (built_in.motion, built_in.names),
     ],
 )
-def test_what_differs_has_another_digest(one: Any, other: Any) -> None:
-    assert ArgumentDigest.of(one).digest == ArgumentDigest.of(one).digest
-    assert ArgumentDigest.of(one).digest != ArgumentDigest.of(other).digest
+def test_different_values_have_different_digests(first: Any, second: Any) -> None:
+    assert ArgumentDigest.of(first).digest == ArgumentDigest.of(first).digest
+    assert ArgumentDigest.of(first).digest != ArgumentDigest.of(second).digest
 
 
-def test_the_first_difference_is_said_in_one_line() -> None:
+def test_the_first_difference_is_one_line() -> None:
     now = {"seed": ArgumentDigest.of(1), "source": ArgumentDigest.of("walk")}
-    before = {name: told.as_json() for name, told in now.items()}
+    before = {name: digest.as_json() for name, digest in now.items()}
     assert difference(before, now) is None
     assert difference(before, {**now, "seed": ArgumentDigest.of(2)}) == "seed must be 1, as before, to resume, got 2"
     assert difference({"seed": before["seed"]}, now) == "source must be None, as before, to resume, got 'walk'"
@@ -97,11 +97,11 @@ def test_the_first_difference_is_said_in_one_line() -> None:
 
 
 def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:
-    asked: dict[str, Any] = {"method": "vsmm", "out": tmp_path / "out", **QUICK}
+    options: dict[str, Any] = {"method": "vsmm", "out": tmp_path / "out", **QUICK}
     with pytest.raises(StopError):
-        posefit.track("walk", progress=stopping, **asked)
-    resumed = posefit.track("walk", resume=True, **asked)
-    whole = posefit.track("walk", **{**asked, "out": None})
+        posefit.track("walk", progress=stopping, **options)
+    resumed = posefit.track("walk", resume=True, **options)
+    whole = posefit.track("walk", **{**options, "out": None})
     for before, after in zip(whole.estimates, resumed.estimates, strict=True):
         assert after.cpu_seconds is not None
         assert after.details.keys() == before.details.keys()
