@@ -1,4 +1,4 @@
-"""What happens before the first frame: compiling, which is said only where it is done, and costs little."""
+"""What happens before the first frame: compiling, restarts, and the person's build."""
 
 import os
 import subprocess
@@ -13,15 +13,16 @@ import pytest
 
 import posefit
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.footage.scene import synthetic
+from posefit.footage.scene import Scene
 from posefit.motion import built_in
-from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.initialise import first_seen_by_most, fitted_build, task_of
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import best_restart
 from tests.cases import each
+from tests.testing import planted
+from tests.tracking.scenes import frame_of, truth_of, walk
 
 COMPILING = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
 
@@ -40,15 +41,12 @@ def test_a_search_is_made_once(method: dict[str, Any]) -> None:
 def test_compiling_is_announced_where_something_is_compiled_and_only_there(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "posefit", "fit", "walk", "--size", "60x45", "--evaluations", "80"]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    said = [subprocess.run(words, env=environment, capture_output=True, text=True).stderr for _ in range(2)]
-    assert said[0].count(COMPILING) == 1
-    assert said[1].count(COMPILING) == 0
-    assert "ready in" in said[1]
+    logs = [subprocess.run(words, env=environment, capture_output=True, text=True).stderr for _ in range(2)]
+    assert [log.count(COMPILING) for log in logs] == [1, 0]
+    assert "ready in" in logs[1]
 
 
-def test_a_tracker_that_needs_its_whole_budget_works_all_the_same() -> None:
-    from tests.testing import planted
-
+def test_a_tracker_that_needs_its_whole_budget_is_not_warmed_up() -> None:
     class Demanding(planted.Holds):
         def __init__(self, task: Any) -> None:
             if task.evaluations < 2000:
@@ -61,90 +59,79 @@ def test_a_tracker_that_needs_its_whole_budget_works_all_the_same() -> None:
 
 
 @each(("size", "rows"), [((320, 240), 240), ((640, 479), 479), ((640, 480), 240), ((960, 721), 240)])
-def test_starts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
+def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_whole_one(
     size: tuple[int, int], rows: int
 ) -> None:
-    motion = built_in.motion("walk", frames=5)
-    scene = synthetic(motion, [90.0], size, [], (None, None))
-    task = Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
-    looked: list[int] = []
-    rates: list[float] = []
+    scene = walk(5, [90.0], size)
+    motion, task = truth_of(scene), Task(scene.body, scene.cameras, 100, scene.yaw, scene.anchor)
+    views: list[tuple[int, float]] = []
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        for seen in observations:
-            looked.append(task.cameras[0].height)
-            rates.append(task.fps)
-            assert seen.silhouettes[0].mask.shape[0] == task.cameras[0].height
-            pose, where = motion.poses[:1], motion.translations[:1]
-            counts = areas(task.body, task.cameras[0], seen.silhouettes[0], pose, where)
-            yield Frame(pose[0], where[0], float(mismatch(counts)[0]), counts, 1, 0.0, np.empty(0))
+        for observation in observations:
+            views.append((task.cameras[0].height, task.fps))
+            assert observation.silhouettes[0].mask.shape[0] == task.cameras[0].height
+            view = replace(scene, cameras=task.cameras)
+            yield frame_of(view, motion.poses[0], motion.translations[0], observation)
 
-    begin = best_restart(task, scene.observations, follow, 3, 0)
-    # frames 0 and 3 of each start, and the best one's first once more where they were seen small
-    assert looked == [rows] * 6 + ([size[1]] if rows != size[1] else [])
-    # a model of motion knows how far apart they are
-    assert rates == [10.0] * 6 + [30.0] * (len(looked) - 6)
-    assert begin.fps == 30.0
-    (first,) = begin.before
-    whole = areas(
-        scene.body, scene.cameras[0], scene.observations[0].silhouettes[0], motion.poses[:1], motion.translations[:1]
-    )
-    np.testing.assert_array_equal(first.areas, whole)
-    assert begin.cameras is task.cameras
+    guess = best_restart(task, scene.observations, follow, 3, 0)
+    # frames 0 and 3 of each restart, with their own rate, and the first of the best once more if they were reduced
+    assert views == [(rows, 10.0)] * 6 + ([(size[1], 30.0)] if rows != size[1] else [])
+    assert guess.fps == 30.0
+    (first,) = guess.before
+    whole = frame_of(scene, motion.poses[0], motion.translations[0], scene.observations[0])
+    np.testing.assert_array_equal(first.areas, whole.areas)
+    assert guess.cameras is task.cameras
 
 
 @each(
-    ("count", "asked", "said"),
+    ("count", "body_frames", "message"),
     [
         (12, 4, "no build is fitted to 4 frames: 4 are too few, at least 5 are needed; it is the average"),
         (3, 30, "no build is fitted to 30 frames: 3 of them show enough of the person, at least 5 are needed"),
         (12, 5, "fitting the person's build to 5 frames"),
     ],
 )
-def test_too_few_frames_for_a_build_are_said(tmp_path: Path, count: int, asked: int, said: str) -> None:
-    scene = synthetic(built_in.motion("walk", frames=count), [90.0], (120, 90), [], (None, None))
-    np.savez(tmp_path / "a.npz", masks=[scene.observations[k].silhouettes[0].mask for k in range(count)])
-    heard: list[str] = []
-    track = posefit.track(
-        tmp_path / "a.npz", method="@loose", evaluations=80, restarts=1, body_frames=asked, say=heard.append
-    )
-    assert any(line.startswith(said) for line in heard)
-    assert (track.summary["body"] is None) == said.startswith("no build")
+def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, body_frames: int, message: str) -> None:
+    scene = walk(count, [90.0], (120, 90))
+    np.savez(tmp_path / "a.npz", masks=[observation.silhouettes[0].mask for observation in scene.observations])
+    log: list[str] = []
+    options: dict[str, Any] = {"method": "@loose", "evaluations": 80, "restarts": 1, "body_frames": body_frames}
+    track = posefit.track(tmp_path / "a.npz", say=log.append, **options)
+    assert any(line.startswith(message) for line in log)
+    assert (track.summary["body"] is None) == message.startswith("no build")
 
 
-def test_a_build_sees_every_third_frame_where_there_are_so_many() -> None:
-    scene = synthetic(built_in.motion("walk", frames=30), [90.0], (120, 90), [], (None, None))
+def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int) -> list[tuple[list[int], float]]:
+    """Return the numbers and the rate of the frames that builds of so many frames are fitted to."""
     task = task_of(scene, TrackOptions(evaluations=80), [built_in.motion("walk")])
-    looked: list[tuple[int, float]] = []
+    calls: list[tuple[list[int], float]] = []
 
-    def follow(mine: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        seen = list(observations)
-        looked.append((len(seen), mine.fps))
-        pose, place = built_in.motion("walk").poses[0], scene.anchor
-        return (Frame(pose, place, 0.0, np.zeros((1, 3), np.int64), 0, 0.0, np.empty(0)) for _ in seen)
+    def follow(task: Task, chosen: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        rows = [next(k for k, other in enumerate(observations) if other is observation) for observation in chosen]
+        calls.append((rows, task.fps))
+        areas = np.zeros((len(scene.cameras), 3), np.int64)
+        return iter([Frame(truth_of(scene).poses[0], scene.anchor, 0.0, areas, 0, 0.0, np.empty(0))] * len(rows))
 
-    fitted_build(task, scene.observations, follow, 10, None, 0)
-    fitted_build(task, scene.observations, follow, 11, None, 0)  # of which there are not so many thirds
-    assert set(looked) == {(10, scene.fps / 3), (11, scene.fps)}
+    for count in counts:
+        fitted_build(task, observations, follow, count, None, 0)
+    return [call for k, call in enumerate(calls) if call not in calls[:k]]
+
+
+def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many() -> None:
+    scene = walk(30, [90.0], (120, 90))
+    observations = [scene.observations[k] for k in range(30)]
+    thirds, all_of_them = frames_of_builds(scene, observations, 10, 11)
+    assert thirds == (list(range(0, 30, 3)), scene.fps / 3)
+    assert all_of_them == (list(range(11)), scene.fps)
 
 
 def test_a_build_begins_where_most_cameras_see_the_person() -> None:
-    scene = synthetic(built_in.motion("walk", frames=40), [0.0, 90.0], (120, 90), [], (None, None))
-    task = task_of(scene, TrackOptions(evaluations=80), [built_in.motion("walk")])
-    nothing = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
-    seen = [scene.observations[k] for k in range(40)]
-    seen[:10] = [replace(one, silhouettes=[one.silhouettes[0], nothing]) for one in seen[:10]]
-    looked: list[list[int]] = []
-
-    def follow(mine: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        told = list(observations)
-        looked.append([next(k for k, one in enumerate(seen) if one is each) for each in told])
-        pose, place = built_in.motion("walk").poses[0], scene.anchor
-        return (Frame(pose, place, 0.0, np.zeros((2, 3), np.int64), 0, 0.0, np.empty(0)) for _ in told)
-
-    fitted_build(task, seen, follow, 5, None, 0)
-    fitted_build(task, seen, follow, 11, None, 0)  # too many for those that come after
-    assert looked[0] == [10, 13, 16, 19, 22]
-    assert looked[-1] == list(range(11))
-    assert first_seen_by_most(seen) == 10
-    assert first_seen_by_most([replace(one, silhouettes=one.silhouettes[:1]) for one in seen]) == 0
+    scene = walk(40, [0.0, 90.0], (120, 90))
+    unknown = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
+    observations = [scene.observations[k] for k in range(40)]
+    observations[:10] = [replace(seen, silhouettes=[seen.silhouettes[0], unknown]) for seen in observations[:10]]
+    few, many = frames_of_builds(scene, observations, 5, 11)  # too many for those that come after
+    assert few[0] == [10, 13, 16, 19, 22]
+    assert many[0] == list(range(11))
+    assert first_seen_by_most(observations) == 10
+    assert first_seen_by_most([replace(seen, silhouettes=seen.silhouettes[:1]) for seen in observations]) == 0
