@@ -1,4 +1,4 @@
-"""What other programs open: read back by readers that are not ours, equal to 0.1 mm, with bones of one length."""
+"""Files for other programs: read back by other readers, equal to 0.1 mm, with bones of one length."""
 
 import csv
 import importlib
@@ -11,11 +11,10 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, PARENTS
 from posefit.measuring.angles import COLUMNS, clinical_angles
-from posefit.measuring.c3d import EVENTS, write_c3d
+from posefit.measuring.c3d import MAX_EVENTS, write_c3d
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait, Step, gait_of
-from posefit.measuring.tables import STEP_COLUMNS, write_angles, write_gait
-from posefit.measuring.trc import write_trc
+from posefit.measuring.tables import STEP_COLUMNS, write_angles, write_gait, write_trc
 from posefit.motion import recorded
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
@@ -24,15 +23,12 @@ from posefit.motion.motion import Motion
 
 TENTH = 1e-4  # metres
 BLANK = {3, 4, 50}
+NO_WALK = Gait(steps=[Step(foot="left", strike_seconds=1.0)], why="it is a dance")
 
 
 @pytest.fixture(scope="module")
 def walk() -> Motion:
     return recorded.clip("02_01").motion()
-
-
-def joints_of(motion: Motion) -> Array:
-    return motion.skeleton.joints(motion.poses, motion.translations)
 
 
 def rigid(points: Array) -> bool:
@@ -51,20 +47,18 @@ def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
     ezc3d = pytest.importorskip("ezc3d")
     write_c3d(tmp_path / "walk.c3d", walk, BLANK, gait_of(walk))
     read = ezc3d.c3d(str(tmp_path / "walk.c3d"))
-    points, expected = read["data"]["points"], joints_of(walk)
-    told = read["parameters"]["POINT"]
-    assert told["LABELS"]["value"] == list(PLACES)
-    assert told["UNITS"]["value"] == ["mm"]
-    assert told["RATE"]["value"] == [30.0]
+    points, expected = read["data"]["points"], walk.joints
+    parameters = {name: read["parameters"]["POINT"][name]["value"] for name in ("LABELS", "UNITS", "RATE")}
+    assert parameters == {"LABELS": list(PLACES), "UNITS": ["mm"], "RATE": [30.0]}
     assert read["header"]["points"]["frame_rate"] == 30.0
     assert (read["header"]["points"]["first_frame"], read["header"]["points"]["last_frame"]) == (0, len(walk) - 1)
     metres = points[:3].transpose(2, 1, 0) / 1e3
-    seen = np.array([k not in BLANK for k in range(len(walk))])
-    np.testing.assert_allclose(metres[seen], expected[seen], atol=TENTH)
-    assert np.isnan(metres[~seen]).all()
+    known = np.array([k not in BLANK for k in range(len(walk))])
+    np.testing.assert_allclose(metres[known], expected[known], atol=TENTH)
+    assert np.isnan(metres[~known]).all()
     residuals = read["data"]["meta_points"]["residuals"][0].T
-    assert (residuals[seen] == 0.0).all()
-    assert (residuals[~seen] == -1.0).all()
+    assert (residuals[known] == 0.0).all()
+    assert (residuals[~known] == -1.0).all()
     assert rigid(metres)
 
 
@@ -72,30 +66,19 @@ def test_a_c3d_has_the_events_of_gait(walk: Motion, tmp_path: Path) -> None:
     ezc3d = pytest.importorskip("ezc3d")
     gait = gait_of(walk)
     write_c3d(tmp_path / "walk.c3d", walk, (), gait)
-    told = {
-        name: one["value"]
-        for name, one in ezc3d.c3d(str(tmp_path / "walk.c3d"))["parameters"]["EVENT"].items()
-        if name != "__METADATA__"
+    events = {
+        name: ezc3d.c3d(str(tmp_path / "walk.c3d"))["parameters"]["EVENT"][name]["value"]
+        for name in ("CONTEXTS", "LABELS", "TIMES")
     }
-    strikes = [
-        (foot, seconds)
-        for foot, label, seconds in zip(told["CONTEXTS"], told["LABELS"], told["TIMES"][1], strict=True)
-        if label == "Foot Strike"
-    ]
-    assert [foot for foot, _ in strikes] == ["Right", "Left", "Right", "Left"]
-    assert [seconds for _, seconds in strikes] == pytest.approx([one.strike_seconds for one in gait.steps])
-    assert (told["TIMES"][0] == 0.0).all()
-    assert told["LABELS"].count("Foot Off") == sum(one.toe_off_seconds is not None for one in gait.steps)
-
-
-def test_a_c3d_of_no_walk_has_no_events(walk: Motion, tmp_path: Path) -> None:
-    ezc3d = pytest.importorskip("ezc3d")
-    gait = Gait(steps=[Step(foot="left", strike_seconds=1.0)], why="it is a dance")
-    write_c3d(tmp_path / "walk.c3d", walk, (), gait)
-    assert (
-        ezc3d.c3d(str(tmp_path / "walk.c3d"))["parameters"].get("EVENT", {}).get("USED", {"value": [0]})["value"][0]
-        == 0
-    )
+    strikes = [k for k, label in enumerate(events["LABELS"]) if label == "Foot Strike"]
+    assert [events["CONTEXTS"][k] for k in strikes] == ["Right", "Left", "Right", "Left"]
+    seconds = [step.strike_seconds for step in gait.steps]
+    assert events["TIMES"][1][strikes] == pytest.approx(seconds)
+    assert (events["TIMES"][0] == 0.0).all()
+    assert events["LABELS"].count("Foot Off") == sum(step.toe_off_seconds is not None for step in gait.steps)
+    write_c3d(tmp_path / "dance.c3d", walk, (), NO_WALK)
+    used = ezc3d.c3d(str(tmp_path / "dance.c3d"))["parameters"].get("EVENT", {}).get("USED", {"value": [0]})
+    assert used["value"][0] == 0
 
 
 def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Path) -> None:
@@ -107,7 +90,7 @@ def test_a_long_c3d_counts_its_frames_and_its_events(walk: Motion, tmp_path: Pat
     read = ezc3d.c3d(str(tmp_path / "long.c3d"))
     assert read["data"]["points"].shape[2] == 70_000
     times = read["parameters"]["EVENT"]["TIMES"]["value"]
-    assert times.shape == (2, EVENTS)
+    assert times.shape == (2, MAX_EVENTS)
     assert (times[0, -1], times[1, -1]) == (4.0, 14.0)  # the 255th is after 254 seconds
 
 
@@ -117,7 +100,7 @@ def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> Non
     assert dict(zip(lines[1], lines[2], strict=True))["NumMarkers"] == "27"
     names = [name for name in lines[3][2:] if name]
     assert names == list(PLACES)
-    expected = joints_of(walk)
+    expected = walk.joints
     points = np.full(expected.shape, np.nan)
     for line in lines[6:]:
         if line == [""]:
@@ -128,8 +111,8 @@ def test_a_trc_is_what_a_plain_reader_reads(walk: Motion, tmp_path: Path) -> Non
             if value:
                 points[k, column // 3, column % 3] = float(value)
     assert {int(k) for k in np.flatnonzero(np.isnan(points).all(axis=(1, 2)))} == BLANK
-    seen = [k for k in range(len(walk)) if k not in BLANK]
-    np.testing.assert_allclose(points[seen], expected[seen], atol=TENTH)
+    known = [k for k in range(len(walk)) if k not in BLANK]
+    np.testing.assert_allclose(points[known], expected[known], atol=TENTH)
     assert rigid(points)
 
 
@@ -144,7 +127,7 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
     for joint, name in enumerate(JOINTS[1:], 1):
         node = next(one for one in read.nodes if one.name == named[name])  # begins where the bone begins
         points[:, joint] = nodes[:, read.node_index[node.children[0].name]]
-    np.testing.assert_allclose(points, joints_of(walk), atol=TENTH)
+    np.testing.assert_allclose(points, walk.joints, atol=TENTH)
     assert rigid(points)
 
 
@@ -152,8 +135,8 @@ def test_an_amc_has_bones_of_one_length(walk: Motion, tmp_path: Path) -> None:
     write_asf(tmp_path / "walk.asf", walk.skeleton)
     write_amc(tmp_path / "walk.amc", walk)
     clip = read_clip(tmp_path / "walk.asf", tmp_path / "walk.amc", fps=30.0)
-    np.testing.assert_allclose(joints_of(clip), joints_of(walk), atol=TENTH)
-    assert rigid(joints_of(clip))
+    np.testing.assert_allclose(clip.joints, walk.joints, atol=TENTH)
+    assert rigid(clip.joints)
 
 
 def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion, tmp_path: Path) -> None:
@@ -164,9 +147,9 @@ def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion
     for k, row in enumerate(rows):
         assert (row["frame"], float(row["seconds"])) == (str(k), pytest.approx(k / 30.0, abs=1e-6))
         for name in COLUMNS:
-            told = float(row[name]) if row[name] else np.nan
+            written = float(row[name]) if row[name] else np.nan
             value = np.nan if k in BLANK else expected[name][k]
-            assert told == pytest.approx(value, abs=1e-3, nan_ok=True)
+            assert written == pytest.approx(value, abs=1e-3, nan_ok=True)
 
 
 def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
@@ -175,24 +158,18 @@ def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
     rows = rows_of(tmp_path / "gait.csv")
     assert list(rows[0]) == list(STEP_COLUMNS)
     assert [row["foot"] for row in rows] == ["right", "left", "right", "left"]
-    assert rows[0]["step_length"] == ""  # nobody saw where it came from
+    assert rows[0]["step_length"] == ""  # it is unknown where it came from
     assert float(rows[1]["step_length"]) == pytest.approx(gait.steps[1].step_length, abs=1e-6)
     assert float(rows[1]["strike_seconds"]) == pytest.approx(gait.steps[1].strike_seconds, abs=1e-6)
 
 
-def test_of_no_walk_no_step_is_written(tmp_path: Path) -> None:
-    write_gait(tmp_path / "gait.csv", Gait(steps=[Step(foot="left", strike_seconds=1.0)], why="it is a dance"))
+def test_no_step_is_written_of_a_motion_that_is_no_walk(tmp_path: Path) -> None:
+    write_gait(tmp_path / "gait.csv", NO_WALK)
     assert rows_of(tmp_path / "gait.csv") == []
 
 
-def test_what_is_told_of_a_gait_is_json(walk: Motion) -> None:
-    told = json.loads(json.dumps(gait_of(walk).as_dict()))
-    assert told["walk"] is True
-    assert told["why"] is None
-    assert told["steps"] == 3
-    assert json.loads(json.dumps(Gait(why="it is a dance").as_dict())) == {
-        "walk": False,
-        "why": "it is a dance",
-        "steps": 0,
-        **dict.fromkeys(("cadence", "speed", "step_length", "stride_length", "step_width", "stance_share")),
-    }
+def test_a_gait_is_json(walk: Motion) -> None:
+    gait, none = (json.loads(json.dumps(each.as_dict())) for each in (gait_of(walk), NO_WALK))
+    assert (gait["walk"], gait["why"], gait["steps"]) == (True, None, 3)
+    names = ("cadence", "speed", "step_length", "stride_length", "step_width", "stance_share")
+    assert none == {"walk": False, "why": "it is a dance", "steps": 0, **dict.fromkeys(names)}
