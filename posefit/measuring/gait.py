@@ -76,12 +76,18 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     steps = list(_steps(events, motion.fps, set(unknown)))
     if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
         return Gait(steps=steps, why=why)
-    means = {name: _mean(steps, name) for name in ("step_length", "stride_length", "step_width", "stance_share")}
-    seconds, length = _mean(steps, "step_seconds"), means["step_length"]
+    seconds, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
     assert seconds is not None
     assert length is not None
-    pace = cadence(seconds)
-    return Gait(steps=steps, cadence=pace, speed=walking_speed(length, pace), **means)
+    return Gait(
+        steps=steps,
+        cadence=cadence(seconds),
+        speed=walking_speed(length, cadence(seconds)),
+        step_length=length,
+        stride_length=_mean(steps, "stride_length"),
+        step_width=_mean(steps, "step_width"),
+        stance_share=_mean(steps, "stance_share"),
+    )
 
 
 def cadence(step_seconds: float) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Collection
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from posefit.motion.motion import Motion
@@ -24,9 +25,9 @@ def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_
         return back
     yaws, ground = motion.poses[half : count - half, 0], motion.translations[:, [0, 2]]
     way = ground[2 * half :] - ground[: -2 * half]
-    away = (way * np.column_stack([np.sin(yaws), np.cos(yaws)])).sum(axis=1) < 0.0
-    known = np.isin(np.arange(count), [*unknown], invert=True)
-    known = np.lib.stride_tricks.sliding_window_view(known, 2 * half + 1).all(axis=1)
+    away = np.asarray((way * np.column_stack([np.sin(yaws), np.cos(yaws)])).sum(axis=1) < 0.0)
+    frame_known = np.isin(np.arange(count), [*unknown], invert=True)
+    known = np.asarray(sliding_window_view(frame_known, 2 * half + 1).all(axis=1))
     fast = np.linalg.norm(way, axis=1) > MIN_TRAVEL_SPEED * 2 * half / motion.fps
     back[half : count - half] = away & fast & known
     return back

@@ -14,6 +14,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.smoothing import contours, kernels
 from posefit.tracking.smoothing.contours import (
@@ -39,11 +40,11 @@ def footage(frames: int = 14, views: tuple[float, ...] = (60.0,), girth: float =
     scene = synthetic(motion, views, (160, 160), (), (None, None))
     factors = np.ones(len(NAMES))
     factors[NAMES.index("thighs girth")] = factors[NAMES.index("torso girth")] = girth
-    body, observations = scene.body, list(scene.observations)
-    if girth != 1.0:
-        thick = replace(scene.observations, body=shaped(body, factors))  # type: ignore[type-var]
-        observations = [thick[k] for k in range(len(motion))]
-    observations = [replace(observation, translation=None) for observation in observations]
+    body = shaped(scene.body, factors)
+    observations = [
+        Observation([Silhouette.of(project(body, camera, *pose)) for camera in scene.cameras])
+        for pose in zip(motion.poses, motion.translations, strict=True)
+    ]
     return replace(scene, truth=None, observations=observations), motion
 
 
