@@ -7,6 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("posefit", deadline=None)  # how long an example takes says nothing of it
+settings.load_profile("posefit")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
