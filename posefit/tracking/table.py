@@ -1,4 +1,4 @@
-"""The table a track prints: the method beside what anybody can reach without it."""
+"""The table a track prints: the method beside trivial ones, what was not determined, and the budget."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -140,12 +140,12 @@ def covered_pixels(image: Image, then: Image, body: Mask, observed: Mask, reach:
 Grade = Literal["good", "doubtful", "useless"]
 _BEGINNING: dict[Grade, str] = {"good": "good. ", "doubtful": "doubtful: ", "useless": "do not use: "}
 USELESS_TOGETHER = 3  # signs that make a track doubtful make it useless together
-MIN_FRAMES = 12  # below which nothing can be said of depth, feet and motion together
+MIN_FRAMES = 12  # fewer are too few to judge depth, feet and motion by
 
 
 @dataclass(frozen=True)
 class Sign:
-    """How far a figure may be off its best value until a track is doubtful or useless, and how that is said."""
+    """How far a figure may be off its best value until a track is doubtful or useless, and the words for it."""
 
     name: str
     best: float

@@ -1,4 +1,4 @@
-"""The host counts what trackers draw, computes what their poses cost, and says where they say something else."""
+"""The poses that trackers draw are counted, their costs computed, and differences from their reports are warned of."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -23,25 +23,25 @@ def guarded(kind: Any, audit: Audit) -> AuditedTracker:
     return AuditedTracker(kind(task), task, "tracker 'bad' of posefit-bad 1.0", 0.5, audit)
 
 
-def found(kind: Any) -> tuple[list[Any], list[str]]:
+def audited(kind: Any) -> tuple[list[Any], list[str]]:
     audit = Audit()
     frames = list(guarded(kind, audit).track(scene()[2], np.random.default_rng(0)))
     return frames, audit.warnings
 
 
 def test_an_honest_tracker_is_left_as_it_is() -> None:
-    task, _, seen = scene()
-    plain = list(planted.Holds(task).track(seen, np.random.default_rng(0)))
-    frames, warnings = found(planted.Holds)
+    task, _, observations = scene()
+    plain = list(planted.Holds(task).track(observations, np.random.default_rng(0)))
+    frames, warnings = audited(planted.Holds)
     assert warnings == []
-    for one, other in zip(plain, frames, strict=True):
-        assert one.cost == other.cost
-        assert one.evaluations == other.evaluations == 1
-        np.testing.assert_array_equal(one.areas, other.areas)
+    for frame, other in zip(plain, frames, strict=True):
+        assert frame.cost == other.cost
+        assert frame.evaluations == other.evaluations == 1
+        np.testing.assert_array_equal(frame.areas, other.areas)
 
 
 @each(
-    ("kind", "said"),
+    ("kind", "warning"),
     [
         (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
         (planted.SpendsInSecret, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
@@ -49,35 +49,35 @@ def test_an_honest_tracker_is_left_as_it_is() -> None:
         (planted.InventsAreas, ", got [[0, 0, 100]] (12 such frames)"),
     ],
 )
-def test_what_a_tracker_says_is_held_against_what_the_host_finds(kind: Any, said: str) -> None:
-    frames, warnings = found(kind)
+def test_wrong_reports_of_a_tracker_are_corrected_with_a_warning(kind: Any, warning: str) -> None:
+    frames, warnings = audited(kind)
     assert warnings[0].startswith("tracker 'bad' of posefit-bad 1.0: frame 0 must ")
-    assert warnings[0].endswith(said)
-    honest = found(planted.Holds)[0]
-    for one, other in zip(frames, honest, strict=True):
-        assert one.cost == other.cost
-        np.testing.assert_array_equal(one.areas, other.areas)
+    assert warnings[0].endswith(warning)
+    honest = audited(planted.Holds)[0]
+    for frame, other in zip(frames, honest, strict=True):
+        assert frame.cost == other.cost
+        np.testing.assert_array_equal(frame.areas, other.areas)
         if kind is planted.SpendsInSecret:
-            assert one.evaluations == 20_001
+            assert frame.evaluations == 20_001
 
 
-def test_a_track_is_marked_by_a_warning_and_has_the_hosts_figures() -> None:
-    told: list[str] = []
-    result = posefit.track("walk", method=planted.SpendsInSecret, say=told.append, **QUICK)
-    said, spent = result.summary["warnings"]
-    assert "frame 0 must say how many poses it drew, 20,001, got 100 (3 such frames)" in said
-    assert "frame 0 must use at most 2,440 evaluations, got 20,001 (3 such frames)" in spent
+def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
+    log: list[str] = []
+    result = posefit.track("walk", method=planted.SpendsInSecret, say=log.append, **QUICK)
+    uncounted, beyond = result.summary["warnings"]
+    assert "frame 0 must say how many poses it drew, 20,001, got 100 (3 such frames)" in uncounted
+    assert "frame 0 must use at most 2,440 evaluations, got 20,001 (3 such frames)" in beyond
     assert result.summary["evaluations"] == 3 * 20_001
-    assert [line for line in told if line.startswith("warning")] == [f"warning: {said}", f"warning: {spent}"]
+    assert [line for line in log if line.startswith("warning")] == [f"warning: {uncounted}", f"warning: {beyond}"]
     free = posefit.track("walk", method=planted.CostsNothing, **QUICK)
     assert free.summary["cost"] == posefit.track("walk", method=planted.Holds, **QUICK).summary["cost"] > 0.0
     assert len(free.summary["warnings"]) == 1
 
 
 @each("method", [{"method": "sapso"}, {"method": "vsmm"}, {"method": "sapso+vsmm"}])
-def test_no_method_of_posefits_own_is_warned_of(method: dict[str, str]) -> None:
-    seen = posefit.track("walk", view_degrees=(45.0, 135.0), **method, **{**QUICK, "evaluations": 400}).summary
-    assert seen["warnings"] == []
+def test_posefits_own_methods_lead_to_no_warning(method: dict[str, str]) -> None:
+    summary = posefit.track("walk", view_degrees=(45.0, 135.0), **method, **{**QUICK, "evaluations": 400}).summary
+    assert summary["warnings"] == []
 
 
 def test_trackers_in_several_threads_are_counted_each_for_itself() -> None:
@@ -93,20 +93,20 @@ def test_trackers_in_several_threads_are_counted_each_for_itself() -> None:
             super().draw(observation, 49)
 
     with ThreadPoolExecutor(4) as pool:
-        results = list(pool.map(found, [Patient, Honest, Patient, Honest]))
+        results = list(pool.map(audited, [Patient, Honest, Patient, Honest]))
     assert [bool(warnings) for _, warnings in results] == [True, False, True, False]
     assert {frame.evaluations for frames, _ in results[::2] for frame in frames} == {20_001}
 
 
 def test_a_count_within_a_count_is_in_both() -> None:
-    task, _, seen = scene()
+    task, _, observations = scene()
     outer, inner = PoseCount(), PoseCount()
     draw = planted.Holds(task).draw
     with outer.counting():
-        draw(seen[0], 3)
+        draw(observations[0], 3)
         with inner.counting():
-            draw(seen[0], 4)
-    draw(seen[0], 5)
+            draw(observations[0], 4)
+    draw(observations[0], 5)
     assert (outer.poses, inner.poses) == (7, 4)
 
 
@@ -124,19 +124,19 @@ class LooksAhead(planted.Holds):
 
 
 def test_a_tracker_that_looks_ahead_is_honest() -> None:
-    assert found(LooksAhead)[1] == []
+    assert audited(LooksAhead)[1] == []
 
 
 @each(
-    ("kind", "said"),
+    ("kind", "rule"),
     [
         (planted.GivesFramesTwice, "track must yield a frame for each observation, got 2 for 1"),
         (planted.DropsFrames, "track must yield a frame for each observation, got 6 and then no more"),
     ],
 )
-def test_too_many_frames_and_too_few_are_named(kind: Any, said: str) -> None:
-    with pytest.raises(BrokenRuleError, match=f"^tracker 'bad' of posefit-bad 1.0: {said}$"):
-        found(kind)
+def test_too_many_frames_and_too_few_are_named(kind: Any, rule: str) -> None:
+    with pytest.raises(BrokenRuleError, match=f"^tracker 'bad' of posefit-bad 1.0: {rule}$"):
+        audited(kind)
 
 
 def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
@@ -151,7 +151,7 @@ def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
 
 
 @each(
-    ("change", "said"),
+    ("change", "rule"),
     [
         ({"evaluations": 1.5}, "evaluations must be a whole number, 0 or more, got 1.5"),
         ({"evaluations": -1}, "evaluations must be a whole number, 0 or more, got -1"),
@@ -159,13 +159,13 @@ def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
         ({"seconds": None}, "seconds must be a number, 0 or more, got None"),
     ],
 )
-def test_figures_that_are_none_are_named(change: dict[str, Any], said: str) -> None:
+def test_figures_that_are_none_are_named(change: dict[str, Any], rule: str) -> None:
     class Odd(planted.Holds):
         def frame(self, observation: Any) -> Any:
             return replace(super().frame(observation), **change)
 
-    with pytest.raises(BrokenRuleError, match=said):
-        found(Odd)
+    with pytest.raises(BrokenRuleError, match=rule):
+        audited(Odd)
 
 
 def test_the_scene_is_as_long_as_the_counts_above() -> None:

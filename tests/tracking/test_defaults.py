@@ -1,4 +1,4 @@
-"""What a source is followed with, and what that learns from, where nobody says."""
+"""The method of a source and what it learns from, by default."""
 
 import json
 from dataclasses import replace
@@ -44,7 +44,7 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
 
 
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    without = replace(registry(), plugins=tuple(one for one in registry().plugins if one.name != "exemplars"))
+    without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
     options = resolved("a.npz", TrackOptions())
     assert (options.method, options.train) == ("sapso@loose", WALKS)
@@ -52,26 +52,26 @@ def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pyt
 
 @pytest.fixture(scope="module")
 def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("seen") / "masks.npz"
+    path = tmp_path_factory.mktemp("masks") / "masks.npz"
     scene = scene_of(["09_01"], frames=(0, 8), size=(120, 90))
-    np.savez(path, masks=np.array([seen.silhouettes[0].mask for seen in scene.observations]))
+    np.savez(path, masks=np.array([observation.silhouettes[0].mask for observation in scene.observations]))
     return path
 
 
 def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(masks: Path) -> None:
-    said: list[str] = []
-    track = posefit.track(masks, evaluations=400, body_frames=5, say=said.append)
+    log: list[str] = []
+    track = posefit.track(masks, evaluations=400, body_frames=5, say=log.append)
     assert track.summary["method"] == "exemplars"
-    assert track.summary["train"] == [one.name for one in recorded.clips()]
+    assert track.summary["train"] == [clip.name for clip in recorded.clips()]
     assert track.summary["body"] is not None
-    assert not any("looking for the first pose" in one for one in said)
-    assert "fitting the person's build to 5 frames" in said
+    assert not any("looking for the first pose" in line for line in log)
+    assert "fitting the person's build to 5 frames" in log
 
 
 def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
-    said: list[str] = []
-    posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, say=said.append)
-    assert "looking for the first pose, 1 times" in said
+    log: list[str] = []
+    posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, say=log.append)
+    assert "looking for the first pose, 1 times" in log
 
 
 @each(
@@ -84,16 +84,16 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
         (["--set", "tracker.floor=0.1"], "sapso@loose"),
     ],
 )
-def test_settings_say_whose_they_are(masks: Path, words: list[str], method: str) -> None:
+def test_settings_choose_the_method(masks: Path, words: list[str], method: str) -> None:
     quick = ["--train", "walk-a", "--frames", "0:2", "--evaluations", "400", "--restarts", "1", "--body-frames", "0"]
     done = CliRunner().invoke(main, ["track", str(masks), *quick, *words])
     assert done.exit_code == 0, done.output
     assert f": 2 frames, {method}, " in done.stdout
 
 
-def test_somebody_is_left_out_of_the_library_that_is_learned_from_by_default(masks: Path) -> None:
+def test_people_are_left_out_of_the_default_library(masks: Path) -> None:
     quick = ["--evaluations", "400", "--body-frames", "0", "--frames", "0:2", "--json"]
-    others = [f"--without-subject={one}" for one in recorded.subjects() if one != "17"]
+    others = [f"--without-subject={subject}" for subject in recorded.subjects() if subject != "17"]
     done = CliRunner().invoke(main, ["track", str(masks), *quick, *others])
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["train"] == ["17_03", "17_10"]

@@ -12,6 +12,7 @@ import posefit
 from posefit import registry as registry_package
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
+from posefit.motion import built_in
 from posefit.registry import Offer, Plugin, Registry, registry
 from posefit.tracking import initialise, method
 from posefit.tracking.options import TrackOptions
@@ -22,7 +23,7 @@ QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 200
 
 
 @each("name", ["sapso", "pso", "particle", "annealed", "cma", "random"])
-def test_every_method_gets_the_same_number_of_evaluations_and_says_how_many_it_used(name: str) -> None:
+def test_every_method_gets_the_same_budget_and_reports_its_evaluations(name: str) -> None:
     for budget in (200, 437):
         summary = posefit.track("walk", method=name, **{**QUICK, "evaluations": budget}).summary
         assert summary["evaluations_per_frame"] == budget
@@ -30,7 +31,7 @@ def test_every_method_gets_the_same_number_of_evaluations_and_says_how_many_it_u
         assert 0.85 * budget < used <= budget
 
 
-def test_a_budget_is_particles_times_iterations_and_one_where_nothing_else_is_said() -> None:
+def test_a_budget_is_the_population_times_iterations_and_one() -> None:
     assert TrackOptions().budget == 2440
     assert TrackOptions(population_size=10, iterations=4).budget == 50
     assert TrackOptions(population_size=10, evaluations=300).budget == 300
@@ -61,7 +62,7 @@ def test_mistakes_are_named() -> None:
             )
 
 
-def test_a_filter_carries_its_particles_and_the_others_are_built_anew(monkeypatch: Any) -> None:
+def test_a_filter_carries_its_particles_and_the_others_are_built_again(monkeypatch: Any) -> None:
     built: list[str] = []
     for name in ("particle", "sapso", "random"):
         offer = registry().offer("optimiser", name)
@@ -72,8 +73,10 @@ def test_a_filter_carries_its_particles_and_the_others_are_built_anew(monkeypatc
 
         make.__signature__ = __import__("inspect").signature(offer.factory)  # type: ignore[attr-defined]
         counted = replace(offer, factory=make)
-        found = Registry((Plugin("test", "test", "1", "loaded", offers=(counted, registry().offer("prior", "pca"))),))
-        monkeypatch.setattr(method, "registry", lambda found=found: found)
+        replaced = Registry(
+            (Plugin("test", "test", "1", "loaded", offers=(counted, registry().offer("prior", "pca"))),)
+        )
+        monkeypatch.setattr(method, "registry", lambda replaced=replaced: replaced)
         built.clear()
         posefit.track("walk", method=name, **QUICK)
         first = "anywhere"  # of the track to warm up, and of the track itself
@@ -94,8 +97,8 @@ def installed(monkeypatch: Any) -> Iterator[Any]:
     def install(kind: Any, factory: Any, name: str = "bad", **more: Any) -> None:
         mine = Offer(kind, name, factory, "posefit-bad", "1.0", **more)
         rest = tuple(offer for plugin in registry().plugins for offer in plugin.offers)
-        found = Registry((Plugin("bad", "posefit-bad", "1.0", "loaded", offers=(mine, *rest)),))
-        monkeypatch.setattr(method, "registry", lambda: found)
+        replaced = Registry((Plugin("bad", "posefit-bad", "1.0", "loaded", offers=(mine, *rest)),))
+        monkeypatch.setattr(method, "registry", lambda: replaced)
 
     yield install
     assert registry_package.registry() is registry()
@@ -176,11 +179,11 @@ def test_a_broken_prior_is_named(change: dict[str, Any], rule: str, installed: A
 
 @each("method", ["inverse_transform", "feasible"])
 @each(
-    ("error", "said"),
+    ("error", "rule"),
     [(SystemExit(0), "end the program, got SystemExit: 0"), (KeyError("lost"), "fail, got KeyError: 'lost'")],
 )
 def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meets_it(
-    method: str, error: BaseException, said: str, installed: Any
+    method: str, error: BaseException, rule: str, installed: Any
 ) -> None:
     class Tires(planted.PCA):
         left = 5
@@ -193,7 +196,7 @@ def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meet
 
     setattr(Tires, method, tires)
     installed("prior", Tires)
-    with pytest.raises(BrokenRuleError, match=f"^prior 'bad' of posefit-bad 1.0: {method} must not {said}$"):
+    with pytest.raises(BrokenRuleError, match=f"^prior 'bad' of posefit-bad 1.0: {method} must not {rule}$"):
         posefit.track("walk", method="@bad", **QUICK)
 
 
@@ -246,20 +249,17 @@ def test_every_prior_can_be_searched(prior: str) -> None:
     assert summary["iou"] > 0.4
 
 
-def test_a_scene_is_followed_as_it_is() -> None:
-
-    from posefit.motion import built_in
-
+def test_a_scene_is_tracked_as_it_is() -> None:
     motion = built_in.motion("walk", frames=3)
-    seen = synthetic(motion, [45.0], (120, 90), [], (None, None))
-    result = posefit.track(seen, train=built_in.other_styles("walk"), evaluations=200)
+    scene = synthetic(motion, [45.0], (120, 90), [], (None, None))
+    result = posefit.track(scene, train=built_in.other_styles("walk"), evaluations=200)
     by_name = posefit.track(motion, train=built_in.other_styles("walk"), evaluations=200, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
     assert [frame.cost for frame in result.estimates] == [row["cost"] for row in result.frames]
     with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
-        posefit.track(seen, fps=20.0)
+        posefit.track(scene, fps=20.0)
     with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth is unknown"):
-        posefit.track(replace(seen, truth=None))
+        posefit.track(replace(scene, truth=None))
 
 
 def test_the_prior_is_learned_once_whatever_a_track_searches_before(tmp_path: Path, installed: Any) -> None:
@@ -273,7 +273,10 @@ def test_the_prior_is_learned_once_whatever_a_track_searches_before(tmp_path: Pa
     motion = posefit.track("walk", **QUICK).truth
     assert motion is not None
     scene = synthetic(motion, [45.0, 135.0], (120, 90), [], (None, None))
-    np.savez(tmp_path / "one.npz", masks=np.stack([one.silhouettes[0].mask for one in scene.observations] * 3))
+    np.savez(
+        tmp_path / "one.npz",
+        masks=np.stack([observation.silhouettes[0].mask for observation in scene.observations] * 3),
+    )
     installed("prior", Counted, "counted")
     posefit.track(tmp_path / "one.npz", method="@counted", restarts=2, body_frames=5, evaluations=80)
     assert len(fits) == 1

@@ -23,15 +23,17 @@ LOST, HELD = 5, 1
 def doubtful(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the viewer of a track in two cameras, of which one frame is held, two may be mirrored, and one is lost."""
     scene = walk(FRAMES, [45.0, 135.0])
-    seen = list(scene.observations)
-    seen[HELD] = replace(seen[HELD], usable=False)
-    frames = [replace(one, lost=0.9 if k == LOST else 0.1) for k, one in enumerate(uncertain_frames(scene, MIRRORED))]
-    return viewed(tmp_path_factory.mktemp("doubtful") / "out", replace(scene, observations=seen), frames)
+    observations = list(scene.observations)
+    observations[HELD] = replace(observations[HELD], usable=False)
+    frames = [
+        replace(frame, lost=0.9 if k == LOST else 0.1) for k, frame in enumerate(uncertain_frames(scene, MIRRORED))
+    ]
+    return viewed(tmp_path_factory.mktemp("doubtful") / "out", replace(scene, observations=observations), frames)
 
 
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the viewer of a track that somebody filmed, whose truth nobody knows, and which has a hostile name."""
+    """Return the viewer of a filmed track whose truth is unknown, and which has a hostile name."""
     scene = walk(FRAMES)
     pictures = [np.full((SIZE[1], SIZE[0], 3), (20 * k, 200, 40), np.uint8) for k in range(FRAMES)]
     unknown = replace(scene, truth=None, name=EVIL, warnings=[EVIL], pictures=lambda: iter(pictures))
@@ -44,13 +46,13 @@ def picture(page: Any, canvas: str) -> Any:
     return cv2.imdecode(np.frombuffer(base64.b64decode(text), np.uint8), cv2.IMREAD_UNCHANGED)
 
 
-def waited(seen: Watched, condition: Callable[[], Any]) -> None:
-    """Wait until something is so: two minutes at the most."""
+def waited(browser: Watched, condition: Callable[[], Any]) -> None:
+    """Wait until a condition is true: two minutes at the most."""
     for _ in range(3000):
         if condition():
             return
-        seen.page.wait_for_timeout(40)
-    raise AssertionError("it never came to be so")
+        browser.page.wait_for_timeout(40)
+    raise AssertionError("the condition never became true")
 
 
 def reading(page: Any) -> str:
@@ -68,7 +70,7 @@ CONTRASTS = """() => {
   const light = ([r, g, b]) => [r, g, b].map((one) => one / 255)
     .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
     .reduce((sum, one, k) => sum + [0.2126, 0.7152, 0.0722][k] * one, 0);
-  const found = [];
+  const contrasts = [];
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const node = walker.currentNode.parentElement;
@@ -78,9 +80,9 @@ CONTRASTS = """() => {
     while (under && (parts(getComputedStyle(under).backgroundColor)[3] ?? 1) === 0) under = under.parentElement;
     const [ink, back] = [node.closest("svg") ? style.fill : style.color, getComputedStyle(under).backgroundColor]
       .map((one) => light(parts(one)));
-    found.push([walker.currentNode.data.trim(), (Math.max(ink, back) + 0.05) / (Math.min(ink, back) + 0.05)]);
+    contrasts.push([walker.currentNode.data.trim(), (Math.max(ink, back) + 0.05) / (Math.min(ink, back) + 0.05)]);
   }
-  return found;
+  return contrasts;
 }"""
 NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas, svg, section")]
   .filter((one) => !one.closest("[hidden], [aria-hidden=true]"))
@@ -96,31 +98,31 @@ def test_it_opens_without_errors_or_requests_and_everything_can_be_read(
     chromium: Any, request: pytest.FixtureRequest, which: str, width: int, scheme: str
 ) -> None:
     path = request.getfixturevalue(which)
-    with opened(chromium, path, width, color_scheme=scheme) as seen:
-        assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+    with opened(chromium, path, width, color_scheme=scheme) as browser:
+        assert browser.page.evaluate("document.documentElement.scrollWidth") <= width
         for canvas in ("picture", "turning"):
-            waited(seen, lambda name=canvas: (picture(seen.page, name)[..., 3] > 0).mean() > 0.02)
+            waited(browser, lambda name=canvas: (picture(browser.page, name)[..., 3] > 0).mean() > 0.02)
         for select in ("figure", "joint"):
-            for option in seen.page.locator(f"#{select} option").evaluate_all("all => all.map((one) => one.value)"):
-                seen.page.locator(f"#{select}").select_option(value=option)
-                assert seen.page.locator(f"#{select}-chart svg path").count() >= 1
-        seen.page.locator("summary").click()
-        assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
-        contrasts = seen.page.evaluate(CONTRASTS)
+            for option in browser.page.locator(f"#{select} option").evaluate_all("all => all.map((one) => one.value)"):
+                browser.page.locator(f"#{select}").select_option(value=option)
+                assert browser.page.locator(f"#{select}-chart svg path").count() >= 1
+        browser.page.locator("summary").click()
+        assert browser.page.evaluate("document.documentElement.scrollWidth") <= width
+        contrasts = browser.page.evaluate(CONTRASTS)
         assert len(contrasts) > 40
         assert [(words, ratio) for words, ratio in contrasts if ratio < 4.5] == []
-        assert seen.page.evaluate(NAMELESS) == []
-        assert seen.complaints == []
-        assert [one for one in seen.requests if not one.startswith("data:")] == [path.as_uri()]
+        assert browser.page.evaluate(NAMELESS) == []
+        assert browser.complaints == []
+        assert [url for url in browser.requests if not url.startswith("data:")] == [path.as_uri()]
 
 
 def test_the_slider_moves_picture_body_and_curves_together(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful) as seen:
-        page = seen.page
+    with opened(chromium, doubtful) as browser:
+        page = browser.page
         before = state(page)
         assert len(before[2]) == 3
         page.locator("#frame").fill("7")
-        waited(seen, lambda: all(new != old for new, old in zip(state(page), before, strict=True)))
+        waited(browser, lambda: all(new != old for new, old in zip(state(page), before, strict=True)))
         assert len(set(state(page)[2])) == 1
         assert reading(page).startswith(f"frame 7 of {FRAMES}, 0.23 s; MPJPE 0 mm; IoU 1.000; cost 0.00")
         assert page.locator("#frame").get_attribute("aria-valuetext") == reading(page)
@@ -129,23 +131,23 @@ def test_the_slider_moves_picture_body_and_curves_together(chromium: Any, doubtf
 
 @pytest.mark.slow
 def test_it_plays_and_stops(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful, 390) as seen:
-        page, readings = seen.page, set()
+    with opened(chromium, doubtful, 390) as browser:
+        page, readings = browser.page, set()
         page.locator("#speed").select_option("0.5")
         page.locator("#play").click()
         assert page.locator("#play").inner_text() == "Pause"
-        waited(seen, lambda: readings.add(reading(page)) or len(readings) > 3)
+        waited(browser, lambda: readings.add(reading(page)) or len(readings) > 3)
         page.locator("#play").click()
         assert page.locator("#play").inner_text() == "Play"
         still = reading(page)
         page.wait_for_timeout(300)
         assert reading(page) == still
-        assert seen.complaints == []
+        assert browser.complaints == []
 
 
-def test_keys_go_from_frame_to_frame_and_to_what_is_marked(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful) as seen:
-        page = seen.page
+def test_keys_go_from_frame_to_frame_and_to_marked_frames(chromium: Any, doubtful: Path) -> None:
+    with opened(chromium, doubtful) as browser:
+        page = browser.page
 
         def after(*keys: str) -> int:
             for key in keys:
@@ -172,11 +174,11 @@ def test_keys_go_from_frame_to_frame_and_to_what_is_marked(chromium: Any, doubtf
 
 @pytest.mark.slow
 def test_the_body_turns_by_mouse_keys_and_buttons(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful, 390, has_touch=True) as seen:
-        page = seen.page
+    with opened(chromium, doubtful, 390, has_touch=True) as browser:
+        page = browser.page
         page.locator("#turning").scroll_into_view_if_needed()
         box = page.locator("#turning").bounding_box()
-        shown = [picture(page, "turning").tobytes()]
+        pictures = [picture(page, "turning").tobytes()]
 
         def drag() -> None:
             page.mouse.move(box["x"] + 50, box["y"] + 50)
@@ -190,18 +192,18 @@ def test_the_body_turns_by_mouse_keys_and_buttons(chromium: Any, doubtful: Path)
         clicks = [page.locator(f"#from-{one}").click for one in ("camera", "side", "above")]
         for act in [drag, focused("ArrowLeft"), focused("ArrowUp"), focused("+"), *clicks]:
             act()
-            shown.append(picture(page, "turning").tobytes())
-            assert shown[-1] != shown[-2]
+            pictures.append(picture(page, "turning").tobytes())
+            assert pictures[-1] != pictures[-2]
         assert reading(page).startswith("frame 0 of")  # the same keys turn the body here, and change no frame
         page.locator("#with-truth").check()
-        assert picture(page, "turning").tobytes() != shown[-1]
+        assert picture(page, "turning").tobytes() != pictures[-1]
 
 
 def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path) -> None:
     camera, scene = 1, walk(FRAMES, [45.0, 135.0])
     assert scene.truth is not None
-    with opened(chromium, doubtful) as seen:
-        page = seen.page
+    with opened(chromium, doubtful) as browser:
+        page = browser.page
         page.locator("#camera").select_option(index=camera)
         for box in ("close-up", "with-mask"):
             page.locator(f"#{box}").uncheck()
@@ -210,23 +212,23 @@ def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path) -> 
         drawn = cv2.resize((picture(page, "picture")[..., 3] > 100).astype(np.uint8), SIZE) > 0
         page.locator("#with-body").uncheck()
         page.locator("#with-mask").check()
-        waited(seen, lambda: (picture(page, "picture")[..., 3] > 0).any())
+        waited(browser, lambda: (picture(page, "picture")[..., 3] > 0).any())
         mask = cv2.resize((picture(page, "picture")[..., 3] > 100).astype(np.uint8), SIZE) > 0
     true = project(scene.body, scene.cameras[camera], scene.truth.poses[8], scene.truth.translations[8])
-    for one in (drawn, mask):
-        assert (one & true).sum() / (one | true).sum() > 0.95
+    for shape in (drawn, mask):
+        assert (shape & true).sum() / (shape | true).sum() > 0.95
 
 
 def pixels(image: Any, colour: str) -> int:
     """Return how many pixels have a colour, or nearly."""
-    wanted = np.array([int(colour[k : k + 2], 16) for k in (5, 3, 1)])
-    return int(((np.abs(image[..., :3].astype(int) - wanted).max(axis=2) < 12) & (image[..., 3] > 200)).sum())
+    expected = np.array([int(colour[k : k + 2], 16) for k in (5, 3, 1)])
+    return int(((np.abs(image[..., :3].astype(int) - expected).max(axis=2) < 12) & (image[..., 3] > 200)).sum())
 
 
 @pytest.mark.slow
 def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful, color_scheme="light") as seen:
-        page = seen.page
+    with opened(chromium, doubtful, color_scheme="light") as browser:
+        page = browser.page
         for frame, weight in ((2, 30), (3, 40), (4, 0)):
             page.locator("#frame").fill(str(frame))
             assert (f"may be the thin bones: {weight} %" in reading(page)) == (weight > 20)
@@ -235,13 +237,12 @@ def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, dou
 
 
 def test_doubtful_frames_are_marked(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful) as seen:
-        page = seen.page
-        told = page.locator("#verdict").inner_text()
-        assert told == "Not determined: left and right: unknown in 2 of 12 frames; 1 frame lost."
+    with opened(chromium, doubtful) as browser:
+        page = browser.page
+        verdict = page.locator("#verdict").inner_text()
+        assert verdict == "Not determined: left and right: unknown in 2 of 12 frames; 1 frame lost."
         assert page.locator("#notes").inner_text().startswith("1 of 12 frames shows too little of the person")
-        said = page.locator("#marks li").all_inner_texts()
-        assert said == [
+        assert page.locator("#marks li").all_inner_texts() == [
             "lost: 1 frame",
             "left and right unknown: 2 frames",
             "pose held: too little is visible: 1 frame",
@@ -256,16 +257,16 @@ def test_doubtful_frames_are_marked(chromium: Any, doubtful: Path) -> None:
 
 
 def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful) as seen:
-        page = seen.page
-        for label, bands, said in (
+    with opened(chromium, doubtful) as browser:
+        page = browser.page
+        for label, bands, caption in (
             ("left ankle: height, m", 3, "dashed: the truth, with intervals of 50, 80, 95 %"),
             ("left knee flexion, degrees", 0, "dashed: the truth"),
             ("root yaw: angle, degrees", 3, "dashed: the truth, with intervals of 50, 80, 95 %"),
         ):
             page.locator("#joint").select_option(label=label)
             assert page.locator("#joint-chart polygon").count() == bands
-            assert page.locator("#joint-caption").inner_text() == said
+            assert page.locator("#joint-caption").inner_text() == caption
         page.locator("#joint-chart").scroll_into_view_if_needed()
         box = page.locator("#joint-chart svg").bounding_box()
         for x, frame in ((box["width"] - 13, 11), (49, 0)):  # a click goes to its frame
@@ -275,40 +276,40 @@ def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doub
 
 def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
     scene = walk(1)
-    with opened(chromium, viewed(tmp_path / "out", scene, exact_frames(scene)), 390) as seen:
-        assert seen.page.locator("#lead").inner_text() == "A single frame."
-        assert not seen.page.locator("#frame").is_visible()
-        assert seen.page.locator("#curves").count() == 0
-        seen.page.keyboard.press("n")
-        assert reading(seen.page).startswith("frame 0 of 1, 0.00 s; MPJPE 0 mm")
-        assert seen.complaints == []
+    with opened(chromium, viewed(tmp_path / "out", scene, exact_frames(scene)), 390) as browser:
+        assert browser.page.locator("#lead").inner_text() == "A single frame."
+        assert not browser.page.locator("#frame").is_visible()
+        assert browser.page.locator("#curves").count() == 0
+        browser.page.keyboard.press("n")
+        assert reading(browser.page).startswith("frame 0 of 1, 0.00 s; MPJPE 0 mm")
+        assert browser.complaints == []
 
 
 @pytest.mark.slow
-def test_what_was_filmed_lies_behind_the_body_and_can_be_hidden(chromium: Any, filmed: Path) -> None:
-    with opened(chromium, filmed) as seen:
-        page = seen.page
+def test_footage_lies_behind_the_body_and_can_be_hidden(chromium: Any, filmed: Path) -> None:
+    with opened(chromium, filmed) as browser:
+        page = browser.page
         page.locator("#with-body").uncheck()
         for frame in (0, 9):
             page.locator("#frame").fill(str(frame))
-            wanted = np.array([20 * frame, 200, 40])
-            waited(seen, lambda w=wanted: np.abs(picture(page, "picture")[5, 5, :3].astype(int) - w).max() < 8)
+            expected = np.array([20 * frame, 200, 40])
+            waited(browser, lambda w=expected: np.abs(picture(page, "picture")[5, 5, :3].astype(int) - w).max() < 8)
         page.locator("#with-film").uncheck()
         assert picture(page, "picture")[5, 5, 3] == 0
         page.locator("#with-film").check()
         page.locator("#with-mask").check()
-        waited(seen, lambda: (np.abs(picture(page, "picture").astype(int) - [180, 200, 40, 255]).max(2) > 40).any())
+        waited(browser, lambda: (np.abs(picture(page, "picture").astype(int) - [180, 200, 40, 255]).max(2) > 40).any())
 
 
 def test_names_are_text_and_unreported_figures_are_hidden(chromium: Any, filmed: Path) -> None:
-    with opened(chromium, filmed) as seen:
-        page = seen.page
+    with opened(chromium, filmed) as browser:
+        page = browser.page
         assert page.locator("#title").text_content() == EVIL
         assert page.locator("#notes").text_content().endswith(EVIL)
-        told = page.locator("#verdict").inner_text()
-        assert told.startswith("Trust: ")
-        assert "The method does not report which side is left or which frames are lost: frames without" in told
+        verdict = page.locator("#verdict").inner_text()
+        assert verdict.startswith("Trust: ")
+        assert "The method does not report which side is left or which frames are lost: frames without" in verdict
         for hidden in ("#sure", "#doubtful", "#truth-label", "#camera-label"):
             assert not page.locator(hidden).is_visible()
         assert "MPJPE" not in page.locator("body").inner_text()
-        assert seen.complaints == []
+        assert browser.complaints == []

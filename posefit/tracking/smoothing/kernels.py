@@ -127,7 +127,7 @@ def pull_to_borders(parents, centres, radii, fields, corners, sizes, points, sta
     """Add, frame by frame, half the second derivative and half the gradient of the squares of all distances, in pixels.
 
     `centres` (T, J, 2) and `radii` (T, B, 2) are the drawn body; `fields` (T, h, w), `corners` and `sizes` (T, 2),
-    `points` (n, 2) and `starts` (T + 1,) are a `Borders`, whose points stand for `step` pixels of the border each. A
+    `points` (n, 2) and `starts` (T + 1,) are `MaskContours`, whose points stand for `step` pixels of the border each. A
     distance counts by the pixels that it stands for, and the less the farther it is off, beyond `scales` (T,). `out`
     is curves (T, 2 J + 2 B, 2 J + 2 B) and slopes (T, 2 J + 2 B).
     """

@@ -235,7 +235,7 @@ def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -
 
 
 def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation: float, moved: Array) -> None:
-    """Add what is asked of a root, `moved` (T, 3) from where a motion has it: to be there, and to go smoothly.
+    """Add the squares of a root `moved` (T, 3) from where a motion has it, which is to be there and to go smoothly.
 
     `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth. The
     root's place is the first three numbers of each frame.
@@ -248,7 +248,7 @@ def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation
 
 
 def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]) -> None:
-    """Add what is asked of feet that stand (T, 2) as a motion goes now: not to move.
+    """Add the squares of what feet move that stand (T, 2), as a motion goes now.
 
     The numbers of each frame are the root's place and these angles of it.
     """
