@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from hypothesis import settings
 
 settings.register_profile("posefit", deadline=None)  # how long an example takes says nothing of it
 settings.load_profile("posefit")
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a run in the background ignores it, and so do its children
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
