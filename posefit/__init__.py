@@ -37,14 +37,16 @@ if TYPE_CHECKING:
     from posefit.geometry.camera import Camera as Camera
     from posefit.geometry.skeleton import Skeleton as Skeleton
     from posefit.motion.motion import Motion as Motion
+    from posefit.report.comparison import Comparison as Comparison
+    from posefit.report.comparison import compare as compare
     from posefit.silhouette.mask import Silhouette as Silhouette
     from posefit.suites.problem import Problem as Problem
     from posefit.suites.problem import Suite as Suite
     from posefit.suites.problem import suite as suite
-    from posefit.tracking.front import Fit as Fit
     from posefit.tracking.front import fit as fit
     from posefit.tracking.front import track as track
-    from posefit.tracking.summary import Track as Track
+    from posefit.tracking.result import Fit as Fit
+    from posefit.tracking.result import Track as Track
 
 hookimpl = HookimplMarker("posefit")
 
@@ -61,8 +63,9 @@ _HOMES = {
     "fitting.space": ("SearchSpace",),
     "fitting.tracker": ("Frame", "Observation", "SynthesisTracker", "Task", "Tracker"),
     "suites.problem": ("Problem", "Suite", "suite"),
-    "tracking.front": ("Fit", "fit", "track"),
-    "tracking.summary": ("Track",),
+    "tracking.front": ("fit", "track"),
+    "tracking.result": ("Fit", "Track"),
+    "report.comparison": ("Comparison", "compare"),
     "footage.segmentation": ("Extraction",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

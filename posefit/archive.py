@@ -1,4 +1,4 @@
-"""Arrays of an .npz file that may be hostile: the size of each is checked before it is unpacked.
+"""Arrays of an .npz or .npy file that may be hostile: the size of each is checked before it is unpacked.
 
 `numpy.load` unpacks whatever a file asks for. Here the archive's directory and the header of each array are read first:
 nothing is unpacked that has another size than they say, or more bytes than the caller allows.
@@ -94,6 +94,44 @@ class Stored:
         with _as_input_error(self._path, self._what), self._archive.open(f"{self.name}.npy") as member:
             _exactly(member, self._start)
             yield member
+
+
+@dataclass(frozen=True)
+class Held:
+    """An array in memory, to be read as one of an archive is."""
+
+    array: NDArray[Any]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Its shape."""
+        return self.array.shape
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Its type."""
+        return self.array.dtype
+
+    def read(self) -> NDArray[Any]:
+        """Return the array."""
+        return self.array
+
+    def rows(self) -> Iterator[NDArray[Any]]:
+        """Yield one row after the other."""
+        yield from self.array
+
+
+def mapped(path: Path, most: int) -> Held:
+    """Return the array of an .npy file, read from the disk row by row. Raises InputError where it is none."""
+    check_size(path, most)
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except _DAMAGE as error:
+        came = cut(" ".join(str(error).split()) or type(error).__name__)
+        raise InputError(f"{path}: expected an .npy file with an array, got a damaged one: {came}") from None
+    if not isinstance(array, np.ndarray):
+        raise InputError(f"{path}: expected an .npy file with an array, got an archive of several")
+    return Held(array)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Messages and progress bars of work that takes its time."""
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -21,3 +22,16 @@ class Progress:
 
 
 QUIET = Progress()
+
+
+def interactive() -> Progress:
+    """Return messages and bars on stderr where that is a terminal, bars in a notebook; elsewhere nothing."""
+    terminal = sys.stderr is not None and sys.stderr.isatty()
+    if not terminal and "ipykernel" not in sys.modules:
+        return QUIET
+    from tqdm.auto import tqdm
+
+    def log(message: str) -> None:
+        tqdm.write(message, file=sys.stderr)
+
+    return Progress(log, lambda steps, count: iter(tqdm(steps, total=count, unit="frame", dynamic_ncols=True)))

@@ -7,7 +7,7 @@ from posefit.footage.training import training_clips, training_motions
 from posefit.sweep.cell import TrackCell, settings_text
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
-from posefit.tracking.summary import Track
+from posefit.tracking.result import Track
 
 METHOD, EVALUATIONS = "exemplars", 2440  # evaluations of a frame
 

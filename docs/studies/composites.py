@@ -33,12 +33,13 @@ from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
+from posefit.progress import Progress
 from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
-from posefit.tracking.summary import Track
+from posefit.tracking.result import Track
 from posefit_reproduce.jobs import each
 from table import WORKERS, earlier, kept, markdown
 
@@ -213,7 +214,7 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
                 height=scene.actors[0].body.stature,
                 train=[recorded.leaving_out(recorded.LIBRARY, scene.people)],
                 out=folder / "track",
-                say=said.append,
+                progress=Progress(said.append),
             )
         except ValueError as error:
             return row | {"refused": str(error).replace(f"{folder}/", "")}

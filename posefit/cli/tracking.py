@@ -30,7 +30,7 @@ def track(as_json: bool, live: str | None, **options: Any) -> None:
         return _track_live(live, as_json, options)
 
     with results_alone() if as_json else nullcontext():
-        result = run(progress=progress, say=say, **_arguments(options))
+        result = run(progress=Progress(say, progress), **_arguments(options))
     _print(result.summary, as_json, {}, options["out"], "open track.html, watch overlay.mp4, look at summary.png")
 
 
@@ -42,7 +42,7 @@ def fit(as_json: bool, **options: Any) -> None:
     from posefit.tracking.front import fit as run
 
     with results_alone() if as_json else nullcontext():
-        result = run(say=say, **_arguments(options))
+        result = run(progress=Progress(say), **_arguments(options))
     degrees = [round(math.degrees(angle), 6) for angle in result.pose]
     _print(result.summary, as_json, {"pose_degrees": degrees}, options["out"], "open track.html, look at summary.png")
 

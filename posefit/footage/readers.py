@@ -1,4 +1,4 @@
-"""Masks from a folder of images or an .npz file: which pixels are the person's by the values of all of them.
+"""Masks from images, an array, or an .npz or .npy file: which pixels are the person's by the values of all of them.
 
 Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file does not show which, so the values of
 all files are counted before any pixel is decided. An image is decoded once: its values wait, compressed, in a temporary
@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.archive import Stored, archived
+from posefit.archive import Held, Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import FORMATS, is_colourful, read_values
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
@@ -42,12 +42,32 @@ Values = NDArray[Any]  # (height, width): grey levels, an alpha channel, indices
 Classifier = Callable[[Values], Mask]  # values to the mask (height, width) of the person
 
 
-def read_masks(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
-    """Return the masks of a folder of images, or of an .npz file with `masks`, cut to `frames`.
+Masks = NDArray[Any] | tuple[Path, ...]  # of one camera: (frames, height, width), or an image a frame
+
+
+def read_masks(source: Path | Masks, frames: Range, label: int | None = None) -> PackedMasks:
+    """Return the masks of images, of a folder of them, of an array, or of an .npz or .npy file, cut to `frames`.
 
     `label` is the person's value, where masks hold several. Raises InputError naming the file.
     """
-    return read_folder(path, frames, label) if path.is_dir() else read_npz(path, frames, label)
+    if isinstance(source, tuple):
+        return read_images(source, name_of(source), frames, label)
+    if isinstance(source, np.ndarray):
+        return _packed(name_of(source), {"masks": Held(source)}, frames, label)
+    if source.is_dir():
+        return read_folder(source, frames, label)
+    existing(source)
+    if source.suffix.lower() == ".npy":
+        return _packed(str(source), {"masks": mapped(source, UNPACKED)}, frames, label)
+    with archived(source, NAMES, "the key masks", UNPACKED, PACKED) as arrays:
+        return _packed(str(source), arrays, frames, label)
+
+
+def name_of(source: str | Path | Masks) -> str:
+    """Return what messages call masks: their path, the folder of their images, or `masks` for an array."""
+    if isinstance(source, np.ndarray):
+        return "masks"
+    return str(source[0].parent if isinstance(source, tuple) else source)
 
 
 def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
@@ -60,9 +80,14 @@ def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMa
     images = sorted(files, key=_natural)
     if not images:
         raise InputError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+    return read_images(images, str(path), frames, label)
+
+
+def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
+    """Return the masks of images of one size. Raises InputError naming the file where one is none."""
     chosen = images[slice(*span(frames, len(images)))]
-    if is_colourful(chosen[0]):
-        raise _many_colours(path)
+    if is_colourful(existing(chosen[0])):
+        raise _many_colours(name)
     counts, shape = ValueCounts(), (0, 0)
     stored: list[tuple[int, np.dtype[Any]]] = []
     with tempfile.SpooledTemporaryFile(SPOOLED) as spool:
@@ -76,7 +101,7 @@ def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMa
                 raise InputError(f"{file}: mask must have shape {shape}, got {values.shape}")
             counts.add(values, soft)
             stored.append((spool.write(zlib.compress(values.tobytes(), 1)), values.dtype))
-        is_person, size = counts.classifier(label, path), (shape[1], shape[0])
+        is_person, size = counts.classifier(label, name), (shape[1], shape[0])
         masks = empty_planes(len(chosen), size)
         spool.seek(0)
         for k, (length, dtype) in enumerate(stored):
@@ -91,63 +116,61 @@ def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     return [(int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p) for p in parts], file.name
 
 
-def read_npz(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
-    """Return the masks of an .npz file. Raises InputError naming the file where it holds none."""
-    existing(path)
-    with archived(path, NAMES, "the key masks", UNPACKED, PACKED) as arrays:
-        stack = _checked_stack(path, arrays)
-        count, height, width = stack.shape
-        usable = arrays["usable"].read() if "usable" in arrays else np.ones(count, dtype=bool)
-        fps = float(arrays["fps"].read()) if "fps" in arrays else None
-        if fps is not None and not 0.0 < fps <= MAX_FPS:
-            raise InputError(f"{path}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
-        start, stop = span(frames, count)
-        if not usable[start:stop].any():
-            raise InputError(f"{path}: expected a frame that is usable, got none from {start} to {stop}")
-        masks = _pack(stack, start, stop, _npz_classifier(path, stack, start, stop, label))
-        valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
-    names = [f"{path}[{k}]" for k in range(start, stop)]
+def _packed(name: str, arrays: Mapping[str, Stored | Held], frames: Range, label: int | None) -> PackedMasks:
+    """Return the masks of arrays by their names. Raises InputError naming what holds them where it holds none."""
+    stack = _checked_stack(name, arrays)
+    count, height, width = stack.shape
+    usable = arrays["usable"].read() if "usable" in arrays else np.ones(count, dtype=bool)
+    fps = float(arrays["fps"].read()) if "fps" in arrays else None
+    if fps is not None and not 0.0 < fps <= MAX_FPS:
+        raise InputError(f"{name}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
+    start, stop = span(frames, count)
+    if not usable[start:stop].any():
+        raise InputError(f"{name}: expected a frame that is usable, got none from {start} to {stop}")
+    masks = _pack(stack, start, stop, _stack_classifier(name, stack, start, stop, label))
+    valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
+    names = [f"{name}[{k}]" for k in range(start, stop)]
     return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps)
 
 
-def _checked_stack(path: Path, arrays: Mapping[str, Stored]) -> Stored:
-    """Return the masks of a file. Raises InputError where one of its arrays has another shape or type."""
+def _checked_stack(name: str, arrays: Mapping[str, Stored | Held]) -> Stored | Held:
+    """Return the masks of arrays. Raises InputError where one of them has another shape or type."""
     if "masks" not in arrays:
-        raise InputError(f"{path}: expected an .npz file with the key masks, got none")
+        raise InputError(f"{name}: expected an .npz file with the key masks, got none")
     stack = arrays["masks"]
     shape = tuple(stack.shape)
     if len(shape) != 3 or 0 in shape or stack.dtype.kind not in "buif":
-        raise InputError(f"{path}: masks must have shape (frames, height, width), got {_described(stack)}")
+        raise InputError(f"{name}: masks must have shape (frames, height, width), got {_described(stack)}")
     others: dict[str, tuple[tuple[int, ...], str, str]] = {
         "valid": (shape, "bui", f"have the masks' shape {quoted(shape)}"),
         "usable": (shape[:1], "b", f"be {shape[0]} booleans"),
         "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
     }
-    for name, (wanted, kinds, expected) in others.items():
-        stored = arrays.get(name)
+    for key, (wanted, kinds, expected) in others.items():
+        stored = arrays.get(key)
         if stored is not None and (tuple(stored.shape) != wanted or stored.dtype.kind not in kinds):
-            raise InputError(f"{path}: {name} must {expected}, got {_described(stored)}")
+            raise InputError(f"{name}: {key} must {expected}, got {_described(stored)}")
     return stack
 
 
-def _described(stored: Stored) -> str:
+def _described(stored: Stored | Held) -> str:
     return f"{quoted(tuple(stored.shape))} {stored.dtype}"
 
 
-def _npz_classifier(path: Path, stored: Stored, start: int, stop: int, label: int | None) -> Classifier:
+def _stack_classifier(name: str, stored: Stored | Held, start: int, stop: int, label: int | None) -> Classifier:
     """Return how frames start to stop become masks; booleans need no count."""
     if stored.dtype.kind == "b" and label is None:
         return _above(0.0)
     counts = ValueCounts()
     for k, frame in enumerate(stored.rows()):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
-            raise InputError(f"{path}: masks must be finite, got nan or infinity in frame {k}")
+            raise InputError(f"{name}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
             counts.add(frame, soft=False)
-    return counts.classifier(label, path)
+    return counts.classifier(label, name)
 
 
-def _pack(stored: Stored, start: int, stop: int, is_person: Classifier) -> Planes:
+def _pack(stored: Stored | Held, start: int, stop: int, is_person: Classifier) -> Planes:
     """Return the bits of frames start to stop; the others are read to the end, for the checksum."""
     planes = empty_planes(stop - start, (stored.shape[2], stored.shape[1]))
     for k, frame in enumerate(stored.rows()):

@@ -5,13 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
+
+import numpy as np
 
 from posefit.errors import InputError
 from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import FPS, Range, existing
-from posefit.footage.readers import IMAGES, read_masks
+from posefit.footage.readers import IMAGES, Masks, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
@@ -27,11 +29,12 @@ from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
 
 MOTIONS = (".amc", ".bvh")
-NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".asf", ".json", ".csv", ".txt")
+NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".npy", ".asf", ".json", ".csv", ".txt")
 SIZE = (320, 240)  # pixels of a rendered picture
 Kind = Literal["motion", "masks", "video"]
 _KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video"}
 Source = str | Path | Motion
+Footage = Source | Masks
 HEIGHTS = (0.3, 2.8)  # metres that a person may stand
 _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
     "extraction": ("video", ["video"]),
@@ -58,7 +61,7 @@ def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
 
 
 def scene_of(
-    sources: Sequence[Source],
+    sources: Sequence[Footage],
     progress: Progress = QUIET,
     *,
     asf: str | Path | None = None,
@@ -87,13 +90,12 @@ def scene_of(
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
         cameras = [placed for source in camera for placed in _cameras(source, up)]
-        motion = motion_of(sources[0], asf, fps or FPS)
+        motion = motion_of(cast(Source, sources[0]), asf, fps or FPS)
         return synthetic(motion, view_degrees, size or SIZE, cameras, frames)
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
-    paths = [Path(source) for source in sources if not isinstance(source, Motion)]
     if kind == "video":
-        videos = [Video.of(path) for path in paths]
+        videos = [Video.of(Path(str(source))) for source in sources]
         rates = {round(video.fps, 3) for video in videos}
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
@@ -101,11 +103,12 @@ def scene_of(
         segmentations = [Segmentation(video, extraction or Extraction(), frames) for video in videos]
         views = [_filmed(segmentation, progress) for segmentation in segmentations]
     else:
-        known = calibrated(camera, [None] * len(paths))
-        masks = [cleaned(read_masks(path, frames, label), path, holes) for path in paths]
-        views = [CameraView(*clean, name=str(path)) for clean, path in zip(masks, paths, strict=True)]
+        known = calibrated(camera, [None] * len(sources))
+        places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
+        masks = [cleaned(read_masks(place, frames, label), name_of(place), holes) for place in places]
+        views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
     facing = view_degrees[0] if view_degrees else None
-    return combined(views, paths[0].stem, body_of(asf, height), known, facing, up, fps)
+    return combined(views, Path(views[0].name).stem, body_of(asf, height), known, facing, up, fps)
 
 
 def body_of(asf: str | Path | None, height: float | None) -> Body:
@@ -179,15 +182,17 @@ def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
     return clip_of(source, asf)(fps)
 
 
-def kind_of(source: Source) -> Kind:
+def kind_of(source: Footage) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
 
     A name with folders in it and no suffix is a folder's, even where there is none.
     """
+    if isinstance(source, np.ndarray | tuple):
+        return "masks"
     if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
-    if path.is_dir() or path.suffix.lower() == ".npz" or (not path.suffix and os.sep in str(source)):
+    if path.is_dir() or path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
 

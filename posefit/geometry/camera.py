@@ -72,6 +72,24 @@ class Camera:
         return cls(*size, np.full(2, focal), np.array(size) / 2.0, rotation, back - rotation @ np.asarray(target))
 
     @classmethod
+    def pinhole(
+        cls,
+        width: int,
+        height: int,
+        fx: float,
+        fy: float | None = None,
+        cx: float | None = None,
+        cy: float | None = None,
+    ) -> "Camera":
+        """Return a level camera at the world's origin that looks along -z, of focal lengths and centre in pixels.
+
+        By default `fy` is `fx`, and the centre is that of the image.
+        """
+        focal = np.array([fx, fx if fy is None else fy])
+        centre = np.array([width / 2.0 if cx is None else cx, height / 2.0 if cy is None else cy])
+        return cls(width, height, focal, centre, np.diag([1.0, -1.0, -1.0]), np.zeros(3))
+
+    @classmethod
     def framing(cls, points: Array, radii: Array, azimuth: float, size: tuple[int, int]) -> "Camera":
         """Return the nearest camera at `azimuth` that sees all balls, points (n, 3) with radii (n,), with a margin.
 

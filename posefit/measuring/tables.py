@@ -1,9 +1,11 @@
 """A measured motion as tables: clinical angles, the steps of a walk, and joints as a .trc file."""
 
 import csv
+import importlib
 from collections.abc import Collection
 from dataclasses import astuple, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,14 @@ from posefit.measuring.gait import Gait, Step
 from posefit.motion.motion import Motion
 
 STEP_COLUMNS = tuple(field.name for field in fields(Step))
+
+
+def import_pandas() -> Any:
+    """Return the module pandas. Raises ImportError that says how to install it."""
+    try:
+        return importlib.import_module("pandas")
+    except ImportError as error:
+        raise ImportError("tables need the library pandas: python -m pip install 'posefit[sweep]'") from error
 
 
 def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:

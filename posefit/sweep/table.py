@@ -7,7 +7,6 @@ and `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only ones th
 are sorted by what the spec says, not by when they were finished.
 """
 
-import importlib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
+from posefit.measuring.tables import import_pandas
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
 from posefit.sweep.cell import settings_text
@@ -35,10 +35,7 @@ def is_search(spec: Mapping[str, Any]) -> bool:
 
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
-    try:
-        pandas = importlib.import_module("pandas")
-    except ImportError as error:
-        raise ImportError("tables need the library pandas: python -m pip install 'posefit[sweep]'") from error
+    pandas = import_pandas()
     columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
     count = 0
     for row in rows:

@@ -1,66 +1,55 @@
 """`posefit.track` and `posefit.fit`: a source becomes a scene, the options are completed, and the scene is tracked."""
 
 import inspect
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import whole
+from posefit.footage.readers import IMAGES, name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Source, check_used, kind_of, scene_of
+from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of
 from posefit.footage.training import training_clips, training_motions
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit.progress import QUIET, Progress
+from posefit.progress import Progress, interactive
 from posefit.reading import quoted
 from posefit.tracking.identity import ArgumentDigest
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
 from posefit.tracking.outputs import Output, OutputFolder
 from posefit.tracking.pipeline import track_scene
-from posefit.tracking.summary import Track
+from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
 
 _FILES = ("source", "train", "asf", "camera", "extraction")  # options that may name files, whose content counts
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """The estimated pose of one frame."""
-
-    pose: Array = field(repr=False)  # (66,)
-    translation: Array  # (3,) metres
-    cost: float
-    history: Array = field(repr=False)  # (populations,) best cost after each
-    summary: dict[str, Any] = field(repr=False)
-
-
 def track(
-    source: Source | Scene | Sequence[Source] = "walk",
+    source: Footage | Scene | Sequence[Any] = "walk",
     *,
     out: str | Path | None = None,
     force: bool = False,
     resume: bool = False,
     rerun: str | Path | None = None,
-    progress: Callable[[Iterator[Any], int], Iterator[Any]] | None = None,
-    say: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Track:
     """Return the motion tracked through a source's silhouettes, with its errors where the truth is known.
 
-    `source` is a built-in motion's name, a recorded one's, a `Motion`, an .amc or .bvh file, a folder of mask images,
-    an .npz of masks, a video, or several masks or videos that cameras took at the same time; or a `Scene` of a known
-    motion, as it is. All other options are listed below, with the defaults that depend on the source in
-    `posefit.tracking.method.resolved`.
+    `source` is masks, an array (T, H, W), a list of image files, a folder of them, or an .npz or .npy file; a video; a
+    list of any of these, that several cameras took at the same time; a built-in motion's name, a recorded one's, a
+    `Motion`, an .amc or .bvh file; or a `Scene` of a known motion, as it is. All other options are listed below, with
+    the defaults that depend on the source in `posefit.tracking.method.resolved`.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. `rerun` is where a
-    recording for the Rerun viewer goes. Raises InputError for every mistake in the arguments or files.
+    recording for the Rerun viewer goes; `progress` where messages and bars go, by default a terminal or a notebook.
+    Raises InputError for every mistake in the arguments or files.
     """
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
@@ -73,26 +62,27 @@ def track(
     if chosen.asf is not None and chosen.body_frames is None:
         chosen = chosen.changed(body_frames=0)
     chosen = resolved(sources[0], chosen)
-    clips = training_clips(chosen.train, chosen.asf, followed=sources[0])  # before the work, as a name may be wrong
+    followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
+    clips = training_clips(chosen.train, chosen.asf, followed=followed)  # before the work, as a name may be wrong
     if resume and out is None:
         raise InputError("resume must be given with out, the folder of the track that goes on, got none")
     if rerun is not None:
         from posefit.tracking.recording import check_recording
 
         check_recording(rerun)
-    reporting = Progress(say or QUIET.log, progress or QUIET.steps)
+    progress = progress or interactive()
     folder = Output()
     if out is not None:
-        folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), reporting.log)
+        folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
     with folder as output:
-        scene = scene or scene_of(sources, reporting, **chosen.view)
+        scene = scene or scene_of(sources, progress, **chosen.view)
         names = {
-            "source": [each.name if isinstance(each, Motion) else str(each) for each in sources],
+            "source": [each.name if isinstance(each, Motion) else name_of(each) for each in sources],
             "frames_chosen": list(chosen.frames),
             "view_degrees": options.get("view_degrees"),
         }
         training = training_motions(clips, scene.fps)
-        result = track_scene(scene, training, chosen, output=output, progress=reporting, source=names)
+        result = track_scene(scene, training, chosen, output=output, progress=progress, source=names)
         if rerun is not None:
             from posefit.tracking.recording import record
 
@@ -100,23 +90,31 @@ def track(
     return result
 
 
-def fit(source: Source | Sequence[Source] = "walk", *, frame: int = 0, **options: Any) -> Fit:
-    """Return the estimated pose of one frame of a source; options as for `track`, but for `frames`."""
+def fit(source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any) -> Fit:
+    """Return the estimated pose of one frame of a source, or of a mask (H, W); options as for `track`, but `frames`."""
     frame = whole("frame", frame, 0)
-    result = track(source, frames=(frame, frame + 1), **options)
-    history = np.array(result.summary.pop("history"))
-    return Fit(result.motion.poses[0], result.motion.translations[0], result.measures.cost, history, result.summary)
+    return track(source, frames=(frame, frame + 1), **options).frame(0)
 
 
-def _sources(source: Source | Scene | Sequence[Source]) -> Sequence[Source]:
+def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
+    """Return one source a camera: an image, a mask or a list of either is that of one."""
     if isinstance(source, Scene):
         if source.truth is None:
             raise InputError(f"a scene must be of a known motion, got {source.name}, whose truth is unknown")
         return [source.truth]
-    return source if isinstance(source, Sequence) and not isinstance(source, str) else [source]
+    if isinstance(source, Motion) or not isinstance(source, Sequence) or isinstance(source, str):
+        source = [source]
+    sources: list[Any] = [np.asarray(each) if hasattr(each, "__array__") else each for each in source]
+    if all(isinstance(each, np.ndarray) and each.ndim == 2 for each in sources):
+        if len({each.shape for each in sources}) > 1:
+            raise InputError(f"masks must have one shape, got {', '.join(sorted({str(e.shape) for e in sources}))}")
+        return [np.stack(sources)]
+    if all(isinstance(each, str | Path) and Path(each).suffix.lower() in IMAGES for each in sources):
+        return [tuple(Path(each) for each in sources)]
+    return sources
 
 
-def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Source]) -> None:
+def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
     """Return nothing. Raises InputError for options that do not fit a source whose truth is known, or unknown."""
     if not known:
         if options.translation == "known":
@@ -131,7 +129,7 @@ def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Source]) 
         raise InputError("restarts must be at least 1 for a motion, which is searched once where it is left out, got 0")
 
 
-def _identity(sources: Sequence[Source], options: TrackOptions, train: Sequence[Source]) -> dict[str, ArgumentDigest]:
+def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]) -> dict[str, ArgumentDigest]:
     """Return what a track must have in common with one that it goes on with."""
     values = {option.name: getattr(options, option.name) for option in fields(options) if declared(option).identifies}
     values |= {"source": sources, "train": train, "version": __version__}

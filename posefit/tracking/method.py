@@ -26,7 +26,7 @@ from posefit.fitting.validation import (
     CheckedPrior,
     plugin_errors,
 )
-from posefit.footage.source import Source, kind_of
+from posefit.footage.source import Footage, kind_of
 from posefit.motion import built_in, recorded
 from posefit.reading import suggestion
 from posefit.registry import Kind, Offer, registry
@@ -67,7 +67,7 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
     )
 
 
-def resolved(source: Source, options: TrackOptions) -> TrackOptions:
+def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     """Return options whose method and training motions are known, by default those of the source.
 
     A motion is tracked by `sapso@pca`, which learns from the other styles of a built-in motion, or else from the
@@ -85,7 +85,7 @@ def resolved(source: Source, options: TrackOptions) -> TrackOptions:
     train = options.train
     if not train and footage and method == DEFAULT_TRACKER:
         train = [recorded.LIBRARY]
-    train = train or built_in.other_styles(str(source) if source in built_in.names() else "walk")
+    train = train or built_in.other_styles(source if isinstance(source, str) and source in built_in.names() else "walk")
     return options.changed(method=method, train=train)
 
 

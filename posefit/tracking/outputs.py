@@ -201,6 +201,16 @@ class OutputFolder(Output):
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
 
 
+def page_of(scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> str:
+    """Return the page of a track, `track.html`."""
+    stills = Stills(scene)
+    for frame, observation, picture in zip(
+        frames, scene.observations, repeat(None) if scene.pictures is None else scene.pictures(), strict=False
+    ):
+        stills.add(frame, observation, picture)
+    return track_document(track_data(scene, frames, rows, summary, intervals_of(scene.body.skeleton, frames), stills))
+
+
 def _encoded(value: Any) -> Any:
     """Return what JSON holds of a value in a frame's details: arrays with their type, else what it prints as."""
     if isinstance(value, np.ndarray | np.generic):

@@ -75,13 +75,7 @@ class Painter:
         body, camera, pose, place = self._scene.body, self._scene.cameras[0], frame.pose, frame.translation
         solid = None if radii is None else opacities(radii[DRAWN_LEVEL])
         other = other_mode(body.skeleton, frame.modes, pose, MIN_OTHER_WEIGHT)
-        if filmed is None:
-            left = self._on_masks(frame, observation, solid, other)
-        else:
-            drawn = filmed.copy()
-            draw_body(drawn, body, camera, pose, place, solid)
-            left = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
-            self._draw_other(left, _zoomed(camera, left), other)
+        left = self.overlay(frame, observation, filmed, solid, other)
         width = left.shape[1]
         from_side = side_camera(body, camera, pose, place, PANEL)
         side = np.full((PANEL, PANEL, 3), BACKGROUND, dtype=np.uint8)
@@ -111,8 +105,21 @@ class Painter:
         self._count += 1
         return image
 
-    def _on_masks(self, frame: Frame, observation: Observation, solid: Array | None, other: Mode | None) -> Image:
-        """Return the masks of all cameras with the body on them."""
+    def overlay(
+        self,
+        frame: Frame,
+        observation: Observation,
+        filmed: Image | None,
+        solid: Array | None = None,
+        other: Mode | None = None,
+    ) -> Image:
+        """Return the body on what was `filmed`, or on the masks of all cameras, as a picture (height, width, 3)."""
+        if filmed is not None:
+            drawn, camera = filmed.copy(), self._scene.cameras[0]
+            draw_body(drawn, self._scene.body, camera, frame.pose, frame.translation, solid)
+            panel = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
+            self._draw_other(panel, _zoomed(camera, panel), other)
+            return panel
         body, panels = self._scene.body, []
         columns = min(2, len(self._scene.cameras))
         height = PANEL // -(-len(self._scene.cameras) // columns)

@@ -1,42 +1,28 @@
 """The last step: errors or signs of trust of a track, and the summary that is printed and written."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from posefit.fitting.shape import NAMES
-from posefit.fitting.tracker import Frame, Task
+from posefit.fitting.tracker import Task
 from posefit.measuring.gait import gait_of
 from posefit.measuring.heading import backwards, backwards_warning
-from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.tracking.evaluation import LOST, evaluated, unseen
 from posefit.tracking.follow import Tracked
-from posefit.tracking.measures import Measures
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.restarts import RELOCALISED
+from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import Pass
 from posefit.tracking.trajectory import motion_of
 from posefit.tracking.trust import trust_of
-from posefit.uncertainty.modes import TrackMode, modes_of, track_modes
+from posefit.uncertainty.modes import modes_of, track_modes
 from posefit.version import __version__
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """A tracked motion with its errors or signs of trust."""
-
-    motion: Motion  # the estimate
-    truth: Motion | None = field(repr=False)
-    measures: Measures
-    frames: list[dict[str, float]] = field(repr=False)  # one row a frame: see posefit.tracking.measures.FRAME
-    summary: dict[str, Any] = field(repr=False)  # what `posefit track --json` prints
-    estimates: list[Frame] = field(repr=False)  # the tracker's frames, smoothed
-    modes: list[TrackMode] = field(default_factory=list, repr=False)  # of the whole track, the likeliest first
 
 
 def evaluate(
@@ -113,7 +99,7 @@ def evaluate(
         "warnings": warnings,
     }
     output.finish(scene, frames, rows, summary)
-    return Track(estimate, scene.truth, measures, rows, summary, frames, modes)
+    return Track(estimate, scene.truth, measures, rows, summary, frames, scene, modes)
 
 
 def _numbers(rows: Sequence[Mapping[str, float]], name: str, least: float) -> list[int] | None:

@@ -22,6 +22,7 @@ from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
+from posefit.progress import Progress
 from tests.cases import each
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, error_of, film, iou, run, truth, walk
 
@@ -151,10 +152,12 @@ def test_a_track_goes_on_where_it_ended(tmp_path: Path, optimiser: str) -> None:
     whole = posefit.track(path, out=tmp_path / "whole", **settings)
     messages: list[str] = []
     with pytest.raises(StopError):
-        posefit.track(path, out=tmp_path / "out", progress=stopping(11, StopError()), say=messages.append, **settings)
+        posefit.track(
+            path, out=tmp_path / "out", progress=Progress(messages.append, stopping(11, StopError())), **settings
+        )
     assert not (tmp_path / "out").exists()
     assert "11 finished frames are kept: the same command with --resume goes on from there" in messages
-    again = posefit.track(path, out=tmp_path / "out", resume=True, say=messages.append, **settings)
+    again = posefit.track(path, out=tmp_path / "out", resume=True, progress=Progress(messages.append), **settings)
     assert "going on from frame 11 of 20" in messages
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         path.name for path in (tmp_path / "whole").iterdir()
@@ -181,14 +184,14 @@ def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="resume must be given with out"):
         posefit.track(path, resume=True)
     with pytest.raises(InputError, match="bad luck; 5 finished frames are kept"):
-        posefit.track(path, progress=stopping(5, InputError("bad luck")), **settings)
+        posefit.track(path, progress=Progress(steps=stopping(5, InputError("bad luck"))), **settings)
     with pytest.raises(ValueError, match="seed must be 0, as before, to resume, got 1"):
         posefit.track(path, resume=True, seed=1, **settings)
     # a line that was half written does not count
     (frames,) = tmp_path.glob(".out.*/frames.jsonl")
     frames.write_text(frames.read_text()[:-40])
     messages: list[str] = []
-    posefit.track(path, resume=True, say=messages.append, **settings)
+    posefit.track(path, resume=True, progress=Progress(messages.append), **settings)
     assert "going on from frame 4 of 20" in messages
 
 

@@ -19,7 +19,7 @@ from posefit.silhouette.cost import areas
 from posefit.tracking import method
 from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.pipeline import track_scene
-from posefit.tracking.summary import Track
+from posefit.tracking.result import Track
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 

@@ -10,6 +10,7 @@ import pytest
 
 import posefit
 from posefit.fitting.validation import Audit, AuditedTracker, BrokenRuleError
+from posefit.progress import Progress
 from posefit.silhouette.drawn import PoseCount
 from posefit.testing.tracker_rules import FRAMES, scene
 from tests.cases import each
@@ -63,7 +64,7 @@ def test_wrong_reports_of_a_tracker_are_corrected_with_a_warning(kind: Any, warn
 
 def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
     log: list[str] = []
-    result = posefit.track("walk", method=planted.SpendsInSecret, say=log.append, **QUICK)
+    result = posefit.track("walk", method=planted.SpendsInSecret, progress=Progress(log.append), **QUICK)
     uncounted, beyond = result.summary["warnings"]
     assert "frame 0 must say how many poses it drew, 20,001, got 100 (3 such frames)" in uncounted
     assert "frame 0 must use at most 2,440 evaluations, got 20,001 (3 such frames)" in beyond

@@ -12,6 +12,7 @@ import posefit
 from posefit.cli import main
 from posefit.footage.source import scene_of
 from posefit.motion import recorded
+from posefit.progress import Progress
 from posefit.registry import registry
 from posefit.tracking import method
 from posefit.tracking.method import resolved
@@ -60,7 +61,7 @@ def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(masks: Path) -> None:
     log: list[str] = []
-    track = posefit.track(masks, evaluations=400, body_frames=5, say=log.append)
+    track = posefit.track(masks, evaluations=400, body_frames=5, progress=Progress(log.append))
     assert track.summary["method"] == "exemplars"
     assert track.summary["train"] == [clip.name for clip in recorded.clips()]
     assert track.summary["body"] is not None
@@ -70,7 +71,7 @@ def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(masks
 
 def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
     log: list[str] = []
-    posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, say=log.append)
+    posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, progress=Progress(log.append))
     assert "looking for the first pose, 1 times" in log
 
 

@@ -17,6 +17,7 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.progress import Progress
 from posefit.silhouette.drawn import PoseCount
 from posefit.tracking.restarts import SEARCHED_AGAIN, SYMMETRIC_POSES, initial_guess, stream
 from posefit.tracking.trajectory import (
@@ -226,11 +227,11 @@ def test_interrupted_hypotheses_go_on_where_they_were(tmp_path: Path) -> None:
     for after in [1, 3, 4, 7]:
         written: dict[str, Any] = {**options, "out": tmp_path / f"walk-{after}"}
         with pytest.raises(KeyboardInterrupt):
-            posefit.track("walk", progress=stopping(after), **written)
+            posefit.track("walk", progress=Progress(steps=stopping(after)), **written)
         with pytest.raises(ValueError, match="hypotheses must be 3, as before, to resume, got 2"):
             posefit.track("walk", resume=True, **{**written, "hypotheses": 2})
         log: list[str] = []
-        resumed = posefit.track("walk", resume=True, say=log.append, **written)
+        resumed = posefit.track("walk", resume=True, progress=Progress(log.append), **written)
         done, frames = divmod(after, 3)
         new = [f"track {k + 1} of 3: {names[k]}" for k in range(-(-after // 3), 3)]
         assert [line for line in log if line.startswith("track ")] == new

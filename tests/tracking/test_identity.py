@@ -9,6 +9,7 @@ import pytest
 
 import posefit
 from posefit.motion import built_in
+from posefit.progress import Progress
 from posefit.tracking.identity import ArgumentDigest, difference
 from tests.cases import each
 
@@ -34,7 +35,7 @@ def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
     assert repr(camera(0.5)) == repr(camera(1.5))  # which is why texts are not enough
     out = tmp_path / "out"
     with pytest.raises(StopError):
-        posefit.track("walk", camera=camera(0.5), out=out, progress=stopping, **QUICK)
+        posefit.track("walk", camera=camera(0.5), out=out, progress=Progress(steps=stopping), **QUICK)
     with pytest.raises(ValueError, match="camera must be .* as it was, to resume, got one with another content"):
         posefit.track("walk", camera=camera(1.5), out=out, resume=True, **QUICK)
     resumed = posefit.track(
@@ -48,7 +49,7 @@ def test_two_motions_of_one_name_are_not_the_same_track(tmp_path: Path) -> None:
     motion, out = built_in.motion("walk", frames=8), tmp_path / "out"
     other = replace(motion, poses=motion.poses + 0.01)
     with pytest.raises(StopError):
-        posefit.track(motion, out=out, progress=stopping, **QUICK)
+        posefit.track(motion, out=out, progress=Progress(steps=stopping), **QUICK)
     with pytest.raises(ValueError, match="source must be .* as it was, to resume"):
         posefit.track(other, out=out, resume=True, **QUICK)
 
@@ -99,7 +100,7 @@ def test_the_first_difference_is_one_line() -> None:
 def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:
     options: dict[str, Any] = {"method": "vsmm", "out": tmp_path / "out", **QUICK}
     with pytest.raises(StopError):
-        posefit.track("walk", progress=stopping, **options)
+        posefit.track("walk", progress=Progress(steps=stopping), **options)
     resumed = posefit.track("walk", resume=True, **options)
     whole = posefit.track("walk", **{**options, "out": None})
     for before, after in zip(whole.estimates, resumed.estimates, strict=True):

@@ -15,6 +15,7 @@ import posefit
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.motion import built_in
+from posefit.progress import Progress
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.initialise import first_seen_by_most, fitted_build, task_of
@@ -96,7 +97,7 @@ def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, bod
     np.savez(tmp_path / "a.npz", masks=[observation.silhouettes[0].mask for observation in scene.observations])
     log: list[str] = []
     options: dict[str, Any] = {"method": "@loose", "evaluations": 80, "restarts": 1, "body_frames": body_frames}
-    track = posefit.track(tmp_path / "a.npz", say=log.append, **options)
+    track = posefit.track(tmp_path / "a.npz", progress=Progress(log.append), **options)
     assert any(line.startswith(message) for line in log)
     assert (track.summary["body"] is None) == message.startswith("no build")
 

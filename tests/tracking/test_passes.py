@@ -16,7 +16,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import pose_costs
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
-from posefit.tracking.summary import Track
+from posefit.tracking.result import Track
 from tests.cases import each
 
 WALK = built_in.motion("walk", frames=60).frames(5, 11)

@@ -1,0 +1,118 @@
+"""What people do with masks in Python: arrays in, joints, angles, tables, pictures and files out."""
+
+import webbrowser
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import posefit
+from posefit.errors import InputError
+from posefit.motion import built_in
+from posefit.silhouette.cost import project
+from tests.cases import each
+
+QUICK: dict[str, Any] = {"method": "random@loose", "evaluations": 40, "restarts": 1, "body_frames": 0, "smooth": False}
+MOTION = built_in.motion("walk", frames=3)
+BODY = posefit.Body.of(MOTION.skeleton)
+CAMERA = posefit.Camera.around(MOTION.translations[0], 0.5, 3.6, (80, 60))
+MASKS = np.array([project(BODY, CAMERA, *pose) for pose in zip(MOTION.poses, MOTION.translations, strict=True)])
+
+
+@pytest.fixture(scope="module")
+def track() -> posefit.Track:
+    return posefit.track(MASKS, camera=CAMERA, fps=25, **QUICK)
+
+
+def images(folder: Path) -> list[Path]:
+    paths = [folder / f"{k}.png" for k in range(len(MASKS))]
+    for path, mask in zip(paths, MASKS, strict=True):
+        cv2.imwrite(str(path), 255 * mask.astype(np.uint8))
+    return paths
+
+
+@each("kind", ["npy", "images", "list", "bytes", "folder"])
+def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp_path: Path) -> None:
+    np.save(tmp_path / "masks.npy", MASKS)
+    sources: dict[str, Any] = {
+        "npy": tmp_path / "masks.npy",
+        "images": images(tmp_path),
+        "list": list(MASKS),
+        "bytes": 255 * MASKS.astype(np.uint8),
+        "folder": tmp_path,
+    }
+    again = posefit.track(sources[kind], camera=CAMERA, fps=25, **QUICK)
+    np.testing.assert_array_equal(again.joints, track.joints)
+
+
+def test_two_arrays_are_two_cameras() -> None:
+    cameras = [posefit.Camera.around(MOTION.translations[0], azimuth, 3.6, (80, 60)) for azimuth in (0.0, 1.5)]
+    poses = list(zip(MOTION.poses, MOTION.translations, strict=True))
+    views = [np.array([project(BODY, camera, *pose) for pose in poses]) for camera in cameras]
+    assert posefit.track(views, camera=cameras, fps=25, **QUICK).summary["views"] == 2
+
+
+@each(
+    "masks,words",
+    [
+        (np.zeros((2, 3, 4, 5), bool), "masks must have shape"),
+        (np.zeros((2, 6, 8), bool), "a mask with a person"),
+        ([np.zeros((6, 8)), np.zeros((8, 6))], "masks must have one shape"),
+        (["missing.png"], "missing.png: expected a file"),
+    ],
+)
+def test_arrays_that_are_no_masks_are_named(masks: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        posefit.track(masks, **QUICK)
+
+
+def test_an_npy_file_that_is_damaged_is_named(tmp_path: Path) -> None:
+    (tmp_path / "masks.npy").write_bytes(b"\x93NUMPY no array")
+    with pytest.raises(InputError, match=r"masks\.npy: expected an \.npy file"):
+        posefit.track(tmp_path / "masks.npy", **QUICK)
+
+
+def test_joints_angles_and_the_table_are_those_of_the_motion(track: posefit.Track) -> None:
+    table = track.to_pandas()
+    assert track.joints.shape == (3, 27, 3)
+    np.testing.assert_array_equal(table["left_knee_flexion"], track.angles("left_knee_flexion"))
+    np.testing.assert_allclose(table["seconds"], [0.0, 0.04, 0.08])
+    np.testing.assert_array_equal(table["left_knee_y"], track.joints[:, track.joint_names.index("left_knee"), 1])
+    with pytest.raises(InputError, match="did you mean 'left_knee_flexion'"):
+        track.angles("left_knee_flexio")
+
+
+def test_a_frame_is_a_fit_with_a_picture(track: posefit.Track) -> None:
+    frame = track.frame(1)
+    assert (frame.cost, frame.iou) == (track.frames[1]["cost"], track.frames[1]["iou"])
+    np.testing.assert_array_equal(frame.joints, track.joints[1])
+    picture = np.asarray(frame.overlay())
+    assert picture.shape == (480, 640, 3)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 2  # background, body, mask
+
+
+def test_a_mask_is_fitted() -> None:
+    fit = posefit.fit(MASKS[0], camera=CAMERA, **QUICK)
+    assert fit.pose.shape == (66,)
+    assert "history" not in fit.summary
+
+
+def test_files_and_the_page_come_afterwards_too(
+    track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    track.save(tmp_path / "out")
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    page = track.show()
+    assert (tmp_path / "out" / "track.html").read_text() == page.read_text()
+    assert opened == [page.as_uri()]
+
+
+def test_methods_are_compared(tmp_path: Path) -> None:
+    compared = posefit.compare(["random@pca", "sapso@pca"], seeds=1, frames=2, evaluations=80, out=tmp_path / "kept")
+    assert list(compared.to_pandas()["method"]) == ["random@pca", "sapso@pca"]
+    compared.report(tmp_path / "report.html")
+    assert (tmp_path / "report.html").stat().st_size > 1000
+    assert "random@pca" in str(compared)
