@@ -1,7 +1,7 @@
 """Which models belong together, and which change into each other. VSMM steps 4 and 5, Interpretation V1.
 
 A TOML file holds `stay`, a table `groups` of names and their models, and a table `neighbours` of models and those that
-they change into.
+they change into. It may hold a table `activities` of names and their models: the labels of frames.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -17,6 +17,7 @@ from posefit.fitting.check import one_of
 from posefit.reading import parsed_toml, read_text
 
 SIZE_LIMIT = 100_000  # bytes
+TABLES = ("groups", "neighbours", "activities")
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Topology:
 
     groups: Mapping[str, tuple[str, ...]]
     neighbours: Mapping[str, tuple[str, ...]]
+    activities: Mapping[str, tuple[str, ...]]  # each model is in one at least
     stay: float
 
     def transition(self, models: Sequence[str]) -> Array:
@@ -50,9 +52,17 @@ class Topology:
 
     def most_probable(self, models: Sequence[str], probabilities: Array) -> str:
         """Return the group whose models are the most probable together. VSMM step 5."""
-        mine = dict(zip(models, probabilities, strict=True))
-        sums = {name: sum(mine.get(model, 0.0) for model in group) for name, group in self.groups.items()}
-        return max(sums, key=lambda name: sums[name])
+        return _most_probable(self.groups, models, probabilities)
+
+    def activity(self, models: Sequence[str], probabilities: Array) -> str:
+        """Return the activity whose models are the most probable together."""
+        return _most_probable(self.activities, models, probabilities)
+
+
+def _most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array) -> str:
+    known = dict(zip(models, probabilities, strict=True))
+    sums = {name: sum(known.get(model, 0.0) for model in members) for name, members in sets.items()}
+    return max(sums, key=lambda name: sums[name])
 
 
 def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
@@ -68,20 +78,24 @@ def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
         raise InputError(f"{label}: expected a file of groups, got none") from None
     except ValueError as error:
         raise InputError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
-    if set(values) != {"stay", "groups", "neighbours"}:
+    values = {"activities": {}, **values}
+    if set(values) != {"stay", *TABLES}:
         raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
     stay = values["stay"]
     if not isinstance(stay, float) or not 0.0 < stay < 1.0:
         raise InputError(f"{label}: stay must be a number between 0 and 1, got {stay!r}")
-    for key in ("groups", "neighbours"):
+    for key in TABLES:
         if not isinstance(values[key], dict) or not all(isinstance(models, list) for models in values[key].values()):
             raise InputError(f"{label}: {key} must be a table of lists of models, got {values[key]!r}")
-    groups, neighbours = (
-        {name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in ("groups", "neighbours")
+    groups, neighbours, activities = (
+        {name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in TABLES
     )
     if not groups or not all(groups.values()):
         raise InputError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
     used = {model for models in groups.values() for model in models} | set(neighbours)
-    for model in used.union(*neighbours.values()):
+    for model in used.union(*neighbours.values(), *activities.values()):
         one_of(f"{label}: a model", model, known)
-    return Topology(groups, {model: neighbours.get(model, ()) for model in used}, stay)  # VSMM 4
+    alone = {model: (model,) for model in known if not any(model in models for models in activities.values())}
+    return Topology(
+        groups, {model: neighbours.get(model, ()) for model in used}, {**activities, **alone}, stay
+    )  # VSMM 4

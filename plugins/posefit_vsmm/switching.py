@@ -135,7 +135,7 @@ class Models:
     """The models in force; at first all of them."""
 
     def __init__(self, how: Settings, library: Library, topology: Topology, skeleton: Skeleton, fps: float) -> None:
-        self._how, self._topology, self.groups = how, topology, topology.groups
+        self._how, self.topology, self.groups = how, topology, topology.groups
         self.every = topology.union(topology.groups)
         fps = fps if how.clip_rate == "video" else CLIP_FPS  # Interpretation V6
         self.known = {name: library.models[name].fitted_to(skeleton, fps) for name in self.every}
@@ -155,7 +155,7 @@ class Models:
         self._surprises: list[float] = []
 
     def _make(self, names: tuple[str, ...]) -> IMM:
-        models, transition = [self.known[name] for name in names], self._topology.transition(names)
+        models, transition = [self.known[name] for name in names], self.topology.transition(names)
         return (
             IMM([VectorModel(model) for model in models], transition)
             if self._vector
@@ -192,13 +192,13 @@ class Models:
         after = self.imm.cycle(before, measure)
         self._surprises = [*self._surprises, surprise][-RECENT:]
         if self._how.structure == "all":
-            self.group = self._topology.most_probable(self.active, after.probabilities)
+            self.group = self.topology.most_probable(self.active, after.probabilities)
             return after
         self._cycles += 1
         if self.group is None:
             if self._cycles < FIRST:
                 return after
-            return self._keep(self._topology.most_probable(self.active, after.probabilities), after)  # VSMM 5
+            return self._keep(self.topology.most_probable(self.active, after.probabilities), after)  # VSMM 5
         if self.newcomer is not None and self._rivalry is not None:
             decision = self._rivalry.decide(after, self.active)
             if decision is None:
@@ -227,12 +227,12 @@ class Models:
 
     def _activated(self, before: Belief, after: Belief, measure: Measure) -> Belief:
         """Bring the group that the rules ask for into force beside the present one, if they ask for one."""
-        groups, names = self._topology.groups, tuple(self._topology.groups)
+        groups, names = self.topology.groups, tuple(self.topology.groups)
         number = requested_group(self._drawn, self._how)
         if self.group is None or number is None or number >= len(names) or names[number] == self.group:
             return after
         old, imm = self.active, self.imm
-        self.newcomer, self.active = names[number], self._topology.union((self.group, names[number]))  # VSMM 8.4
+        self.newcomer, self.active = names[number], self.topology.union((self.group, names[number]))  # VSMM 8.4
         self._rivalry = Rivalry(self._how, old=groups[self.group], new=groups[self.newcomer])
         if self._how.new == "rerun":
             return self._rerun(before, old, imm, measure)
@@ -247,7 +247,7 @@ class Models:
 
     def _keep(self, group: str, belief: Belief) -> Belief:
         """Let one group alone go on."""
-        models = tuple(self._topology.groups[group])
+        models = tuple(self.topology.groups[group])
         kept = normalised(regrouped(belief, self.active, models, {}))
         self.active, self.group, self.newcomer, self._rested = models, group, None, 0
         self._rivalry = None

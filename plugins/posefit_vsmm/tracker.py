@@ -267,8 +267,18 @@ class TrackFilter:
             self._bad = self._bad + 1 if iou < LOST else 0
         seconds = time.perf_counter() - began
         spent = time.process_time() - self._begun
+        models, belief = self._models, self._belief
         self._latest = Frame(
-            pose, place, cost, counts, used, seconds, np.array([cost]), details=details, cpu_seconds=spent
+            pose,
+            place,
+            cost,
+            counts,
+            used,
+            seconds,
+            np.array([cost]),
+            details=details,
+            cpu_seconds=spent,
+            activity=None if belief is None else models.topology.activity(models.active, belief.probabilities),
         )
         return self._latest
 

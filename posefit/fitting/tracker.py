@@ -60,6 +60,7 @@ class Frame:
     posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker says
     modes: Sequence[Mode] = ()  # that are in the posterior, the likeliest first; a followed scene's frames have them
     lost: float | None = None  # how likely it is that the frame is lost, 0 to 1, where a tracker says
+    activity: str | None = None  # what the person does, such as "walk", where a tracker says
 
     def __post_init__(self) -> None:
         if self.lost is not None and not 0.0 <= self.lost <= 1.0:

@@ -56,6 +56,7 @@ class LiveFrame:
             "latency_ms": round(1e3 * self.latency, 2),
             "usable": self.usable,
             "cost": round(self.frame.cost, 4),
+            "activity": self.frame.activity,
             "translation_m": np.round(self.frame.translation, 5).tolist(),
             "pose_degrees": np.round(np.degrees(self.frame.pose), 4).tolist(),
         }

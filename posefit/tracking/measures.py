@@ -1,8 +1,8 @@
 """The figures that say what a track is worth, each defined once: its name, label, unit, digits and meaning.
 
 `Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns
-have them under these names. `FRAME` are the columns of frames.csv, one value a frame. Where the truth is unknown, a
-figure that needs it is None.
+have them under these names. `FRAME` are the columns of frames.csv, one value a frame; all are numbers, and in the rows
+of a track, but the activity. Where the truth is unknown, a figure that needs it is None.
 """
 
 from collections.abc import Mapping, Sequence
@@ -172,5 +172,6 @@ FRAME = {
         Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
         Measure("seconds", "time", "ms", 1, "wall time", 1e3),
+        Measure("activity", "activity", "", 0, "what the person does, a word; blank where not estimated"),
     )
 }

@@ -40,7 +40,7 @@ FILES = (*_MOTION_FILES, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 _ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
-_PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "details")
+_PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "activity", "details")
 
 
 class Output:
@@ -283,8 +283,10 @@ def _write_formats(
     names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
     with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow([*rows[0], *names])
-        for k, (row, points) in enumerate(zip(rows, estimate.joints, strict=True)):
+        writer.writerow([*rows[0], "activity", *names])
+        for k, (row, frame, points) in enumerate(zip(rows, frames, estimate.joints, strict=True)):
             values = ["" if np.isnan(value) else value for value in row.values()]
-            writer.writerow([*values, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))])
+            writer.writerow(
+                [*values, frame.activity, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))]
+            )
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -60,6 +60,11 @@ class Track:
         """What the 27 joints are, such as `left_knee`."""
         return PLACES
 
+    @property
+    def activity(self) -> list[str | None]:
+        """What the person does in each frame, such as `walk`; None where the method does not say."""
+        return [frame.activity for frame in self.estimates]
+
     def angles(self, name: str) -> Array:
         """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.
 
@@ -88,7 +93,9 @@ class Track:
         axes = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
         points = dict(zip(axes, self.joints.reshape(len(self), -1).T, strict=True))
         seconds = np.arange(len(self)) / self.motion.fps
-        table: pd.DataFrame = import_pandas().DataFrame({**rows, "seconds": seconds, **self._angles(), **points})
+        table: pd.DataFrame = import_pandas().DataFrame(
+            {**rows, "seconds": seconds, "activity": self.activity, **self._angles(), **points}
+        )
         return table
 
     def frame(self, k: int) -> "Fit":

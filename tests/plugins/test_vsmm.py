@@ -196,6 +196,7 @@ def test_a_single_model_is_a_group(tmp_path: Path) -> None:
         ("stay = 0.9\n[groups]\n[neighbours]\n", "groups must hold at least one group of at least one model"),
         ('stay = 0.9\ngroups = ["walk"]\n[neighbours]\n', "groups must be a table of lists of models"),
         ('[groups]\na = ["walk"]\n', "expected stay, groups and neighbours, got"),
+        ('stay = 0.9\n[groups]\na = ["walk"]\n[neighbours]\n[activities]\nb = ["fly"]\n', "got 'fly'"),
         ("stay = ", "expected TOML"),
     ],
 )
@@ -205,6 +206,15 @@ def test_a_file_of_groups_that_is_wrong_is_named(tmp_path: Path, text: str, mess
     with pytest.raises(ValueError, match=message) as caught:
         read_topology(file, NAMES)
     assert str(caught.value).startswith(str(file))
+
+
+@each(
+    ("probabilities", "activity"),
+    [((0.3, 0.3, 0.4), "walk"), ((0.2, 0.2, 0.6), "jacks")],
+)
+def test_an_activity_is_as_probable_as_its_models_together(probabilities: tuple[float, ...], activity: str) -> None:
+    topology = read_topology(None, NAMES)
+    assert topology.activity(("stiff-walk", "walk", "jacks"), np.array(probabilities)) == activity
 
 
 def test_a_file_of_groups_that_is_not_there_is_one_line_and_status_2(tmp_path: Path) -> None:

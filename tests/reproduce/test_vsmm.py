@@ -18,6 +18,8 @@ from posefit_reproduce.vsmm.experiment import HAND, METHODS, PatentTrack, change
 from posefit_reproduce.vsmm.switches import ModelState, activity_figures, model_states, switching_figures
 from posefit_vsmm.state import AT
 
+WORDS = ("walk", "arms-out", "jacks", "squat")  # the labels of the film's activities
+
 
 @pytest.fixture(scope="module")
 def experiment() -> PatentTrack:
@@ -84,7 +86,10 @@ def states(film: activities.Film, probability: float = 0.9) -> list[ModelState]:
         shares = np.full(len(groups[name]), (1.0 - probability) / max(len(groups[name]) - 1, 1))
         shares[0] = probability
         empty = np.empty(0)
-        every.append(ModelState(groups, name, None, groups[name], shares, False, 0, 0, 0.001, 0.002, empty, empty))
+        times = 0.001, 0.002
+        every.append(
+            ModelState(groups, name, None, groups[name], shares, WORDS[label], False, 0, 0, *times, empty, empty)
+        )
     return every
 
 
@@ -115,7 +120,6 @@ def test_a_restart_is_no_right_group_and_a_newcomer_may_be_a_wrong_one(film: act
 
 def test_labels_are_counted_by_activity(film: activities.Film) -> None:
     figures = activity_figures(film, states(film))
-    # of stepping the first of {stiff-walk, walk}; of waving the first of {arms-out, walk}
     assert figures["confusion"] == [[120, 0, 0, 0, 0], [0, 130, 0, 0, 0], [0, 0, 140, 0, 0], [0, 0, 0, 60, 0]]
     assert (figures["activity_accuracy"], figures["chance"]) == (1.0, 140 / 450)
     jump = replace(states(film)[0], models=("jump",), probabilities=np.ones(1))

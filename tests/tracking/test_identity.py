@@ -1,5 +1,6 @@
 """Two tracks are the same where their arguments have the same content, whatever the objects are."""
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -109,3 +110,7 @@ def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) ->
     first, again = whole.estimates[0].details, resumed.estimates[0].details
     np.testing.assert_array_equal(first["probabilities"], again["probabilities"])
     assert resumed.summary["cpu_seconds_per_frame"] is not None
+    with (tmp_path / "out" / "frames.csv").open(newline="") as file:
+        written = [row["activity"] for row in csv.DictReader(file)]
+    assert written == resumed.activity == whole.activity
+    assert None not in whole.activity

@@ -11,8 +11,8 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film
 
-# the activity that each model stands for; jumps are none of the film's
-LABELS = {"stiff-walk": 0, "walk": 0, "arms-out": 1, "jacks": 2, "squat": 3}
+# the film's activity that each label stands for; a jump is none of them
+LABELS = {"walk": 0, "arms-out": 1, "jacks": 2, "squat": 3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,7 @@ class ModelState:
     newcomer: str | None  # the one that contends with it
     models: tuple[str, ...]  # in force
     probabilities: Array  # of each of these
+    activity: str | None  # the label
     lost: bool
     repairs: int  # of covariances, so far
     restarts: int  # of all models, so far
@@ -42,7 +43,8 @@ class ModelState:
         """Return the state in a frame's `details`; None for a tracker without models."""
         if "probabilities" not in frame.details:
             return None
-        return cls(**{one.name: frame.details[one.name] for one in fields(cls)})
+        details = {**frame.details, "activity": frame.activity}
+        return cls(**{one.name: details[one.name] for one in fields(cls)})
 
 
 def model_states(frames: Sequence[Frame]) -> list[ModelState]:
@@ -96,17 +98,14 @@ def _group_models(state: ModelState) -> set[str]:
 
 
 def activity_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any]:
-    """Return how well the models' probabilities name the activity of a frame.
+    """Return how well the frames' labels name the activity.
 
-    Each frame's label is the activity whose models are the most probable together. `confusion` has the frames of each
-    true activity by label, the last column being models of none; chance always says the commonest activity.
+    `confusion` has the frames of each true activity by label, the last column being a label of none; chance always says
+    the commonest activity.
     """
     counts = np.zeros((len(ACTIVITIES), len(ACTIVITIES) + 1), dtype=np.int64)
     for state, label in zip(states, film.labels, strict=True):
-        sums = np.zeros(len(ACTIVITIES) + 1)
-        for model, probability in zip(state.models, state.probabilities, strict=True):
-            sums[LABELS.get(model, len(ACTIVITIES))] += probability
-        counts[label, sums.argmax()] += 1
+        counts[label, LABELS.get(state.activity or "", len(ACTIVITIES))] += 1
     right = np.trace(counts)
     chance = counts.sum(axis=1).max() / counts.sum()
     return {"activity_accuracy": float(right / counts.sum()), "chance": float(chance), "confusion": counts.tolist()}
