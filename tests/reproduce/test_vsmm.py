@@ -122,7 +122,7 @@ def test_labels_are_counted_by_activity(film: activities.Film) -> None:
     figures = activity_figures(film, states(film))
     assert figures["confusion"] == [[120, 0, 0, 0, 0], [0, 130, 0, 0, 0], [0, 0, 140, 0, 0], [0, 0, 0, 60, 0]]
     assert (figures["activity_accuracy"], figures["chance"]) == (1.0, 140 / 450)
-    jump = replace(states(film)[0], models=("jump",), probabilities=np.ones(1))
+    jump = replace(states(film)[0], activity="jump")
     assert activity_figures(film, [jump] * 450)["confusion"][3] == [0, 0, 0, 0, 60]
 
 
