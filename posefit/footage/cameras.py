@@ -19,6 +19,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Silhouette
 
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
@@ -82,7 +83,7 @@ def combined(
         rate,
         len(observations),
         yaw,
-        _first_place(observations, cameras, body.stature),
+        place_of(observations[observations.first].silhouettes, cameras, body.stature),
         None,
         observations,
         "given" if known else "guessed",
@@ -111,11 +112,11 @@ def _rate(views: Sequence[CameraView], fps: float | None) -> float:
     return stated[0][0] if stated else FPS
 
 
-def _first_place(views: Views, cameras: Sequence[Camera], stature: float) -> Array:
-    """Return about where (3,) the root is in the first usable frame."""
+def place_of(silhouettes: Sequence[Silhouette], cameras: Sequence[Camera], stature: float) -> Array:
+    """Return about where (3,) the root of a person of so many metres is, whom one camera or several see."""
     shown = [
         (camera, *extent_of(silhouette))
-        for camera, silhouette in zip(cameras, views[views.first].silhouettes, strict=True)
+        for camera, silhouette in zip(cameras, silhouettes, strict=True)
         if silhouette.mask.any()
     ]
     if len(shown) > 1:
@@ -132,7 +133,7 @@ def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
 
 
 def calibrated(
-    cameras: Sequence[Camera | str | Path], filmed: Sequence[tuple[int, int] | None]
+    cameras: Sequence[Camera | Calibration | str | Path], filmed: Sequence[tuple[int, int] | None]
 ) -> list[Camera | Calibration]:
     """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
 
@@ -141,7 +142,7 @@ def calibrated(
     """
     known: list[Camera | Calibration] = []
     for camera in cameras:
-        known += [camera] if isinstance(camera, Camera) else read_calibrations(camera)
+        known += [camera] if isinstance(camera, Camera | Calibration) else read_calibrations(camera)
     views = len(filmed)
     if not known and views > 1:
         raise InputError(f"camera must be given for each of several views, {views}, got none")

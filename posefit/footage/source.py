@@ -18,7 +18,7 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Up, read_calibrations, upright
+from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
@@ -65,7 +65,7 @@ def scene_of(
     progress: Progress = QUIET,
     *,
     asf: str | Path | None = None,
-    camera: Sequence[Camera | str | Path] = (),
+    camera: Sequence[Camera | Calibration | str | Path] = (),
     view_degrees: Sequence[float] = (),
     size: tuple[int, int] | None = None,
     fps: float | None = None,
@@ -197,10 +197,10 @@ def kind_of(source: Footage) -> Kind:
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
 
 
-def _cameras(source: Camera | str | Path, up: Up | None) -> list[Camera]:
+def _cameras(source: Camera | Calibration | str | Path, up: Up | None) -> list[Camera]:
     if isinstance(source, Camera):
         return [source]
-    known = read_calibrations(source)
+    known = [source] if isinstance(source, Calibration) else read_calibrations(source)
     return [calibration.camera(calibration.size, upright(known, up)) for calibration in known]
 
 

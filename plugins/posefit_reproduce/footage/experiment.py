@@ -1,0 +1,237 @@
+"""Figures 8 and 10 of the SAPSO paper: poses of single real images, and 100 frames of a real film, tracked.
+
+Masks are those of a mixture of Gaussians, as in the paper. It says neither which frames it took nor what it knew of
+camera, body and place: here the camera is the data set's or a guess, the place in each image is aligned to the mask,
+and the first yaw is unknown.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.files import new_folder
+from posefit.fitting import metrics
+from posefit.fitting.tracker import Frame
+from posefit.footage.cameras import place_of
+from posefit.footage.masks import Range, span
+from posefit.footage.scene import Scene
+from posefit.footage.segmentation import Extraction
+from posefit.footage.source import scene_of
+from posefit.footage.video import Video
+from posefit.motion.motion import Motion
+from posefit.silhouette.foreground import Image
+from posefit.tracking.drawing import draw_body, write
+from posefit.tracking.initialise import task_of
+from posefit.tracking.method import prepare
+from posefit.tracking.options import ITERATIONS, TrackOptions
+from posefit.tracking.pipeline import track_scene
+from posefit_reproduce.footage.humaneva import errors_mm
+from posefit_reproduce.footage.recordings import Activity, Recording, films_in, recording_of
+from posefit_reproduce.sapso.design import METHODS, OURS, PAPER, settings_of
+from posefit_reproduce.sapso.motions import paper_motions
+from posefit_reproduce.sapso.numbers import FRAMES
+
+IMAGES = 6  # estimated by themselves, and shown
+TALL = 300  # pixels of a picture in a figure
+LABEL_HEIGHT = 28  # pixels
+SOLID = 0.65  # how much of the film the body hides
+SINGLE = "PCA + SAPSO, images"
+Progress = Callable[[Iterator[Any], int], Iterator[Any]]
+
+
+class Estimate(NamedTuple):
+    """The poses of some frames of a scene, each by itself or tracked."""
+
+    method: str
+    frames: Sequence[int]  # their numbers in the scene
+    results: Sequence[Frame]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What is run."""
+
+    folder: str | Path
+    only: str = ""  # in the paths of films; "" for one walk and one run
+    activity: Activity | None = None  # of films that do not say
+    frames: Range = (None, None)  # by default 100 from the first that shows the person
+    clips: str | Path | None = None  # what priors learn from: a folder of CMU clips, or None for built-in motions
+    height: float | None = None  # metres that the person stands
+    extraction: Extraction | None = None  # of the masks; by default a mixture of Gaussians, as in the paper
+    seed: int = 0
+    iterations: int = ITERATIONS
+
+
+def footage_report(choice: Choice, out: str | Path | None, progress: Progress) -> dict[str, Any]:
+    """Return what single images and tracks of each film give, and write it with the pictures to `out`, if given.
+
+    Raises InputError where files or choices do not fit.
+    """
+    chosen, motions = _chosen(choice), paper_motions(choice.clips, FRAMES)
+    with nullcontext() if out is None else new_folder(out) as folder:
+        rows: dict[str, Any] = {}
+        figures: list[str] = []
+        for recording, activity in progress(iter(chosen), len(chosen)):
+            scene, first = filmed_scene(recording, choice)
+            training = motions[activity].training
+            tracks = [tracked(scene, training, name, choice) for name in PAPER]
+            images = single_images(scene, training, choice)  # last, so that its seconds are not those of compiling
+            rows[recording.name] = {
+                "activity": activity,
+                "frames": [first, first + scene.count],
+                "camera": scene.placing,
+                "warnings": list(scene.warnings),
+                "estimates": {each.method: _figures(each, scene, recording, first) for each in (images, *tracks)},
+            }
+            if folder is not None:
+                for figure, shown in (("figure-8", [images]), ("figure-10", tracks)):
+                    name = f"{figure}-{recording.name}.png"
+                    cv2.imwrite(str(folder / name), picture(scene, shown, images.frames, first))
+                    figures.append(name)
+        report = {"seed": choice.seed, "iterations": choice.iterations, "films": rows, "figures": figures}
+        if folder is not None:
+            (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    return report
+
+
+def _chosen(choice: Choice) -> list[tuple[Recording, Activity]]:
+    """Return the films that are run, and what they show; without a name those of one walk and one run."""
+    chosen: dict[Path, Activity] = {}
+    for film, named in films_in(choice.folder, choice.only).items():
+        activity = named or choice.activity
+        if activity is None:
+            raise InputError(f"activity must be walk or run for films that do not say, such as {film.name}, got none")
+        if choice.activity in (None, activity) and (choice.only or activity not in chosen.values()):
+            chosen[film] = activity
+    return [(recording_of(film), activity) for film, activity in chosen.items()]
+
+
+def filmed_scene(recording: Recording, choice: Choice) -> tuple[Scene, int]:
+    """Return the scene of 100 frames of a film, or of those chosen, and the number of its first frame."""
+    given, count = choice.frames != (None, None), Video.of(recording.film).count()
+    start, stop = span(choice.frames if given else recording.frames, count)
+    stop = stop if given else min(stop, start + FRAMES)
+    scene = scene_of(
+        [recording.film],
+        camera=() if recording.calibration is None else (recording.calibration,),
+        frames=(start, stop),
+        extraction=choice.extraction,
+        asf=recording.skeleton,
+        height=choice.height,
+    )
+    return replace(scene, name=recording.name), start
+
+
+def single_images(scene: Scene, training: Sequence[Motion], choice: Choice) -> Estimate:
+    """Return the poses of a few images, each by itself, from a full circle of yaws. SAPSO section 5.3, figure 8."""
+    options = TrackOptions(method=OURS, settings=settings_of(OURS), iterations=choice.iterations, seed=choice.seed)
+    task = replace(task_of(scene, options, training), yaw=None)
+    method = prepare(options, task)
+    usable = [k for k in range(scene.count) if scene.observations[k].usable]
+    chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
+    results: list[Frame] = []
+    for k in chosen:
+        observation = replace(scene.observations[k], yaw=None)
+        anchor = place_of(observation.silhouettes, scene.cameras, scene.body.stature)
+        tracker = method.tracker(replace(task, anchor=anchor))
+        results += tracker.track([observation], np.random.default_rng([choice.seed, k]))
+    return Estimate(SINGLE, chosen, results)
+
+
+def tracked(scene: Scene, training: Sequence[Motion], name: str, choice: Choice) -> Estimate:
+    """Return the poses of all frames, tracked by a method of the paper. SAPSO section 5.4, figure 10.
+
+    The first yaw is unknown, with restarts; as in the paper no build is fitted and nothing is smoothed.
+    """
+    options = TrackOptions(
+        method=name,
+        settings=settings_of(name),
+        iterations=choice.iterations,
+        seed=choice.seed,
+        smooth=False,
+        body_frames=0,
+    )
+    track = track_scene(replace(scene, yaw=None), training, options)
+    return Estimate(name, range(scene.count), track.estimates)
+
+
+def _figures(estimate: Estimate, scene: Scene, recording: Recording, first: int) -> dict[str, float | int | None]:
+    """Return what fits how well: means over an estimate's frames."""
+    usable = np.array([scene.observations[k].usable for k in estimate.frames])
+    values = {
+        "iou": [float(metrics.iou(frame.areas)[0]) for frame in estimate.results],
+        "cost": [frame.cost for frame in estimate.results],
+        "seconds_per_frame": [frame.seconds for frame in estimate.results],
+    }
+    row: dict[str, float | int | None] = {"frames": len(usable), "usable": int(usable.sum())}
+    row |= {name: float(np.array(each)[usable].mean()) for name, each in values.items()}
+    if recording.truth is not None:
+        truth = recording.truth(first, first + scene.count)[list(estimate.frames)]
+        joints = np.array([scene.body.skeleton.joints(each.pose, each.translation) for each in estimate.results])
+        for name, relative in (("error_mm", False), ("relative_error_mm", True)):
+            errors = errors_mm(truth, joints, relative)
+            known = np.isfinite(errors) & usable
+            row[name] = float(errors[known].mean()) if known.any() else None
+    return row
+
+
+def picture(scene: Scene, estimates: Sequence[Estimate], frames: Sequence[int], first: int) -> Image:
+    """Return frames of a film side by side, and below them the same ones with the body of each estimate.
+
+    `frames` are their numbers in the scene, whose first frame has the number `first` in the film.
+    """
+    assert scene.pictures is not None
+    films = {k: image for k, image in enumerate(scene.pictures()) if k in frames}
+    rows = [np.hstack([_scaled(films[k]) for k in frames])]
+    for estimate in estimates:
+        poses = dict(zip(estimate.frames, estimate.results, strict=True))
+        rows.append(np.hstack([_scaled(_drawn(scene, films[k], poses[k])) for k in frames]))
+        write(rows[-1], METHODS[estimate.method].label if estimate.method in METHODS else SINGLE, (8, 20))
+    for number, k in enumerate(frames):
+        write(rows[0], f"frame {first + k}", (number * rows[0].shape[1] // len(frames) + 8, 20))
+    return np.asarray(np.vstack(rows), dtype=np.uint8)
+
+
+def _drawn(scene: Scene, film: Image, frame: Frame) -> Image:
+    """Return a frame of a film with the body on it, half seen through."""
+    image = film.copy()
+    draw_body(image, scene.body, scene.cameras[0], frame.pose, frame.translation)
+    return np.asarray(cv2.addWeighted(image, SOLID, film, 1.0 - SOLID, 0.0), dtype=np.uint8)
+
+
+def _scaled(image: Image) -> Image:
+    """Return a picture of the height of all in a figure, its top dark, so that labels stand out."""
+    size = round(image.shape[1] * TALL / image.shape[0]), TALL
+    scaled: Image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    scaled[:LABEL_HEIGHT] //= 4
+    return scaled
+
+
+def footage_text(report: dict[str, Any]) -> str:
+    """Return the report as it is printed."""
+    return "\n".join(_lines(report))
+
+
+def _lines(report: dict[str, Any]) -> Iterator[str]:
+    for name, film in report["films"].items():
+        first, stop = film["frames"]
+        yield f"{name}: {film['activity']}, frames {first} to {stop - 1}, camera {film['camera']}"
+        yield f"{'':24}{'frames':>8}{'usable':>8}{'IoU':>8}{'cost':>8}{'s':>8}{'mm':>8}{'rel. mm':>9}"
+        for method, row in film["estimates"].items():
+            label = f"{METHODS[method].label}, tracked" if method in METHODS else method
+            errors = [row.get("error_mm"), row.get("relative_error_mm")]
+            shown = ["-" if error is None else f"{error:.1f}" for error in errors]
+            yield (
+                f"  {label:22}{row['frames']:8}{row['usable']:8}{row['iou']:8.3f}{row['cost']:8.2f}"
+                f"{row['seconds_per_frame']:8.3f}{shown[0]:>8}{shown[1]:>9}"
+            )
+        for warning in film["warnings"]:
+            yield f"  {warning}"
+    yield "mm: HumanEva's error, the mean distance of 15 virtual markers, and the same with both pelvises in one place"
