@@ -23,7 +23,8 @@ def each(jobs: Mapping[K, Callable[[], T]], workers: int | None, progress: Progr
 
     Jobs and results travel between processes. Raises ValueError where a job fails, and ends the others.
     """
-    _check(workers)
+    if workers is not None and workers < 1:
+        raise InputError(f"workers must be at least 1, got {workers}")
     engine: Processes[tuple[K, Callable[[], T]], T] = Processes(min(workers or cores(), len(jobs)), Limits(), _called)
     with closing(engine):
         ended = _ended(jobs, engine)
@@ -48,11 +49,6 @@ def _ended(jobs: Mapping[K, Callable[[], T]], engine: Processes[tuple[K, Callabl
 
 def _called(job: tuple[K, Callable[[], T]]) -> T:
     return job[1]()
-
-
-def _check(workers: int | None) -> None:
-    if workers is not None and workers < 1:
-        raise InputError(f"workers must be at least 1, got {workers}")
 
 
 def check_seeds(seeds: int) -> None:

@@ -21,12 +21,14 @@ from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
 from posefit.footage.cameras import place_of
 from posefit.footage.masks import Range, span
+from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.motion.motion import Motion
 from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Silhouette
 from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
@@ -41,6 +43,7 @@ from posefit_reproduce.sapso.numbers import FRAMES
 IMAGES = 6  # estimated by themselves, and shown
 TALL = 300  # pixels of a picture in a figure
 LABEL_HEIGHT = 28  # pixels
+SQUARE = 0.65  # of the person's height in pixels: half the side of such a picture
 SOLID = 0.65  # how much of the film the body hides
 SINGLE = "PCA + SAPSO, images"
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
@@ -183,19 +186,20 @@ def _figures(estimate: Estimate, scene: Scene, recording: Recording, first: int)
 
 
 def picture(scene: Scene, estimates: Sequence[Estimate], frames: Sequence[int], first: int) -> Image:
-    """Return frames of a film side by side, and below them the same ones with the body of each estimate.
+    """Return the person in frames of a film side by side, and below with the body of each estimate.
 
     `frames` are their numbers in the scene, whose first frame has the number `first` in the film.
     """
     assert scene.pictures is not None
     films = {k: image for k, image in enumerate(scene.pictures()) if k in frames}
-    rows = [np.hstack([_scaled(films[k]) for k in frames])]
+    masks = {k: scene.observations[k].silhouettes[0] for k in frames}
+    rows = [np.hstack([_square(films[k], masks[k]) for k in frames])]
     for estimate in estimates:
         poses = dict(zip(estimate.frames, estimate.results, strict=True))
-        rows.append(np.hstack([_scaled(_drawn(scene, films[k], poses[k])) for k in frames]))
+        rows.append(np.hstack([_square(_drawn(scene, films[k], poses[k]), masks[k]) for k in frames]))
         write(rows[-1], METHODS[estimate.method].label if estimate.method in METHODS else SINGLE, (8, 20))
     for number, k in enumerate(frames):
-        write(rows[0], f"frame {first + k}", (number * rows[0].shape[1] // len(frames) + 8, 20))
+        write(rows[0], f"frame {first + k}", (number * TALL + 8, 20))
     return np.asarray(np.vstack(rows), dtype=np.uint8)
 
 
@@ -206,12 +210,14 @@ def _drawn(scene: Scene, film: Image, frame: Frame) -> Image:
     return np.asarray(cv2.addWeighted(image, SOLID, film, 1.0 - SOLID, 0.0), dtype=np.uint8)
 
 
-def _scaled(image: Image) -> Image:
-    """Return a picture of the height of all in a figure, its top dark, so that labels stand out."""
-    size = round(image.shape[1] * TALL / image.shape[0]), TALL
-    scaled: Image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    scaled[:LABEL_HEIGHT] //= 4
-    return scaled
+def _square(image: Image, silhouette: Silhouette) -> Image:
+    """Return the square of a picture that shows the person, black beyond its borders and darker under its label."""
+    (x, y), tall = extent_of(silhouette)
+    half = SQUARE * tall
+    placed = TALL / (2.0 * half) * np.array([[1.0, 0.0, half - x], [0.0, 1.0, half - y]])
+    square: Image = np.asarray(cv2.warpAffine(image, placed, (TALL, TALL)), dtype=np.uint8)
+    square[:LABEL_HEIGHT] //= 4
+    return square
 
 
 def footage_text(report: dict[str, Any]) -> str:
