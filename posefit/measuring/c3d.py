@@ -131,7 +131,7 @@ def read_c3d(path: str | Path) -> dict[str, Array]:
         if path.stat().st_size > LARGEST_FILE:
             raise ValueError(f"{path.stat().st_size:,} bytes")
         return _points(path.read_bytes())
-    except (OSError, ValueError, IndexError, KeyError, struct.error) as error:
+    except (OSError, ValueError, IndexError, struct.error) as error:
         most = f"a .c3d file of at most {LARGEST_FILE // 10**6} MB"
         raise InputError(f"{path}: expected {most}, got {error or type(error).__name__}") from None
 
@@ -181,4 +181,7 @@ def _labels(content: bytes, start: int) -> list[str]:
         if not ahead:
             break
         at += ahead
-    return next(words[number] for number, group in groups.items() if group == "POINT")
+    for number, group in groups.items():
+        if group == "POINT" and number in words:
+            return words[number]
+    raise ValueError("one whose points have no labels")

@@ -1,5 +1,6 @@
 """Films in the layouts of KTH's actions, HumanEva-I and CMU's database, made here; HumanEva's truth and its error."""
 
+import contextlib
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,9 +13,10 @@ from click.testing import CliRunner
 
 from posefit.arrays import Array
 from posefit.cli import main
+from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.measuring.c3d import read_c3d
+from posefit.measuring.c3d import read_c3d, write_c3d
 from posefit.measuring.centres import PLACES
 from posefit.motion import built_in
 from posefit.motion.asf import write_asf
@@ -213,6 +215,26 @@ def test_a_c3d_is_read_as_reals_and_integers_of_both_byte_orders(scale: float, d
     assert list(read) == ["PELO", "C7"]
     for name, places in points.items():
         np.testing.assert_allclose(read[name], places, atol=1e-5)
+
+
+def test_a_c3d_that_posefit_wrote_reads_back(tmp_path: Path) -> None:
+    motion = walk(5)
+    write_c3d(tmp_path / "walk.c3d", motion, {2})
+    read = np.stack([*read_c3d(tmp_path / "walk.c3d").values()], axis=1) / 1e3
+    np.testing.assert_allclose(np.delete(read, 2, axis=0), np.delete(motion.joints, 2, axis=0), atol=1e-6)
+    assert np.isnan(read[2]).all()
+
+
+def test_a_damaged_c3d_is_an_input_error_or_points(tmp_path: Path) -> None:
+    whole, rng = c3d(stands()), np.random.default_rng(0)
+    for _ in range(300):
+        content = bytearray(whole[: rng.integers(0, len(whole) + 1)])
+        for at in rng.integers(0, 1200, 4):
+            if at < len(content):
+                content[at] = rng.integers(0, 256)
+        (tmp_path / "damaged.c3d").write_bytes(bytes(content))
+        with contextlib.suppress(InputError):
+            read_c3d(tmp_path / "damaged.c3d")
 
 
 def test_virtual_points_of_a_person_who_stands() -> None:
