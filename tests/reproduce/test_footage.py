@@ -227,7 +227,7 @@ def test_a_c3d_that_posefit_wrote_reads_back(tmp_path: Path) -> None:
 
 def test_a_damaged_c3d_is_an_input_error_or_points(tmp_path: Path) -> None:
     whole, rng = c3d(stands()), np.random.default_rng(0)
-    for _ in range(300):
+    for _ in range(150):
         content = bytearray(whole[: rng.integers(0, len(whole) + 1)])
         for at in rng.integers(0, 1200, 4):
             if at < len(content):

@@ -19,7 +19,6 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
-from posefit.footage.cameras import place_of
 from posefit.footage.masks import Range, span
 from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
@@ -30,13 +29,12 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.drawing import draw_body, write
-from posefit.tracking.initialise import task_of
-from posefit.tracking.method import prepare
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.footage.humaneva import errors_mm
 from posefit_reproduce.footage.recordings import Activity, Recording, films_in, recording_of
 from posefit_reproduce.sapso.design import METHODS, OURS, PAPER, settings_of
+from posefit_reproduce.sapso.experiment import estimate_images
 from posefit_reproduce.sapso.motions import paper_motions
 from posefit_reproduce.sapso.numbers import FRAMES
 
@@ -134,18 +132,10 @@ def filmed_scene(recording: Recording, choice: Choice) -> tuple[Scene, int]:
 
 def single_images(scene: Scene, training: Sequence[Motion], choice: Choice) -> Estimate:
     """Return the poses of a few images, each by itself, from a full circle of yaws. SAPSO section 5.3, figure 8."""
-    options = TrackOptions(method=OURS, settings=settings_of(OURS), iterations=choice.iterations, seed=choice.seed)
-    task = replace(task_of(scene, options, training), yaw=None)
-    method = prepare(options, task)
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
-    results: list[Frame] = []
-    for k in chosen:
-        observation = replace(scene.observations[k], yaw=None)
-        anchor = place_of(observation.silhouettes, scene.cameras, scene.body.stature)
-        tracker = method.tracker(replace(task, anchor=anchor))
-        results += tracker.track([observation], np.random.default_rng([choice.seed, k]))
-    return Estimate(SINGLE, chosen, results)
+    images = {k: replace(scene.observations[k], yaw=None) for k in chosen}
+    return Estimate(SINGLE, chosen, estimate_images(scene, images, training, OURS, choice.iterations, choice.seed))
 
 
 def tracked(scene: Scene, training: Sequence[Motion], name: str, choice: Choice) -> Estimate:

@@ -3,7 +3,7 @@
 The tables need errors of single angles and frames, and the figures poses, which a sweep does not keep; so all are jobs.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
@@ -13,9 +13,11 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
-from posefit.fitting.tracker import Frame
-from posefit.footage.scene import with_corruption
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.cameras import place_of
+from posefit.footage.scene import Scene, with_corruption
 from posefit.geometry.rotation import wrapped
+from posefit.motion.motion import Motion
 from posefit.tracking.evaluation import nearest
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
@@ -187,24 +189,37 @@ def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack
     )
 
 
-def estimate_paper(motion: PaperMotion, key: ImageKey, scale: Scale) -> PaperTrack:
-    """Estimate the pose in each frame by itself, whichever way the person faces: a full circle of yaws. Section 5.3.
+def estimate_images(
+    scene: Scene,
+    images: Mapping[int, Observation],
+    training: Sequence[Motion],
+    name: str,
+    iterations: int,
+    seed: int,
+) -> list[Frame]:
+    """Return the pose in each image by itself, whichever way the person faces: a full circle of yaws. Section 5.3.
 
-    The translation of each frame is known.
+    `images` are observations of the scene by their frames' numbers; a method is run that `METHODS` names.
     """
-    scene, frames = paper_scene(motion, key.view), list[Frame]()
+    options = TrackOptions(method=name, settings=settings_of(name), iterations=iterations, seed=seed)
+    task = replace(task_of(scene, options, training), yaw=None)  # Interpretation S17
+    method, frames = prepare(options, task), list[Frame]()
+    for k, image in images.items():
+        known = image.translation
+        anchor = place_of(image.silhouettes, scene.cameras, scene.body.stature) if known is None else np.asarray(known)
+        tracker = method.tracker(replace(task, anchor=anchor))
+        frames += tracker.track([image], np.random.default_rng([seed, k]))
+    return frames
+
+
+def estimate_paper(motion: PaperMotion, key: ImageKey, scale: Scale) -> PaperTrack:
+    """Estimate the pose in each frame by itself; the translation is known. Section 5.3."""
+    scene = paper_scene(motion, key.view)
     observations = scene.observations
     if key.hidden:
         observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, key.seed)
-    options = TrackOptions(
-        method=key.method, settings=settings_of(key.method), iterations=scale.iterations, seed=key.seed
-    )
-    task = replace(task_of(scene, options, motion.training), yaw=None)  # Interpretation S17
-    method = prepare(options, task)
-    for k, observation in enumerate(observations):
-        assert observation.translation is not None
-        tracker = method.tracker(replace(task, anchor=observation.translation))
-        frames += tracker.track([observation], np.random.default_rng([key.seed, k]))
+    images = dict(enumerate(observations))
+    frames = estimate_images(scene, images, motion.training, key.method, scale.iterations, key.seed)
     estimate = replace(motion.test, poses=np.array([frame.pose for frame in frames]))
     truth, joints = motion.test.joints, estimate.joints
     return PaperTrack(
