@@ -265,7 +265,7 @@ def test_frames_without_a_marker_have_no_truth() -> None:
 
 
 def test_the_error_is_the_mean_distance_of_fifteen_markers() -> None:
-    # Sigal, Balan and Black, IJCV 87, 2010, equation (3): the mean over 15 markers of their distances
+    # Sigal, Balan and Black, IJCV 87, 2010: the mean over 15 markers of their distances
     joints = walk(3).joints
     truth = joints[:, [PLACES.index(point) for point in POINTS]]
     np.testing.assert_allclose(errors_mm(truth, joints), 0.0, atol=1e-9)
