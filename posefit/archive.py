@@ -4,8 +4,10 @@
 nothing is unpacked that has another size than they say, or more bytes than the caller allows.
 """
 
+import io
 import math
 import struct
+import sys
 import tokenize
 import warnings
 import zipfile
@@ -22,11 +24,10 @@ from numpy.typing import NDArray
 from posefit.errors import InputError
 from posefit.reading import check_size, cut, quoted
 
-MEMBERS = 1_000  # arrays of a file
+DIRECTORY = 100_000  # bytes of an archive's directory, which has about a hundred for each array
 HEADER = 10_000  # characters before an array, as NumPy has it
 TURNED = 500_000_000  # bytes of an array that is stored column by column, which has to be unpacked whole
 KINDS = "biufUS"  # booleans, numbers and text: nothing that has to be unpickled
-_END, _END64 = b"PK\x05\x06", b"PK\x06\x07"  # of an archive's directory
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # as NumPy writes; others unpack a thousand times slower
 # what zipfile, zlib and NumPy raise where bits were flipped or bytes are missing
 _DAMAGE = (
@@ -91,14 +92,15 @@ class Stored:
 
     @contextmanager
     def _opened(self) -> Iterator[IO[bytes]]:
-        with _as_input_error(self._path, self._what), self._archive.open(f"{self.name}.npy") as member:
+        expected = f"{self._path}: expected an .npz file with {self._what}"
+        with _as_input_error(expected), self._archive.open(f"{self.name}.npy") as member:
             _exactly(member, self._start)
             yield member
 
 
 @dataclass(frozen=True)
 class Held:
-    """An array in memory, to be read as one of an archive is."""
+    """An array in memory or in an .npy file, to be read as one of an archive is."""
 
     array: NDArray[Any]
 
@@ -121,73 +123,64 @@ class Held:
         yield from self.array
 
 
-def mapped(path: Path, most: int) -> Held:
+def mapped(path: Path) -> Held:
     """Return the array of an .npy file, read from the disk row by row. Raises InputError where it is none."""
-    check_size(path, most)
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except _DAMAGE as error:
-        came = cut(" ".join(str(error).split()) or type(error).__name__)
-        raise InputError(f"{path}: expected an .npy file with an array, got a damaged one: {came}") from None
-    if not isinstance(array, np.ndarray):
-        raise InputError(f"{path}: expected an .npy file with an array, got an archive of several")
-    return Held(array)
+    check_size(path, sys.maxsize)
+    with _as_input_error(f"{path}: expected an .npy file with an array"):
+        with path.open("rb") as file:
+            shape, fortran, dtype, start = _header(file, "one", path.stat().st_size)
+        return Held(np.memmap(path, dtype, "r", start, shape, "F" if fortran else "C"))
 
 
 @contextmanager
-def archived(path: Path, names: Sequence[str], what: str, most: int, packed: int) -> Iterator[dict[str, Stored]]:
-    """Yield those of `names` that an .npz file of at most `packed` bytes has; together they unpack to `most` at most.
+def archived(path: Path, names: Sequence[str], what: str, packed: int) -> Iterator[dict[str, Stored]]:
+    """Yield those of `names` that an .npz file of at most `packed` bytes has; none of them is unpacked yet.
 
     Raises InputError, also while they are read, where the file is damaged or larger; `what` describes the expected
     arrays in messages.
     """
     check_size(path, packed)
     with ExitStack() as stack:
-        with _as_input_error(path, what):
-            file = stack.enter_context(path.open("rb"))
-            _check_directory(file)
+        with _as_input_error(f"{path}: expected an .npz file with {what}"):
+            file = stack.enter_context(_ArchiveFile(path))
             archive = stack.enter_context(zipfile.ZipFile(file))
+            file.longest = packed
             there = set(archive.namelist())
             arrays = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
-            size = sum(one.size for one in arrays.values())
-            if size > most:
-                raise _RefusedError(f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most")
         yield arrays
 
 
 def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mapping[str, NDArray[Any]]:
     """Return those of `names` that an .npz file has, of `most` bytes together. Raises InputError as `archived` does."""
-    with archived(path, names, what, most, most) as arrays:
+    with archived(path, names, what, most) as arrays:
+        size = sum(one.size for one in arrays.values())
+        if size > most:
+            came = f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most"
+            raise InputError(f"{path}: expected an .npz file with {what}, got {came}")
         return {name: one.read() for name, one in arrays.items()}
 
 
-def _check_directory(file: IO[bytes]) -> None:
-    """Return nothing. Raises InputError where an archive's directory, which is read whole, has too many entries.
+class _ArchiveFile(io.FileIO):
+    """A file of which zipfile reads no more than `longest` bytes at once: its directory, which it reads whole."""
 
-    The record that says so is looked for as zipfile does it.
-    """
-    size = file.seek(0, 2)
-    tail = min(size, 22 + (1 << 16))
-    file.seek(size - tail)
-    end = file.read(tail)
-    start = len(end) - 22 if end[-22:-18] == _END and end.endswith(b"\0\0") else end.rfind(_END)
-    record = end[start : start + 22] if start >= 0 else b""
-    if len(record) < 22:
-        raise _RefusedError("a file that is none")
-    count, length = struct.unpack("<10xHL6x", record)
-    if max(count, length // 46) > MEMBERS or (start >= 20 and end[start - 20 : start - 16] == _END64):
-        raise _RefusedError(f"one of more than {MEMBERS} arrays")
+    longest = DIRECTORY
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Return the next bytes."""
+        if size is not None and size > self.longest:
+            raise _RefusedError(f"one whose directory is longer than {DIRECTORY:,} bytes")
+        return super().read(size)
 
 
 @contextmanager
-def _as_input_error(path: Path, what: str) -> Iterator[None]:
-    """Raise whatever a damaged archive or array raises as an InputError that names the file."""
+def _as_input_error(expected: str) -> Iterator[None]:
+    """Raise whatever a damaged archive or array raises as an InputError, which begins with what was expected."""
     try:
         yield
     except _DAMAGE as error:
         text = " ".join(str(error).split()) or type(error).__name__
         came = text if isinstance(error, _RefusedError) else f"a damaged one: {cut(text)}"
-        raise InputError(f"{path}: expected an .npz file with {what}, got {came}") from None
+        raise InputError(f"{expected}, got {came}") from None
 
 
 def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Stored:
@@ -195,20 +188,24 @@ def _stored(path: Path, what: str, archive: zipfile.ZipFile, name: str) -> Store
     if info.compress_type not in _PACKED:
         raise _RefusedError(f"{name} packed in a way that NumPy does not write")
     with archive.open(info) as member:
-        version = np.lib.format.read_magic(member)
-        if version not in ((1, 0), (2, 0)):
-            raise _RefusedError(f"{name} in NumPy's format {version}")
-        header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about headers as Python 2 wrote them
-            shape, fortran, dtype = header(member, HEADER)
-        start = member.tell()
-    stored = Stored(name, shape, dtype, fortran, path, what, archive, start)
+        shape, fortran, dtype, start = _header(member, name, info.file_size)
+    return Stored(name, shape, dtype, fortran, path, what, archive, start)
+
+
+def _header(file: IO[bytes], name: str, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+    """Return shape, order and type of the array in a file of `size` bytes, and where its values begin."""
+    version = np.lib.format.read_magic(file)
+    if version != (1, 0):  # the others are for records of very many fields, and their headers of any length
+        raise _RefusedError(f"{name} in NumPy's format {version}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about headers as Python 2 wrote them
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(file, HEADER)
+    start = file.tell()
     if dtype.kind not in KINDS or not dtype.itemsize:
         raise _RefusedError(f"{name} of {cut(str(dtype))}")
-    if any(side < 0 for side in shape) or stored.size != info.file_size - start:
-        raise _RefusedError(f"{name} of {info.file_size - start} bytes for shape {quoted(shape)}")
-    return stored
+    if any(side < 0 for side in shape) or math.prod(shape) * dtype.itemsize != size - start:
+        raise _RefusedError(f"{name} of {size - start} bytes for shape {quoted(shape)}")
+    return shape, fortran, dtype, start
 
 
 def _exactly(member: IO[bytes], count: int) -> bytes:

@@ -11,8 +11,12 @@ from functools import lru_cache
 from pathlib import Path
 from types import FrameType
 
+from posefit.errors import InputError
+from posefit.reading import quoted
+
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off
+DECODED, DECODED_GIGABYTES = "POSEFIT_DECODED_GIGABYTES", 4.0  # the variable of `check_decoded`, and its default
 # of Linux: the memory that a container may have, in control groups of version 2 and 1
 _CONTAINER = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
 
@@ -71,6 +75,21 @@ def memory(gigabytes: float) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def check_decoded(name: str, size: int) -> None:
+    """Return nothing. Raises InputError where masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES allows.
+
+    They take time rather than memory, where they become bits frame by frame.
+    """
+    text = os.environ.get(DECODED, "")
+    try:
+        most = float(text or DECODED_GIGABYTES)
+    except ValueError:
+        raise InputError(f"{DECODED} must be a number, got {quoted(text)}") from None
+    if not size <= most * 1e9:
+        came = f"{size / 1e9:.3g} GB; {DECODED} raises the limit"
+        raise InputError(f"{name}: expected masks that unpack to at most {most:g} GB, got {came}")
 
 
 def allowed_bytes() -> int:

@@ -9,6 +9,7 @@ Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
 
 import json
 import re
+import stat
 import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -48,8 +49,12 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def check_size(path: Path, most: int) -> None:
-    """Return nothing. Raises InputError where a file is too large to be read."""
-    size = path.stat().st_size
+    """Return nothing. Raises InputError where a file is too large to be read, or is a folder, a pipe or a device."""
+    state = path.stat()
+    if not stat.S_ISREG(state.st_mode):
+        came = "a folder" if stat.S_ISDIR(state.st_mode) else "a pipe or a device"
+        raise InputError(f"{path}: expected a file that can be read, got {came}")
+    size = state.st_size
     if size > most:
         allowed = f"{most / 1e6:g} MB" if most < 1_000_000_000 else f"{most / 1e9:g} GB"
         came = f"{size / 1e6:.1f} MB" if most < 1_000_000_000 else f"{size / 1e9:.1f} GB"
@@ -65,9 +70,7 @@ def read_text(path: str | Path, most: int, what: str = "text") -> str:
     try:
         check_size(path, most)
         with path.open("rb") as file:
-            content = file.read(most + 1)  # what is no plain file does not know its size
-        if len(content) > most:
-            raise InputError(f"{path}: expected at most {most / 1e6:g} MB, got more")
+            content = file.read()
         return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise

@@ -1,7 +1,10 @@
 """What a stranger's text may do, and what it may not."""
 
+import os
+
 import pytest
 
+from posefit.errors import InputError
 from posefit.reading import SHOWN, parsed_json, parsed_toml, quoted, read_text
 from tests.cases import each
 
@@ -13,6 +16,10 @@ def test_what_a_message_quotes_is_cut_at_80_characters():
     assert quoted(16**5000) == "one int that is too long to write"  # Python writes 4,300 digits at most
 
 
+def test_a_message_is_one_line_that_leaves_the_terminal_alone():
+    assert str(InputError("a\nb\x1b[31m\x9b\u202ec é 人: bad")) == r"a\nb\x1b[31m\x9b\u202ec é 人: bad"
+
+
 def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
     path = tmp_path / "a.toml"
     path.write_bytes(b"\xef\xbb\xbfa = 1")
@@ -22,10 +29,13 @@ def test_a_byte_order_mark_is_no_part_of_a_text(tmp_path):
 def test_a_text_that_is_too_large_or_no_utf_8_is_named(tmp_path):
     path = tmp_path / "a.toml"
     path.write_bytes(b"a = \xff")
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
     for place, most, message in (
         (path, 100, "a.toml: expected text in UTF-8, got byte 0xff"),
         (path, 1, "a.toml: expected at most 1e-06 MB, got 0.0 MB"),
-        (tmp_path, 1_000_000, "expected a file that can be read, got Is a directory"),
+        (pipe, 100, "expected a file that can be read, got a pipe or a device"),
+        (tmp_path, 1_000_000, "expected a file that can be read, got a folder"),
     ):
         with pytest.raises(ValueError, match=message):
             read_text(place, most)

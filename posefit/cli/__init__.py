@@ -11,6 +11,7 @@ import click
 from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.ambiguity import ambiguity
 from posefit.cli.motions import motions
+from posefit.cli.output import say
 from posefit.errors import InputError
 from posefit.version import __version__
 
@@ -48,7 +49,7 @@ class _Commands(click.Group):
             if context.params.get("debug"):
                 raise
             message = error.format_message() if isinstance(error, click.UsageError) else str(error)
-            click.echo(f"posefit: {' '.join(message.split())}", err=True)
+            say(f"posefit: {' '.join(message.split())}")
             context.exit(MISTAKE)
 
 

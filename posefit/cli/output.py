@@ -8,10 +8,12 @@ from typing import Any
 
 import click
 
+from posefit.errors import printable
+
 
 def say(message: str) -> None:
     """Print a message on stderr."""
-    click.echo(message, err=True)
+    click.echo("\n".join(map(printable, message.split("\n"))), err=True)
 
 
 def json_line(value: Any) -> str:

@@ -241,7 +241,8 @@ class AuditedTracker:
         """Return the frame with the areas and the cost of its pose, and note where it reports others."""
         label = f"{self._name}: frame {number}"
         pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
-        scene = self._task.body, self._task.cameras, observation.silhouettes
+        observed = [replace(silhouette) for silhouette in observation.silhouettes]  # without bits that it may change
+        scene = self._task.body, self._task.cameras, observed
         costs, counts = pose_costs(*scene, pose, place, self._beta)
         true = counts[:, 0]
         if not np.array_equal(true, frame.areas):

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from posefit.archive import Held, Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, is_colourful, read_values
+from posefit.footage.images import FORMATS, PIXELS, is_colourful, read_values
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
+from posefit.limits import check_decoded
 from posefit.reading import quoted
 from posefit.silhouette.mask import Mask
 
@@ -29,7 +30,6 @@ IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
 SPOOLED = 64_000_000  # bytes of compressed values that are kept in memory; more are on the disk
 PACKED = 2_000_000_000  # bytes of an .npz file
-UNPACKED = 6_000_000_000  # bytes that its arrays unpack to; in memory they are an eighth of that
 MAX_FPS = 1000.0
 NAMES = ("masks", "valid", "usable", "fps")
 
@@ -58,8 +58,11 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
         return read_folder(source, frames, label)
     existing(source)
     if source.suffix.lower() == ".npy":
-        return _packed(str(source), {"masks": mapped(source, UNPACKED)}, frames, label)
-    with archived(source, NAMES, "the key masks", UNPACKED, PACKED) as arrays:
+        held = mapped(source)
+        check_decoded(str(source), held.array.nbytes)
+        return _packed(str(source), {"masks": held}, frames, label)
+    with archived(source, NAMES, "the key masks", PACKED) as arrays:
+        check_decoded(str(source), sum(array.size for array in arrays.values()))
         return _packed(str(source), arrays, frames, label)
 
 
@@ -96,7 +99,9 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
             if read is None:
                 raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
             values, soft = read
-            shape = shape if stored else values.shape
+            if not stored:
+                shape = values.shape
+                check_decoded(name, values.nbytes * len(chosen))
             if values.shape != shape:
                 raise InputError(f"{file}: mask must have shape {shape}, got {values.shape}")
             counts.add(values, soft)
@@ -141,6 +146,10 @@ def _checked_stack(name: str, arrays: Mapping[str, Stored | Held]) -> Stored | H
     shape = tuple(stack.shape)
     if len(shape) != 3 or 0 in shape or stack.dtype.kind not in "buif":
         raise InputError(f"{name}: masks must have shape (frames, height, width), got {_described(stack)}")
+    if shape[1] * shape[2] > PIXELS:
+        raise InputError(
+            f"{name}: expected at most {PIXELS // 10**6} million pixels a frame, got {shape[2]}x{shape[1]}"
+        )
     others: dict[str, tuple[tuple[int, ...], str, str]] = {
         "valid": (shape, "bui", f"have the masks' shape {quoted(shape)}"),
         "usable": (shape[:1], "b", f"be {shape[0]} booleans"),

@@ -46,7 +46,8 @@ class Silhouette:
     def of(cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None) -> "Silhouette":
         """Return the silhouette of a mask (height, width), any value but 0 being the person.
 
-        Pixels where `valid` is 0 are unknown and count for nothing. Raises ValueError where shapes differ.
+        Pixels where `valid` is 0 are unknown and count for nothing. Both arrays are read-only: what a method writes
+        into them would falsify its own audit. Raises ValueError where shapes differ.
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
@@ -54,7 +55,10 @@ class Silhouette:
         known = np.ones(values.shape, dtype=bool) if valid is None else np.asarray(valid) != 0
         if known.shape != values.shape:
             raise InputError(f"valid must have the mask's shape {values.shape}, got {known.shape}")
-        return cls((values != 0) & known, known)
+        person = (values != 0) & known
+        for plane in (person, known):
+            plane.flags.writeable = False
+        return cls(person, known)
 
     @property
     def size(self) -> tuple[int, int]:
