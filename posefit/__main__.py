@@ -1,5 +1,5 @@
 """`python -m posefit` is `posefit`."""
 
-from posefit.cli import main
+from posefit.cli import run
 
-main()
+run()

@@ -161,14 +161,14 @@ class Unfinished:
         emptied(self.path, [*names, MARK])
         self.close()
 
-    def finish(self, names: Iterable[str]) -> None:
-        """Give the folder its target's name. An earlier folder of that name, with entries of these names, is removed.
+    def finish(self, names: Iterable[str], replace: bool) -> None:
+        """Give the folder its target's name; with `replace` it may be an earlier one's, with entries of these names.
 
-        Raises OSError where that one holds anything else, or has appeared meanwhile.
+        Raises OSError where that one holds anything else, or a folder of that name has appeared meanwhile.
         """
         names = [*names, MARK]
         aside = None
-        if os.path.lexists(self._target):
+        if replace and os.path.lexists(self._target):
             if others := other_entries(self._target, names):
                 raise OSError(errno.ENOTEMPTY, f"a folder with {cut(others[0])}")
             aside = _beside(self._target)

@@ -15,6 +15,7 @@ from posefit.errors import InputError
 from posefit.reading import quoted
 
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
+PARENT_POLL_SECONDS = 0.5
 SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off
 DECODED, DECODED_GIGABYTES = "POSEFIT_DECODED_GIGABYTES", 4.0  # the variable of `check_decoded`, and its default
 # of Linux: the memory that a container may have, in control groups of version 2 and 1
@@ -56,6 +57,17 @@ def timed(limit: float | None) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
         if callers:
             signal.setitimer(signal.ITIMER_REAL, max(callers - (time.monotonic() - began), SOON))
+
+
+def end_with_parent(parent: int) -> None:
+    """End this process soon after `parent`, the one that started it, however that one ends."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_POLL_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager

@@ -41,6 +41,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angle_index
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in, recorded
+from posefit.reading import quoted
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Posterior, poses_apart
@@ -193,7 +194,7 @@ def niche_instance(number: int) -> NicheInstance:
     Raises ValueError where the number is out of range.
     """
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < COUNT:
-        raise InputError(f"instance must be a whole number from 0 to {COUNT - 1}, got {number!r}")
+        raise InputError(f"instance must be a whole number from 0 to {COUNT - 1}, got {quoted(number)}")
     kind, rng = KINDS[number % len(KINDS)], np.random.default_rng([RNG_STREAM, number])
     for _ in range(ATTEMPTS):
         instance = _attempt(int(number), kind, rng)

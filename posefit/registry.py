@@ -9,8 +9,10 @@ into an error.
 
 import os
 import re
+import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
@@ -22,7 +24,7 @@ import pluggy
 from posefit import hooks
 from posefit.errors import InputError
 from posefit.hooks import PROJECT, ClaimedOrder
-from posefit.reading import suggestion
+from posefit.reading import cut, quoted, suggestion
 from posefit.settings import Setting, settings_of
 from posefit.version import source_digest
 
@@ -133,9 +135,8 @@ class Registry:
         known = self.offers[kind]
         family, colon, variant = name.partition(":")
         if family not in known:
-            raise InputError(
-                f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {name!r}{suggestion(family, known)}"
-            )
+            came = f"{quoted(name)}{suggestion(family, known)}"
+            raise InputError(f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {came}")
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
@@ -145,7 +146,7 @@ class Registry:
         if not colon:
             return offer
         if all(setting.name != "variant" for setting in offer.settings):
-            raise InputError(f"{kind} must be {family}, which has no variants, got {name!r}")
+            raise InputError(f"{kind} must be {family}, which has no variants, got {quoted(name)}")
         factory = partial(offer.factory, variant=variant)
         factory.__doc__ = offer.factory.__doc__
         return replace(offer, name=name, factory=factory)
@@ -154,6 +155,8 @@ class Registry:
 @lru_cache(maxsize=1)
 def registry() -> Registry:
     """Return the methods of all installed plugins; they are loaded once a process."""
+    import numpy  # noqa: F401  # before a plugin that may change it
+
     return registry_of(_installed("methods"))
 
 
@@ -240,7 +243,8 @@ def _loaded(
     try:
         manager = pluggy.PluginManager(PROJECT)
         manager.add_hookspecs(hooks)
-        module = point.load()
+        with _unpatched():
+            module = point.load()
         manager.register(module, point.name)
         manager.check_pending()
         for hook in manager.get_hookcallers(module) or ():
@@ -261,6 +265,29 @@ def _loaded(
         cause = f"{type(error).__name__}: {error}"
         return Plugin(point.name, distribution, version, "broken", cause, traceback=trace)
     return Plugin(point.name, distribution, version, "loaded", offers=tuple(offers.values()))
+
+
+@contextmanager
+def _unpatched() -> Iterator[None]:
+    """Undo what the body changes for every other plugin, Python's recursion limit and NumPy's functions, and raise."""
+    names = ("numpy", "numpy.linalg", "numpy.random")
+    modules = [sys.modules[name] for name in names if name in sys.modules]
+    before, limit = [dict(vars(module)) for module in modules], sys.getrecursionlimit()
+    try:
+        yield
+    finally:
+        changed = [
+            f"another {module.__name__}.{name}"
+            for module, values in zip(modules, before, strict=True)
+            for name, value in values.items()
+            if vars(module).get(name) is not value
+        ]
+        changed += ["another recursion limit"] * (sys.getrecursionlimit() != limit)
+        for module, values in zip(modules, before, strict=True):
+            vars(module).update(values)
+        sys.setrecursionlimit(limit)
+    if changed:
+        raise InputError(f"to load it must leave NumPy and Python as they are, got {cut(', '.join(changed))}")
 
 
 def _registers(name: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from posefit.errors import InputError
-from posefit.reading import suggestion
+from posefit.reading import quoted, suggestion
 
 HEADING = "Settings:"  # of a docstring's list of them
 _ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
@@ -83,7 +83,7 @@ def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) ->
     for name, value in given.items():
         setting = _known(plugin, name, known)
         if not accepts(setting.annotation, value):
-            raise InputError(f"{plugin}.{name} must be {setting.type}, got {value!r}")
+            raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(value)}")
 
 
 def planned(
@@ -125,7 +125,7 @@ def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) ->
         setting = _known(plugin, name, known)
         readings = [value for value in _readings(text) if accepts(setting.annotation, value)]
         if not readings:
-            raise InputError(f"{plugin}.{name} must be {setting.type}, got {text!r}")
+            raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(text)}")
         values[name] = readings[0]
     return values
 
@@ -139,7 +139,7 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
-            raise InputError(f"--set must be SETTING=VALUE such as population_size=20, got {text!r}")
+            raise InputError(f"--set must be SETTING=VALUE such as population_size=20, got {quoted(text)}")
         given[setting.rpartition(".")[2]] = value
     return parse(plugin, factory, given)
 
@@ -182,7 +182,7 @@ def _section(lines: list[str]) -> tuple[int, int]:
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:
     if name not in known:
         listed = f"one of {', '.join(known)}" if known else "none, it takes none"
-        raise InputError(f"a setting of {plugin} must be {listed}, got {name!r}{suggestion(name, known)}")
+        raise InputError(f"a setting of {plugin} must be {listed}, got {quoted(name)}{suggestion(name, known)}")
     return known[name]
 
 

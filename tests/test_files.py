@@ -230,15 +230,26 @@ def test_a_finished_folder_replaces_an_earlier_one_but_no_other_files(tmp_path):
     for text in ("one", "two"):
         place = Unfinished.begin(target, {})
         (place.path / "ours").write_text(text)
-        place.finish(["ours"])
+        place.finish(["ours"], replace=True)
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert [(path.name, path.read_text()) for path in target.iterdir()] == [("ours", "two")]
     place = Unfinished.begin(target, {})
     (target / "theirs").write_text("theirs")
     with pytest.raises(OSError, match="theirs"):
-        place.finish(["ours"])
+        place.finish(["ours"], replace=True)
     assert sorted(path.name for path in target.iterdir()) == ["ours", "theirs"]
     assert place.path.is_dir()
+
+
+def test_of_two_unfinished_folders_for_one_new_name_the_first_to_end_has_it(tmp_path):
+    places = [Unfinished.begin(tmp_path / "out", {}) for _ in range(2)]
+    for k, place in enumerate(places):
+        (place.path / "ours").write_text(str(k))
+    places[1].finish(["ours"], replace=False)
+    with pytest.raises(OSError):
+        places[0].finish(["ours"], replace=False)
+    assert (tmp_path / "out" / "ours").read_text() == "1"
+    assert (places[0].path / "ours").read_text() == "0"
 
 
 def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():

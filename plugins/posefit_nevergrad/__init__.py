@@ -23,6 +23,7 @@ from posefit.plugin import (
     hookimpl,
     repair,
 )
+from posefit.reading import quoted
 
 
 @final
@@ -51,7 +52,7 @@ class Nevergrad:
         known = nevergrad.optimizers.registry
         if variant not in known:
             raise InputError(
-                f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, got {variant!r}"
+                f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, got {quoted(variant)}"
             )
         self._space, self._home = space, draw_population(space, rng, 1)[0]
         rng = np.random.default_rng(int(rng.integers(2**63)))

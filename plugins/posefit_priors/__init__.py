@@ -4,7 +4,7 @@
 - `loose.Loose` adds freedom at shoulders, elbows, hips and knees, for movements that are not in the training poses.
 - `union.Union` is one space for several motions, feasible near any of many local Gaussians.
 - `full.Full` is all joint angles that are free, within their limits.
-- `sklearn.Transformed` is any transformer of scikit-learn that has an inverse: `sklearn:KernelPCA`.
+- `sklearn.Transformed` is a decomposition of scikit-learn that has an inverse: `sklearn:KernelPCA`.
 
 `arrays` has the checks and files, `kernels` the loops.
 

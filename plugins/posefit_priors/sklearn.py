@@ -1,8 +1,7 @@
-"""Any transformer of scikit-learn that has an inverse, as a prior: `sklearn:KernelPCA`, `sklearn:FactorAnalysis`."""
+"""Decompositions of scikit-learn that have an inverse, as priors: `sklearn:KernelPCA`, `sklearn:FactorAnalysis`."""
 
 import importlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,13 +12,19 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.check import at_least
 from posefit.geometry.skeleton import Skeleton
-from posefit.reading import cut, parsed_json
+from posefit.limits import timed
+from posefit.reading import cut, parsed_json, quoted
 from posefit_priors.arrays import angles_of, check_clustering, load_arrays
 from posefit_priors.clusters import clustered
 from posefit_priors.kernels import near, recover
 from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, reach_of
 
-MODULES = ("decomposition", "manifold", "preprocessing", "random_projection", "cross_decomposition")
+# of `sklearn.decomposition`, those that have an inverse or are linear: a file may name no other class
+VARIANTS = (
+    "DictionaryLearning", "FactorAnalysis", "FastICA", "IncrementalPCA", "KernelPCA", "MiniBatchDictionaryLearning",
+    "MiniBatchSparsePCA", "PCA", "SparsePCA", "TruncatedSVD",
+)  # fmt: skip
+LOADING_SECONDS = 10.0  # a space of a file may take to be learned again
 DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}
 
 
@@ -42,6 +47,7 @@ class Transformed:
     high: Array  # (m,)
     centres: Array  # (K, m)
     reach: Array  # ()
+    _limit: float | None = None  # seconds that the class may take to learn
 
     def __init__(
         self,
@@ -65,7 +71,8 @@ class Transformed:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
         self._angles = angles_of(angles, max(self._clusters, self._components + 1))
         self._model = _built(*self._transformer)
-        self._model.fit(self._angles)
+        with timed(self._limit):
+            self._model.fit(self._angles)
         latents = self.transform(self._angles)
         if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
             name = type(self._model).__name__
@@ -112,7 +119,11 @@ class Transformed:
             raise InputError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
         try:
             settings = dict(zip(names, parsed_json(letters.astype(np.uint8).tobytes().decode()), strict=True))
-            return cls(**settings).fit(arrays["angles"])
+            prior = cls(**settings)
+            prior._limit = LOADING_SECONDS
+            return prior.fit(arrays["angles"])
+        except TimeoutError:
+            raise InputError(f"{path}: expected a prior learned in {LOADING_SECONDS:g} s, got a slower one") from None
         except Exception as error:  # of any transformer
             came = cut(" ".join(str(error).split()))
             raise InputError(f"{path}: expected the settings of a prior, got {came}") from None
@@ -120,35 +131,20 @@ class Transformed:
 
 def _built(variant: str, components: int, options: str, seed: int) -> Any:
     """Return the transformer. Raises ValueError where there is none of that name, or its parameters are others."""
-    kind = _class(variant)
+    if variant not in VARIANTS:
+        raise InputError(f"variant must be one of {', '.join(VARIANTS)}, got {quoted(variant)}")
+    kind = getattr(importlib.import_module("sklearn.decomposition"), variant)
     try:
         parameters = json.loads(options)
         if not isinstance(parameters, dict):
             raise TypeError(type(parameters).__name__)
     except (ValueError, TypeError) as error:
-        raise InputError(f"options must be a JSON object, got {options!r} ({error})") from None
+        raise InputError(f"options must be a JSON object, got {quoted(options)} ({error})") from None
     known = kind().get_params()
     defaults = {"n_components": components, "random_state": seed, **DEFAULTS.get(variant, {})}
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
     return kind(**{name: value for name, value in defaults.items() if name in known} | parameters)
-
-
-def _class(variant: str) -> Callable[..., Any]:
-    known: dict[str, Callable[..., Any]] = {}
-    for module in MODULES:
-        package = importlib.import_module(f"sklearn.{module}")
-        kinds = {name: getattr(package, name) for name in package.__all__}
-        known |= {name: kind for name, kind in kinds.items() if isinstance(kind, type) and _inverts(kind)}
-        if variant in known:
-            return known[variant]
-    choices = ", ".join(sorted(known))
-    raise InputError(f"variant must be a transformer with an inverse, such as {choices}, got {variant!r}")
-
-
-def _inverts(kind: type) -> bool:
-    """Return whether a transformer has an inverse, or is linear and needs none."""
-    return hasattr(kind, "transform") and (hasattr(kind, "inverse_transform") or kind.__name__ == "FactorAnalysis")
 
 
 def _linear(model: Any, components: int) -> tuple[Array, Array] | None:

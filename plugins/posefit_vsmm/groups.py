@@ -14,7 +14,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import one_of
-from posefit.reading import parsed_toml, read_text
+from posefit.reading import parsed_toml, quoted, read_text
 
 SIZE_LIMIT = 100_000  # bytes
 TABLES = ("groups", "neighbours", "activities")
@@ -83,10 +83,10 @@ def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
         raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
     stay = values["stay"]
     if not isinstance(stay, float) or not 0.0 < stay < 1.0:
-        raise InputError(f"{label}: stay must be a number between 0 and 1, got {stay!r}")
+        raise InputError(f"{label}: stay must be a number between 0 and 1, got {quoted(stay)}")
     for key in TABLES:
         if not isinstance(values[key], dict) or not all(isinstance(models, list) for models in values[key].values()):
-            raise InputError(f"{label}: {key} must be a table of lists of models, got {values[key]!r}")
+            raise InputError(f"{label}: {key} must be a table of lists of models, got {quoted(values[key])}")
     groups, neighbours, activities = (
         {name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in TABLES
     )

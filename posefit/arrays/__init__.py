@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from posefit.arrays.compiling import compiled_once
 from posefit.errors import InputError
+from posefit.reading import quoted
 
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
@@ -64,7 +65,7 @@ def frozen(name: str, values: ArrayLike, shape: tuple[int | str, ...]) -> Array:
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} must be numbers of shape {sides}, got {values!r}") from None
+        raise InputError(f"{name} must be numbers of shape {sides}, got {quoted(values)}") from None
     fits = array.ndim == len(shape) and all(
         isinstance(side, str) or side == length for side, length in zip(shape, array.shape, strict=True)
     )

@@ -4,6 +4,9 @@ The commands stand in `tracking`, `ambiguity`, `sweeping`, `motions`, `suite` an
 `posefit.hooks`. What each does is imported when it runs.
 """
 
+import os
+import sys
+import threading
 from typing import Any
 
 import click
@@ -13,8 +16,10 @@ from posefit.cli.ambiguity import ambiguity
 from posefit.cli.motions import motions
 from posefit.cli.output import say
 from posefit.errors import InputError
+from posefit.reading import cut
 from posefit.version import __version__
 
+THREAD_SECONDS = 1.0  # that threads have to end after a command
 MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 BUILT_IN = (
     tracking.track,
@@ -70,3 +75,19 @@ def main(debug: bool) -> None:
 
 for _command in BUILT_IN:
     main.add_command(_command)
+
+
+def run() -> None:
+    """Run the command that was asked for, and end the process even where a plugin left a thread running."""
+    try:
+        main()
+    except SystemExit as end:
+        left = [one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread()]
+        for thread in left:
+            thread.join(THREAD_SECONDS / len(left))
+        names = ", ".join(sorted({thread.name for thread in left if thread.is_alive()}))
+        if names:
+            say(f"posefit: not waiting for what a plugin left running: {cut(names)}")
+            sys.stdout.flush()
+            os._exit(end.code if isinstance(end.code, int) else 0 if end.code is None else 1)
+        raise

@@ -11,7 +11,7 @@ import click
 
 from posefit.errors import InputError
 from posefit.hooks import ClaimedOrder
-from posefit.reading import suggestion
+from posefit.reading import quoted, suggestion
 from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
 
@@ -50,7 +50,7 @@ def explanation(registry: Registry, name: str) -> Iterator[str]:
     mine = [offer for offer in offers if offer.name == name]
     if not mine:
         known = sorted({offer.name for offer in offers})
-        raise InputError(f"plugin must be one of {', '.join(known)}, got {name!r}{suggestion(name, known)}")
+        raise InputError(f"plugin must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}")
     for offer in mine:
         text = getdoc(offer.factory) or ""
         listed = settings_in(text)

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from posefit.errors import InputError
+from posefit.reading import quoted
 from posefit.tracking.options import TrackOptions, declared, text_range
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -52,7 +53,7 @@ def box(text: str) -> tuple[int, ...]:
     """Return the left, the top, the width and the height of a text X,Y,WIDTH,HEIGHT."""
     parts = text.split(",")
     if len(parts) != 4 or not all(part.strip().isdigit() for part in parts):
-        raise InputError(f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {text!r}")
+        raise InputError(f"expected X,Y,WIDTH,HEIGHT in pixels such as 0,420,1400,570, got {quoted(text)}")
     return tuple(map(int, parts))
 
 

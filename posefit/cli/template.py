@@ -12,6 +12,7 @@ from typing import Literal
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.hooks import PROJECT
+from posefit.reading import quoted
 from posefit.registry import KINDS, Kind, command_plugins, registry
 
 COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
@@ -27,9 +28,9 @@ def write_plugin(
     be a plugin's, or the folder is there already.
     """
     if kind not in (*KINDS, COMMAND):
-        raise InputError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {kind!r}")
+        raise InputError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {quoted(kind)}")
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
-        raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {name!r}")
+        raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}")
     if name in (known := _taken(kind, own)):
         raise InputError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
     module = name.replace("-", "_")

@@ -62,4 +62,4 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
     """Return nothing. Raises ValueError listing the choices where a value is none of them."""
     known = tuple(known)
     if value not in known:
-        raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}")
+        raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}")

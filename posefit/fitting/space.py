@@ -47,7 +47,7 @@ class SearchSpace:
 
     def __post_init__(self) -> None:
         if self.translation not in TRANSLATIONS:
-            raise InputError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {self.translation!r}")
+            raise InputError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {quoted(self.translation)}")
         if self.root_order == "xyz" and self.tilt is not None:
             raise InputError('tilt must be "box" where the root is in the order xyz, got a learned one')
         for name in ("root_range", "translation_range"):

@@ -22,6 +22,7 @@ from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
+from posefit.reading import quoted
 from posefit.silhouette.cost import pose_costs
 from posefit.silhouette.drawn import PoseCount, uncounted
 
@@ -55,9 +56,9 @@ class CheckedOptimiser:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
         with plugin_errors(self._name, "ask", self._limit):
             proposals = self._optimiser.ask()
-        if not isinstance(proposals, np.ndarray) or proposals.shape[1:] != (self._space.dimensions,):
-            shape = getattr(proposals, "shape", None)
-            came = type(proposals).__name__ if shape is None else f"shape {shape}"
+        plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
+        if not plain or proposals.shape[1:] != (self._space.dimensions,):
+            came = f"shape {proposals.shape}" if plain else type(proposals).__name__
             raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
         if proposals.dtype.kind != "f":
             raise self._broken(f"ask must return numbers of type float64, got {proposals.dtype}")
@@ -223,9 +224,9 @@ class AuditedTracker:
         if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
             raise self._broken(f"a translation must be 3 finite metres, got {frame.translation}")
         if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
-            raise self._broken(f"evaluations must be a whole number, 0 or more, got {frame.evaluations!r}")
+            raise self._broken(f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}")
         if not isinstance(frame.seconds, float | int | np.number) or not 0.0 <= frame.seconds < math.inf:
-            raise self._broken(f"seconds must be a number, 0 or more, got {frame.seconds!r}")
+            raise self._broken(f"seconds must be a number, 0 or more, got {quoted(frame.seconds)}")
 
     def _counted(self, frame: Frame, number: int, counted: int, leeway: int) -> Frame:
         """Return the frame with the evaluations that were counted, where it reports fewer, and note it."""

@@ -18,6 +18,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
 from posefit.geometry.camera import Camera
+from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
@@ -164,4 +165,6 @@ def _fitting(calibration: Calibration, size: tuple[int, int], *, scaled: bool = 
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration
-    raise InputError(f"camera {calibration.name!r} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}")
+    raise InputError(
+        f"camera {quoted(calibration.name)} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
+    )

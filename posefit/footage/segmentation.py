@@ -19,6 +19,7 @@ from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span
 from posefit.footage.quality import FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video
+from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
 from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, person
@@ -73,7 +74,7 @@ class Extraction:
             offers = registry().offers["segmenter"].values()
             takers = [other.name for other in offers if "background" in [setting.name for setting in other.settings]]
             if self.name not in takers:
-                came = f"{self.background!r} with {self.name}"
+                came = f"{quoted(self.background)} with {self.name}"
                 raise InputError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
             object.__setattr__(self, "settings", {**self.settings, "background": self.background})
         check(self.name, offer.factory, self.settings)
@@ -119,7 +120,7 @@ class VideoFootage:
         """Return a picture of the video's size as the video shows it. Raises InputError where there is none."""
         image = read_image(path, grey=False)
         if image is None:
-            raise InputError(f"background must be frames A:B or an image, got {path!r}")
+            raise InputError(f"background must be frames A:B or an image, got {quoted(path)}")
         (tall, wide), (width, height) = image.shape[:2], self.video.size
         if (wide, tall) != (width, height):
             raise InputError(f"{path}: background must have the video's size {width}x{height}, got {wide}x{tall}")

@@ -88,7 +88,7 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     images most. Raises ValueError where `up` is none.
     """
     if up is not None and up not in TURNS:
-        raise InputError(f"up must be one of x, y, z, got {up!r}")
+        raise InputError(f"up must be one of x, y, z, got {quoted(up)}")
     placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
     if not placed or any(camera.upright for camera in calibrations):
         return np.eye(3)

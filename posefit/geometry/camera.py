@@ -9,7 +9,7 @@ import numpy as np
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
-from posefit.reading import parsed_json, read_text
+from posefit.reading import parsed_json, quoted, read_text
 
 LARGEST_SIDE = 16_384  # pixels
 LARGEST_FILE = 1_000_000  # bytes
@@ -33,7 +33,7 @@ class Camera:
         for name in ("width", "height"):
             side = getattr(self, name)
             if isinstance(side, bool) or not isinstance(side, int | np.integer) or not 1 <= side <= LARGEST_SIDE:
-                raise InputError(f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {side!r}")
+                raise InputError(f"{name} must be a whole number from 1 to {LARGEST_SIDE}, got {quoted(side)}")
             object.__setattr__(self, name, int(side))
         for name, shape in (("focal", (2,)), ("centre", (2,)), ("rotation", (3, 3)), ("translation", (3,))):
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))

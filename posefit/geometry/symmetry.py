@@ -18,6 +18,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles, wrapped
 from posefit.geometry.skeleton import INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.reading import quoted
 
 Limbs = Literal["legs", "arms"]
 
@@ -71,7 +72,7 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
     cross, and the silhouette is nearly the same whichever of them is in front.
     """
     if limbs not in _BONES:
-        raise InputError(f"limbs must be one of {', '.join(_BONES)}, got {limbs!r}")
+        raise InputError(f"limbs must be one of {', '.join(_BONES)}, got {quoted(limbs)}")
     return _exchanged(skeleton, poses, _BONES[limbs])
 
 

@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
-from posefit.reading import SHOWN, check_size, cut
+from posefit.reading import SHOWN, check_size, cut, quoted
 
 INCH = 0.0254  # metres
 METRES_PER_UNIT = INCH / 0.45  # CMU's files say `length 0.45`: a unit is 1 / 0.45 inch
@@ -231,14 +231,14 @@ def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
                 raise line.mistake("bones that :bonedata defines", repr(name))
         for name in line.words[1:]:
             if name in parents or name == "root":
-                raise line.mistake("one parent a bone", f"another one for {name!r}")
+                raise line.mistake("one parent a bone", f"another one for {quoted(name)}")
             parents[name] = line.words[0], line
     for name, above in zip(BONES, PARENTS[1:], strict=True):
         if name not in parents:
             raise lines[-1].mistake(f"bone {name!r} in the hierarchy", "none")
         parent, line = parents[name]
         if parent != JOINTS[above]:
-            raise line.mistake(f"bone {name!r} under {JOINTS[above]!r}", f"it under {parent!r}")
+            raise line.mistake(f"bone {name!r} under {JOINTS[above]!r}", f"it under {quoted(parent)}")
 
 
 def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = METRES_PER_UNIT) -> None:

@@ -27,7 +27,7 @@ from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Chan
 from posefit.motion.amc import SIZE_LIMIT, VALUES
 from posefit.motion.asf import LARGEST, checked_unit, mistake
 from posefit.motion.motion import LONGEST, Motion
-from posefit.reading import check_size, cut
+from posefit.reading import check_size, cut, quoted
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
     "hipjoint": "HipJoint",
@@ -150,7 +150,7 @@ def _offsets(path: Path, nodes: list[Any]) -> Array:
         parent, expected = nodes[joint].parent, nodes[above] if above >= 0 else None
         if parent is not expected:
             wanted = f"right under {expected.name!r}" if expected else "as the ROOT"
-            got = f"it under {parent.name!r}" if parent else "it as the ROOT"
+            got = f"it under {quoted(parent.name)}" if parent else "it as the ROOT"
             raise InputError(f"{path}: expected joint {nodes[joint].name!r} {wanted}, got {got}")
     near = SAME_PLACE * max(float(np.linalg.norm(node.offset)) for node in nodes[1:])
     offsets = np.zeros((len(nodes), 3))  # of the root, too: its children must start where it is

@@ -6,6 +6,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera
+from posefit.reading import quoted
 from posefit.silhouette.mask import Silhouette
 
 
@@ -37,5 +38,5 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
 
 def _first(factor: int, size: tuple[int, int]) -> int:
     if isinstance(factor, bool) or not isinstance(factor, int | np.integer) or not 1 <= factor <= min(size):
-        raise InputError(f"factor must be a whole number from 1 to the smaller side {min(size)}, got {factor!r}")
+        raise InputError(f"factor must be a whole number from 1 to the smaller side {min(size)}, got {quoted(factor)}")
     return int(factor) // 2

@@ -21,7 +21,8 @@ from typing import Any
 
 from posefit import testing
 from posefit.errors import InputError
-from posefit.limits import memory
+from posefit.limits import end_with_parent, memory
+from posefit.reading import quoted
 from posefit.testing import results
 from posefit.testing.results import Check, Report, Result, not_run
 
@@ -35,7 +36,7 @@ def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: S
     Raises ValueError where a setting or a check is wrong, or the plugin cannot be loaded.
     """
     task: dict[str, Any] = {"kind": kind, "name": name, "settings": list(settings), "only": list(only)}
-    task |= {"path": sys.path, "seconds": results.SECONDS, "overrun": OVERRUN_SECONDS}
+    task |= {"parent": os.getpid(), "path": sys.path, "seconds": results.SECONDS, "overrun": OVERRUN_SECONDS}
     done: list[Result] = []
     while True:
         messages, end = _messages(task)
@@ -87,6 +88,7 @@ def _check() -> int:
     faulthandler.enable()
     out = os.fdopen(_stdout_kept_apart(), "w", encoding="utf-8")
     task = json.load(sys.stdin)
+    end_with_parent(task["parent"])
 
     def send(**message: Any) -> None:
         out.write(json.dumps(message) + "\n")
@@ -125,7 +127,7 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     names = [check.name for check in checks]
     for rule in only:
         if rule not in names:
-            raise InputError(f"--only must be one of {', '.join(names)}, got {rule!r}")
+            raise InputError(f"--only must be one of {', '.join(names)}, got {quoted(rule)}")
     return offer.label, [check for check in checks if not only or check.name in only]
 
 

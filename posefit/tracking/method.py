@@ -28,7 +28,7 @@ from posefit.fitting.validation import (
 )
 from posefit.footage.source import Footage, kind_of
 from posefit.motion import built_in, recorded
-from posefit.reading import suggestion
+from posefit.reading import quoted, suggestion
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.modes import WeighingTracker
@@ -63,7 +63,8 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
     raise InputError(
-        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {method!r}{suggestion(optimiser, known)}"
+        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, "
+        f"got {quoted(method)}{suggestion(optimiser, known)}"
     )
 
 
@@ -172,9 +173,9 @@ def parsed_settings(
         left, equals, value = item.partition("=") if texts else (item, "=", None)
         name, dot, setting = left.partition(".")
         if not (equals and dot):
-            raise InputError(f"--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {item!r}")
+            raise InputError(f"--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
-            raise InputError(f"--set must name one of {', '.join(places)}, which are in use here, got {item!r}")
+            raise InputError(f"--set must name one of {', '.join(places)}, which are in use here, got {quoted(item)}")
         each[name][setting] = given[item] if isinstance(given, Mapping) else value
     parsed: dict[str, dict[str, Any]] = {}
     for name, (kind, factory) in places.items():

@@ -148,7 +148,7 @@ def text_size(text: str) -> tuple[int, int]:
     """Return the width and the height of a text WxH. Raises InputError where it is none."""
     width, _, height = text.lower().partition("x")
     if not (width.isdigit() and height.isdigit()):
-        raise InputError(f"expected WIDTHxHEIGHT such as 320x240, got {text!r}")
+        raise InputError(f"expected WIDTHxHEIGHT such as 320x240, got {quoted(text)}")
     return int(width), int(height)
 
 
@@ -160,7 +160,7 @@ def text_range(text: str) -> tuple[int | None, int | None]:
             return int(start) if start else None, int(stop) if stop else None
     except ValueError:
         pass
-    raise InputError(f"expected A:B such as 0:50, :50 or 10:, got {text!r}")
+    raise InputError(f"expected A:B such as 0:50, :50 or 10:, got {quoted(text)}")
 
 
 def text_label(text: str) -> int:
@@ -168,7 +168,7 @@ def text_label(text: str) -> int:
     try:
         return int(text, 0)
     except ValueError:
-        raise InputError(f"expected a whole number such as 15, or a colour 0xRRGGBB, got {text!r}") from None
+        raise InputError(f"expected a whole number such as 15, or a colour 0xRRGGBB, got {quoted(text)}") from None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -85,7 +85,7 @@ class OutputFolder(Output):
         if self.path.exists() and (others := other_entries(self.path, _MINE)):
             came = f"one with {cut(others[0])}"
             raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
-        self._recorded = 0
+        self._recorded, self._force = 0, force
         self._place = self._same() if resume else None
 
     def _same(self) -> Unfinished:
@@ -118,7 +118,7 @@ class OutputFolder(Output):
         assert self._place is not None
         if kind is None:
             try:
-                self._place.finish(_MINE)
+                self._place.finish(_MINE, self._force)
             except OSError as taken:
                 self._place.close()
                 where = f"{taken.strerror}; the results are in {self._building}"

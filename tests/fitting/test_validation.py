@@ -47,6 +47,8 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
         (np.zeros((40, 8)), r"ask must return an array of shape \(n, 9\), got shape \(40, 8\)"),
         (np.zeros(9), r"ask must return an array of shape \(n, 9\), got shape \(9,\)"),
         ([[0.0] * 9], r"ask must return an array of shape \(n, 9\), got list"),
+        (np.zeros((4, 9)).view(np.matrix), r"ask must return an array of shape \(n, 9\), got matrix"),
+        (np.ma.zeros((4, 9)), r"ask must return an array of shape \(n, 9\), got MaskedArray"),
         (None, r"ask must return an array of shape \(n, 9\), got NoneType"),
         (np.zeros((4, 9), dtype=int), "ask must return numbers of type float64, got int64"),
         (np.full((4, 9), 1.5), r"ask must return proposals in \[-1, 1\], got 1.5"),

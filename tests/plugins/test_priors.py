@@ -12,6 +12,7 @@ from posefit.arrays import Array
 from posefit.cli import main
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import built_in
+from posefit_priors import sklearn
 from posefit_priors.full import Full
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
@@ -164,6 +165,22 @@ def test_parameters_of_a_transformer_can_be_given() -> None:
     assert floor(loose, poses) != floor(tight, poses)
 
 
+def test_a_file_may_name_decompositions_alone_and_has_a_limited_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prior = Transformed(variant="PCA").fit(angles("walk-a"))
+    path = tmp_path / "prior.npz"
+    prior._settings[0] = "FunctionTransformer"
+    prior.save(path)
+    with pytest.raises(ValueError, match="prior.npz: .*variant must be one of DictionaryLearning"):
+        Transformed.load(path)
+    prior._settings[:3] = ["SparsePCA", 9, '{"tol": 0, "max_iter": 1000000000}']
+    prior.save(path)
+    monkeypatch.setattr(sklearn, "LOADING_SECONDS", 0.5)
+    with pytest.raises(ValueError, match=r"prior.npz: expected a prior learned in 0.5 s, got a slower one"):
+        Transformed.load(path)
+
+
 # loose
 
 
@@ -252,7 +269,7 @@ def test_mistakes_in_settings_are_named() -> None:
         (PCA, {"components": 2.5}, "components must be a whole number or a share"),
         (PCA, {"clusters": 0}, "clusters must be at least 1, got 0"),
         (PCA, {"quantile": 0.0}, "quantile must lie in 0 to 1"),
-        (Transformed, {"variant": "TSNE"}, r"variant must be a transformer with an inverse, such as .*, got 'TSNE'"),
+        (Transformed, {"variant": "TSNE"}, "variant must be one of .*, got 'TSNE'"),
         (Transformed, {"variant": "KMeans"}, "got 'KMeans'"),
         (Transformed, {"options": "gamma=1"}, "options must be a JSON object, got 'gamma=1'"),
         (Transformed, {"options": "[1]"}, "options must be a JSON object"),

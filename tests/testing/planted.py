@@ -122,6 +122,12 @@ class KnowsItsRows(Sound):
         super().tell(proposals, costs)
 
 
+class LeavesAThread(Sound):
+    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
+        super().__init__(space, rng)
+        threading.Thread(target=time.sleep, args=(120.0,), name="planted").start()
+
+
 class Talks(Sound):
     """Prints whatever it does, by Python and past it; nothing else is wrong with it."""
 
@@ -383,6 +389,14 @@ class CostsNothing(Holds):
         return replace(super().frame(observation), cost=0.0, history=np.zeros(1))
 
 
+class ChangesTheMask(Holds):
+    """Makes the mask what it has drawn."""
+
+    def frame(self, observation: Any) -> Frame:
+        observation.silhouettes[0].mask[:] = True
+        return super().frame(observation)
+
+
 class InventsAreas(Holds):
     def frame(self, observation: Any) -> Frame:
         return replace(super().frame(observation), areas=np.array([[0, 0, 100]]))
@@ -459,6 +473,7 @@ TRACKERS: dict[type, tuple[str, ...]] = {
     Remembers: ("used_twice",),
     SpendsAndSaysSo: ("audit",),
     SpendsInSecret: ("audit",),
+    ChangesTheMask: ("one_frame_each",),
     CostsNothing: ("audit",),
     InventsAreas: ("audit",),
     GivesFramesTwice: ("one_frame_each",),

@@ -24,7 +24,7 @@ def install(folder: Path, module: str = __name__, name: str = "sabotage") -> Pat
 
 @hookimpl
 def posefit_register_optimisers(register: Any) -> None:
-    for kind in (*planted.OPTIMISERS, *planted.RIGHT, *planted.APART):
+    for kind in (*planted.OPTIMISERS, *planted.RIGHT, *planted.APART, planted.LeavesAThread):
         register(named(kind), kind)
 
 

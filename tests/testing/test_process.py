@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +93,40 @@ def test_a_plugin_that_exits_ends_a_track_with_status_2_and_one_line() -> None:
         (line,) = [line for line in ran.stderr.splitlines() if line.startswith("posefit: ")]
         assert line.startswith(f"posefit: {blame} must not end the program, got SystemExit: 0")
         assert "Traceback" not in ran.stderr
+
+
+@pytest.mark.usefixtures("installed")
+def test_the_process_of_a_check_ends_with_the_one_that_started_it(tmp_path: Path) -> None:
+    words = ["check", "optimiser", "never-returns", "--only", "dtype"]
+    with (tmp_path / "err").open("w") as err:
+        ran = subprocess.Popen([sys.executable, "-m", "posefit", *words], stdout=subprocess.DEVNULL, stderr=err)
+        try:
+            wait_until(lambda: children(ran.pid))
+            (child,) = children(ran.pid)
+        finally:
+            ran.kill()
+            ran.wait()
+    wait_until(lambda: not Path(f"/proc/{child}/cmdline").exists() or not Path(f"/proc/{child}/cmdline").read_bytes())
+
+
+def children(process: int) -> list[int]:
+    """Return the processes that one has started."""
+    return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def wait_until(condition: Callable[[], Any]) -> None:
+    """Return once a condition holds. Raises AssertionError where that takes a minute."""
+    end = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending() -> None:
+    ran = posefit("track", "walk", "--method", "leaves-a-thread", "--frames", ":1", "--evaluations", "80")
+    assert ran.returncode == 0
+    assert ran.stderr.splitlines()[-1] == "posefit: not waiting for what a plugin left running: planted"
 
 
 @pytest.mark.usefixtures("installed")

@@ -62,6 +62,24 @@ def test_wrong_reports_of_a_tracker_are_corrected_with_a_warning(kind: Any, warn
             assert frame.evaluations == 20_001
 
 
+def test_a_tracker_cannot_change_what_it_is_compared_with() -> None:
+    with pytest.raises(BrokenRuleError, match="it must not fail, got ValueError: assignment destination is read-only"):
+        audited(planted.ChangesTheMask)
+
+    class ChangesTheBits(planted.Holds):  # which the kernel reads: where no pixel is known, nothing costs anything
+        def frame(self, observation: Any) -> Any:
+            for bits in observation.silhouettes[0].bits:
+                bits[:] = 0
+            return super().frame(observation)
+
+    audit, (task, _, observations) = Audit(), scene()
+    fresh = [replace(one, silhouettes=[replace(mask) for mask in one.silhouettes]) for one in observations]
+    tracker = AuditedTracker(ChangesTheBits(task), task, "tracker 'bad'", 0.5, audit)
+    costs = [frame.cost for frame in tracker.track(fresh, np.random.default_rng(0))]
+    assert costs == [frame.cost for frame in audited(planted.Holds)[0]]
+    assert len(audit.warnings) == 2  # of areas and of costs
+
+
 def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
     log: list[str] = []
     result = posefit.track("walk", method=planted.SpendsInSecret, progress=Progress(log.append), **QUICK)

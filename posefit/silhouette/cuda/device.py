@@ -4,6 +4,7 @@ from copy import copy
 from importlib.util import find_spec
 
 from posefit.errors import InputError
+from posefit.reading import quoted
 from posefit.silhouette.mask import Silhouette
 
 DEVICES = ("cpu", "cuda")
@@ -12,7 +13,7 @@ DEVICES = ("cpu", "cuda")
 def check_device(device: str) -> None:
     """Return nothing. Raises InputError for an unknown device, and for one that is not available."""
     if device not in DEVICES:
-        raise InputError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
+        raise InputError(f"device must be one of {', '.join(DEVICES)}, got {quoted(device)}")
     if device == "cuda" and (missing := _missing()):
         raise InputError(f"device cuda needs an NVIDIA GPU and posefit[gpu], got {missing}")
 

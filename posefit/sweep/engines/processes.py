@@ -18,13 +18,12 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import IO, Any, Generic
 
 from posefit.errors import InputError
-from posefit.limits import memory
+from posefit.limits import end_with_parent, memory
 from posefit.sweep.engines.engine import Ended, J, Limits, R, text_of
 
 IDLE_SECONDS = 60.0  # after which a process without a job ends; half of it after which it gets no other
 START_SECONDS = 60.0  # that a process may take to start
 GRACE_SECONDS = 5.0  # after its limit, in which a process ends itself
-POLL_SECONDS = 0.5  # between two checks whether the parent lives
 # Seconds that count at most between two checks: where the parent was stopped for an hour, its cells may finish
 MAX_POLL_SECONDS = 1.0
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -225,14 +224,7 @@ def become_worker() -> None:
     cv2.setNumThreads(1)
     numba.set_num_threads(1)
     threadpool_limits(1)
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(POLL_SECONDS)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    end_with_parent(os.getppid())
 
 
 def main() -> None:
