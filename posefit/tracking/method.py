@@ -34,9 +34,9 @@ from posefit.silhouette.cost import BETA
 from posefit.tracking.modes import WeighingTracker
 from posefit.tracking.options import TrackOptions
 
-DEFAULT_OPTIMISER = "sapso"
+DEFAULT_OPTIMISER = "cma"
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
-DEFAULT_TRACKER = "exemplars"  # of footage, where it is installed
+DEFAULT_TRACKER = "exemplars"  # where it is installed
 FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
 
 
@@ -71,22 +71,23 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
 def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     """Return options whose method and training motions are known, by default those of the source.
 
-    A motion is tracked by `sapso@pca`, which learns from the other styles of a built-in motion, or else from the
-    built-in walks. Footage is tracked by `exemplars`, which learns from the library of recorded motions; where an
-    optimiser, a prior or settings of theirs are given, by `sapso@loose`. Other trackers than `exemplars` learn from the
-    built-in walks, too.
+    That is `exemplars`, which learns from the library of recorded motions. A built-in motion is tracked by `cma@pca`;
+    so is all else for which an optimiser, a prior or settings of theirs are given, by the optimiser that settings name,
+    and footage with the prior `loose`. These and other trackers learn from the other styles of a built-in motion, or
+    else from the built-in walks.
     """
-    footage, method = kind_of(source) != "motion", options.method
-    sets_search = any(name.partition(".")[0] != DEFAULT_TRACKER for name in options.settings)
-    searched = options.optimiser is not None or options.prior is not None or sets_search
-    if method is None and footage and not searched and DEFAULT_TRACKER in registry().offers["tracker"]:
+    known = isinstance(source, str) and source in built_in.names()
+    prior, method = DEFAULT_FOOTAGE_PRIOR if kind_of(source) != "motion" else DEFAULT_PRIOR, options.method
+    offers, set_names = registry().offers, {name.partition(".")[0] for name in options.settings}
+    searched = known or options.optimiser is not None or options.prior is not None or set_names - {DEFAULT_TRACKER}
+    if method is None and not searched and DEFAULT_TRACKER in offers["tracker"]:
         method = DEFAULT_TRACKER
     elif not callable(method):
-        method = str(method_names(method, DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR))
+        method = str(method_names(method or next(iter(set_names & {*offers["optimiser"]}), None), prior))
     train = options.train
-    if not train and footage and method == DEFAULT_TRACKER:
+    if not train and method == DEFAULT_TRACKER:
         train = [recorded.LIBRARY]
-    train = train or built_in.other_styles(source if isinstance(source, str) and source in built_in.names() else "walk")
+    train = train or built_in.other_styles(str(source) if known else "walk")
     return options.changed(method=method, train=train)
 
 

@@ -177,8 +177,8 @@ class TrackOptions:
 
     method: "str | TrackerFactory | None" = option(
         None,
-        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default sapso@pca, or exemplars "
-        "where the truth is not known.",
+        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or cma@pca "
+        "for a built-in motion.",
         unit="METHOD",
     )
     optimiser: "OptimiserFactory | None" = option(None, "An optimiser's factory instead of a name.", flag="")
@@ -194,7 +194,7 @@ class TrackOptions:
     train: "Sequence[Source]" = option(
         (),
         "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
-        "exemplars where the truth is not known, else other styles of a built-in motion, or walks.",
+        "exemplars, else other styles of a built-in motion, or walks.",
         _sources,
         "SOURCE",
         repeated=True,

@@ -206,7 +206,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     masks[6] = 0  # no person at all
     path = tmp_path / "a.npz"
     np.savez(path, masks=masks, usable=usable)
-    result = posefit.track(path, method="@loose", view_degrees=90, evaluations=400, smooth=False, out=tmp_path / "out")
+    result = posefit.track(path, method="sapso", view_degrees=90, evaluations=400, smooth=False, out=tmp_path / "out")
     assert result.summary["frames"] == 12
     assert result.summary["held_frames"] == 3
     assert result.summary["evaluations"] == 9 * 400

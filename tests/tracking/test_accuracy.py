@@ -12,7 +12,12 @@ import posefit
 def summaries(cmu: Path, view: float, seeds: range) -> list[dict[str, Any]]:
     return [
         posefit.track(
-            cmu / "16/16_17.amc", train=[cmu / "16/16_15.amc"], view_degrees=view, frames=(0, 60), seed=seed
+            cmu / "16/16_17.amc",
+            train=[cmu / "16/16_15.amc"],
+            view_degrees=view,
+            frames=(0, 60),
+            seed=seed,
+            method="sapso",
         ).summary
         for seed in seeds
     ]

@@ -14,7 +14,7 @@ from posefit.progress import Progress
 from posefit.tracking.identity import ArgumentDigest, difference
 from tests.cases import each
 
-QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
+QUICK: dict[str, Any] = {"method": "sapso", "frames": (0, 8), "size": (120, 90), "evaluations": 200}
 
 
 class StopError(Exception):
@@ -99,7 +99,7 @@ def test_the_first_difference_is_one_line() -> None:
 
 
 def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:
-    options: dict[str, Any] = {"method": "vsmm", "out": tmp_path / "out", **QUICK}
+    options: dict[str, Any] = {**QUICK, "method": "vsmm", "out": tmp_path / "out"}
     with pytest.raises(StopError):
         posefit.track("walk", progress=Progress(steps=stopping), **options)
     resumed = posefit.track("walk", resume=True, **options)

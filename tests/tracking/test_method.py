@@ -41,7 +41,7 @@ def test_mistakes_are_named() -> None:
     for settings, message in [
         ({"evaluations": 0}, "evaluations must be at least 1, got 0"),
         ({"evaluations": 100, "iterations": 4}, "evaluations and iterations must not both be given"),
-        ({"evaluations": 30}, "evaluations must hold one population of 40, got 30"),
+        ({"evaluations": 30, "method": "sapso"}, "evaluations must hold one population of 40, got 30"),
         ({"ask_seconds": 0.0}, "ask_seconds must be above 0, got 0.0"),
         ({"view_degrees": float("nan")}, "view_degrees must be a finite number, got nan"),
         ({"fps": 0.0}, "fps must be a positive number, got 0.0"),
@@ -245,15 +245,15 @@ def test_a_given_first_pose_starts_the_first_frame_around_it(seed: int) -> None:
 @each("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
 def test_every_prior_can_be_searched(prior: str) -> None:
     summary = posefit.track("walk", method=f"@{prior}", **QUICK).summary
-    assert summary["method"] == f"sapso@{prior}"
+    assert summary["method"] == f"cma@{prior}"
     assert summary["iou"] > 0.4
 
 
 def test_a_scene_is_tracked_as_it_is() -> None:
     motion = built_in.motion("walk", frames=3)
     scene = synthetic(motion, [45.0], (120, 90), [], (None, None))
-    result = posefit.track(scene, train=built_in.other_styles("walk"), evaluations=200)
-    by_name = posefit.track(motion, train=built_in.other_styles("walk"), evaluations=200, size=(120, 90))
+    how = {"method": "sapso", "train": built_in.other_styles("walk"), "evaluations": 200}
+    result, by_name = posefit.track(scene, **how), posefit.track(motion, **how, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
     assert [frame.cost for frame in result.estimates] == [row["cost"] for row in result.frames]
     with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
