@@ -119,10 +119,11 @@ def test_limits_of_memory_and_time_segfaults_and_exceptions_are_the_cells_own_fa
         fake.SEGFAULT: "its process died of SIGSEGV",
         fake.HOG: "it wanted more memory than its limit of 0.6 GB",
         fake.RAISE: "ZeroDivisionError: one by none",
-        fake.ENDLESS: "it ran past its limit of 5 s",
     }
-    ended = one_by_one(make(1, Limits(5.0, 0.6)), [replace(cells(1)[0], frames=n) for n in reasons])
+    ended = one_by_one(make(1, Limits(600.0, 0.6)), [replace(cells(1)[0], frames=n) for n in reasons])
     assert [(outcome.reason, outcome.own) for outcome in ended] == [(reason, True) for reason in reasons.values()]
+    (endless,) = one_by_one(make(1, Limits(3.0, 0.6)), [replace(cells(1)[0], frames=fake.ENDLESS)])
+    assert (endless.reason, endless.own) == ("it ran past its limit of 3 s", True)
 
 
 def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> None:
