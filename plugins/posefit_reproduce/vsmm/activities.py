@@ -4,7 +4,7 @@ The patent's own recording is not public. Here the four activities are built-in 
 and view for every seed, that no motion model was fitted to; between them lie a few frames of blending.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -68,12 +68,12 @@ class Film:
 
 
 @lru_cache(maxsize=1)  # all methods follow the film of one seed before that of the next
-def film_of(seed: int) -> Film:
+def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
     """Return the film of a seed: masks taken from a film of it, by the mean background of the empty scene."""
     rng = np.random.default_rng(seed)
     parts = [
         built_in.motion(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
-        for one in ACTIVITIES
+        for one in activities
     ]
     poses = np.concatenate([part.poses for part in parts])
     places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])  # striding, but on the spot

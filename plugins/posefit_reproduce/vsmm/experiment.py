@@ -58,19 +58,17 @@ class PatentTrack:
     figures: dict[str, Any]
 
 
+def film_task(film: Film, evaluations: int, training: Sequence[str] = TRAINING) -> Task:
+    """Return what is known before a film; its first pose is not."""
+    yaw, place = float(film.truth.poses[0, 0]), film.truth.translations[0]
+    motions = [built_in.motion(one) for one in training]
+    return Task(film.body, [film.camera], evaluations, yaw, place, "aligned", film.truth.fps, motions)
+
+
 def follow_film(options: TrackOptions, seed: int) -> PatentTrack:
     """Follow the film of a seed with a method and return what it is worth; the first pose is not known."""
     film = film_of(seed)
-    task = Task(
-        film.body,
-        [film.camera],
-        options.budget,
-        float(film.truth.poses[0, 0]),
-        film.truth.translations[0],
-        "aligned",
-        film.truth.fps,
-        [built_in.motion(one) for one in TRAINING],
-    )
+    task = film_task(film, options.budget)
     with threadpool_limits(1):
         for observations in (film.observations[:WARMING], film.observations):
             frames = list(prepare(options, task).tracker(task).track(observations, np.random.default_rng(seed)))
