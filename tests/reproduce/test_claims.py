@@ -126,6 +126,13 @@ def test_claims_of_single_images_are_judged_by_their_runs(claims: list[PaperClai
     assert of(paper_claims(results(swapped=0.2)), "left and right").verdict == "the opposite holds"
 
 
+def test_claims_of_tracks_are_judged_by_their_size_and_their_joints(claims: list[PaperClaim]) -> None:
+    assert of(claims, "tracks err by about 4 degrees").verdict == "confirmed"  # 2 degrees and a little
+    few = of(claims, "frames with a high error")
+    assert few.verdict == "not confirmed"  # every joint errs alike
+    assert "3 of 22 joints hold 14 %, 14 % of the error" in few.evidence
+
+
 def test_dimensions_are_counted_among_the_free_ones(claims: list[PaperClaim]) -> None:
     turn = of(claims, "most dimensions err by less than 5 degrees on the walk with a turn")
     free = int(paper_motions(None, 1)["walk"].test.skeleton.free.sum())

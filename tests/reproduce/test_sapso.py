@@ -192,7 +192,7 @@ def test_a_turned_motion_keeps_its_steps_and_ends_to_the_left() -> None:
 
 
 def test_baselines_are_what_a_track_reports(walk: PaperMotion) -> None:
-    quick = {"population_size": 5, "iterations": 1}
+    quick = {"method": "sapso", "population_size": 5, "iterations": 1}
     degrees = track(paper_scene(walk, 45.0), train=walk.training, **quick).summary["baselines_degrees"]
     for name, poses in baseline_poses(walk, 45.0).items():
         away = np.degrees(np.abs(wrapped(poses - walk.test.poses)))

@@ -168,11 +168,9 @@ def repeat_paper(
 
 def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack:
     """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
-    unknown = scale.first_yaw == "unknown"  # Interpretation S17
-    scene = paper_scene(motion, key.view)
     results = track(
-        replace(scene, yaw=None) if unknown else scene,
-        restarts=RESTARTS if unknown else None,
+        paper_scene(motion, key.view, first_yaw=scale.first_yaw),
+        restarts=RESTARTS if scale.first_yaw == "unknown" else None,
         train=motion.training,
         method=key.method,
         settings=settings_of(key.method),
@@ -242,11 +240,12 @@ def baseline_poses(motion: PaperMotion, view: float) -> dict[str, Array]:
 
 def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array:
     """Return the lowest cost after each iteration (swarms, iterations + 1) in the first frame, for each N."""
-    scene = paper_scene(motion, view, (0, 1))
+    scene = paper_scene(motion, view, (0, 1), scale.first_yaw)
     tracks = [
         track(
             scene,
             train=motion.training,
+            method=OURS,
             population_size=count,
             iterations=scale.iterations,
             settings=DRIVEN,

@@ -42,7 +42,7 @@ class _Search:
 
 def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int = 0) -> WatchedSwarm:
     """Return the proposals of SAPSO in the first frame."""
-    scene = paper_scene(motion, scale.shown, (0, 1))
+    scene = paper_scene(motion, scale.shown, (0, 1), scale.first_yaw)
     searches: list[_Search] = []
 
     class Watched:
@@ -66,6 +66,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
     result = track(
         scene,
         optimiser=Watched,
+        method="@pca",
         train=motion.training,
         population_size=particles,
         iterations=scale.iterations,

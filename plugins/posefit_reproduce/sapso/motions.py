@@ -13,6 +13,7 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import motion_of
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit_reproduce.sapso.design import FirstYaw
 from posefit_reproduce.sapso.numbers import TRAINING_FRAMES
 
 SIZE = (320, 240)  # pixels
@@ -68,9 +69,10 @@ def _built_in(name: str, frames: int) -> PaperMotion:
     return PaperMotion(name, test, [built_in.motion(style, frames=count, fps=FPS) for style in styles])
 
 
-def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None)) -> Scene:
-    """Return a motion as a camera sees it."""
-    return synthetic(motion.test, [view], SIZE, [], frames)
+def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None), first_yaw: FirstYaw = "known") -> Scene:
+    """Return a motion as a camera sees it. Interpretation S17."""
+    scene = synthetic(motion.test, [view], SIZE, [], frames)
+    return scene if first_yaw == "known" else replace(scene, yaw=None)
 
 
 def turned(motion: Motion, degrees: float) -> Motion:
