@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from posefit import Camera
+from posefit.footage.video import VideoWriter
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
@@ -18,7 +19,9 @@ from posefit.silhouette.cost import project
 from posefit_priors.full import Full
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
+from posefit_priors.sklearn import Transformed
 from posefit_priors.union import Union
+from tests.footage.matroska import write_matroska
 from tests.geometry.calibrations import QUALISYS, TOML, opencv
 
 PLAN = """[defaults]
@@ -66,6 +69,16 @@ def corpus(folder: Path) -> list[Seed]:
         path = folder / "prior.npz"
         prior().fit(angles, motion.skeleton).save(path)
         seeds.append(Seed(prior.__name__, ".npz", path.read_bytes()))
+    for variant in ("PCA", "KernelPCA", "FactorAnalysis"):
+        Transformed(variant=variant, clusters=5).fit(angles[:40]).save(path)
+        seeds.append(Seed("Transformed", ".npz", path.read_bytes()))
+    pictures = [np.where(mask, 255, 0).astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
+    for suffix in (".mp4", ".avi"):
+        with VideoWriter(folder / f"video{suffix}", 30.0, (64, 48)) as writer:
+            for picture in pictures:
+                writer.write(picture)
+        seeds.append(Seed("video", suffix, (folder / f"video{suffix}").read_bytes()))
+    seeds.append(Seed("video", ".mkv", write_matroska(folder / "video.mkv", pictures, [0, 33, 99]).read_bytes()))
     texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
     texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]

@@ -13,6 +13,7 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,14 @@ from tests.fuzz.mutator import mutated
 NAME = "subject"  # what every input is called, so that a message can be seen to name it
 ADDRESSES = 6_000_000_000  # bytes of addresses that a child may have more than it has at first
 CELLS = 2_000  # of a plan here: a million are allowed, and reading takes as long as there are cells
-LONGEST = 2_000  # characters of a message
+LONGEST = 400  # characters of a message
 
 
 def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of file, as far as a user's file goes before anything is searched."""
     from posefit.footage.masks import Views
     from posefit.footage.readers import read_masks
+    from posefit.footage.video import Video
     from posefit.geometry.calibration import read_calibrations, upright
     from posefit.motion.amc import read_amc
     from posefit.motion.asf import read_asf
@@ -38,6 +40,7 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit_priors.full import Full
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA
+    from posefit_priors.sklearn import Transformed
     from posefit_priors.union import Union
 
     skeleton = read_asf(folder / "a.asf")
@@ -56,6 +59,10 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     def calibration(path: Path) -> object:
         cameras = read_calibrations(path)
         return [(camera.camera((64, 48), upright(cameras)), camera.maps((64, 48))) for camera in cameras]
+
+    def video(path: Path) -> object:
+        filmed = Video.of(path)
+        return filmed.warnings, [image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)]
 
     def ledger(path: Path) -> object:
         room = path.parent / f"{NAME}-ledger"
@@ -78,9 +85,10 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         "masks": masks,
         "images": images,
         "calibration": calibration,
+        "video": video,
         "plan": plan.Plan.read,
         "ledger": ledger,
-        **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Union)},
+        **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Union, Transformed)},
     }
 
 
