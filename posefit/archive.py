@@ -151,9 +151,12 @@ def archived(path: Path, names: Sequence[str], what: str, packed: int) -> Iterat
 
 
 def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mapping[str, NDArray[Any]]:
-    """Return those of `names` that an .npz file has, of `most` bytes together. Raises InputError as `archived` does."""
+    """Return those of `names` that an .npz file has, of `most` bytes together, 8 or more for each value.
+
+    Raises InputError as `archived` does.
+    """
     with archived(path, names, what, most) as arrays:
-        size = sum(one.size for one in arrays.values())
+        size = sum(max(one.size, 8 * math.prod(one.shape)) for one in arrays.values())
         if size > most:
             came = f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most"
             raise InputError(f"{path}: expected an .npz file with {what}, got {came}")

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from posefit.errors import printable
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -32,6 +34,6 @@ def interactive() -> Progress:
     from tqdm.auto import tqdm
 
     def log(message: str) -> None:
-        tqdm.write(message, file=sys.stderr)
+        tqdm.write(printable(message), file=sys.stderr)
 
     return Progress(log, lambda steps, count: iter(tqdm(steps, total=count, unit="frame", dynamic_ncols=True)))

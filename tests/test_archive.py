@@ -56,6 +56,9 @@ def test_what_would_unpack_to_more_is_refused_before_it_is(path, monkeypatch):
         pytest.raises(ValueError, match=REFUSED + "4.*e-05 GB when unpacked, where 3e-05 GB are the most"),
     ):
         read(path, 30_000)
+    np.savez_compressed(path, a=np.zeros(5_000, dtype=bool))  # each becomes a number of eight bytes
+    with pytest.raises(ValueError, match=REFUSED + "4e-05 GB when unpacked, where 3.9e-05 GB are the most"):
+        read(path, 39_000)
 
 
 def test_objects_and_foreign_packing_and_other_sizes_are_refused(tmp_path):

@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import at_least
 
-LARGEST = 500_000_000  # bytes of a file, packed and unpacked; a space learned from 200,000 poses has 100 MB
+LARGEST = 250_000_000  # bytes of a file, and of its arrays as float64; a space learned from 200,000 poses has 100 MB
 Shape = tuple[str | int, ...]
 
 

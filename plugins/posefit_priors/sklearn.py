@@ -24,6 +24,7 @@ VARIANTS = (
     "DictionaryLearning", "FactorAnalysis", "FastICA", "IncrementalPCA", "KernelPCA", "MiniBatchDictionaryLearning",
     "MiniBatchSparsePCA", "PCA", "SparsePCA", "TruncatedSVD",
 )  # fmt: skip
+KERNEL_POSES = 5_000  # of a KernelPCA, whose memory is their square
 LOADING_SECONDS = 10.0  # a space of a file may take to be learned again
 DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}
 
@@ -70,6 +71,8 @@ class Transformed:
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
         self._angles = angles_of(angles, max(self._clusters, self._components + 1))
+        if self._transformer[0] == "KernelPCA" and len(self._angles) > KERNEL_POSES:
+            raise InputError(f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(self._angles)}")
         self._model = _built(*self._transformer)
         with timed(self._limit):
             self._model.fit(self._angles)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from posefit.errors import printable
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit.tracking.trust import trust_line
 
@@ -61,7 +62,7 @@ def table(summary: Mapping[str, Any]) -> str:
         f"{MEASURES['seconds_per_frame'].number(summary['seconds_per_frame'])} ms a frame, "
         f"{MEASURES['evaluations_per_second'].number(summary['evaluations_per_second'])} poses a second"
     )
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))  # the names of files are among them
 
 
 def undetermined(summary: Mapping[str, Any]) -> str:

@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 
 import posefit
 from posefit.cli import main
+from posefit.cli.output import say
 from posefit.errors import InputError
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
@@ -462,6 +463,12 @@ def test_a_command_loads_no_library_that_it_can_do_without(command: str, librari
     )
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.splitlines()[-1] == "[]"
+
+
+def test_names_from_outside_do_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    say("warning: a\x1b]0;b\x07.mp4\nsecond line")
+    assert capsys.readouterr().err == "warning: a\\x1b]0;b\\x07.mp4\nsecond line\n"
+    assert fails("track", "a\x1b[31m\nb.amc").startswith(r"posefit: a\x1b[31m\nb.amc: expected ")
 
 
 def test_a_mistake_is_one_line_and_a_fault_of_the_program_is_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -177,6 +177,11 @@ def test_a_file_may_name_decompositions_alone_and_has_a_limited_time(
     prior.save(path)
     with pytest.raises(ValueError, match="prior.npz: .*variant must be one of DictionaryLearning"):
         Transformed.load(path)
+    prior._settings[0] = "KernelPCA"
+    prior._angles = np.zeros((5_001, 63))  # a few kilobytes, from which scikit-learn makes a gigabyte
+    prior.save(path)
+    with pytest.raises(ValueError, match=r"prior.npz: .*KernelPCA must learn from at most 5000 poses, got 5001"):
+        Transformed.load(path)
     prior._settings[0] = "PCA"
     prior.save(path)
     monkeypatch.setattr(sklearn, "LOADING_SECONDS", 0.1)
