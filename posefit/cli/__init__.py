@@ -35,12 +35,32 @@ BUILT_IN = (
 )
 
 
+GROUPS = {
+    "Follow a person": "track fit extract ambiguity",
+    "Compare methods": "sweep report suite",
+    "Look around": "motions plugins check",
+}
+
+
+def _sentence(command: click.Command) -> str:
+    return " ".join((command.help or "").split("\n\n")[0].split())
+
+
 class _Commands(click.Group):
     """Has plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors have a traceback."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Return the names of all commands: those of plugins come last."""
         return [*self.commands, *_added()]
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by what they are for, each with its whole first sentence; those of plugins last."""
+        names = [name for group in GROUPS.values() for name in group.split()]
+        groups = GROUPS | {"From plugins": " ".join(name for name in self.list_commands(context) if name not in names)}
+        for heading, group in groups.items():
+            commands = {name: self.get_command(context, name) for name in group.split()}
+            with formatter.section(heading):
+                formatter.write_dl([(name, _sentence(one)) for name, one in commands.items() if one is not None])
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
         """Return a command; plugins are looked at for those alone that posefit does not have itself."""
@@ -70,7 +90,13 @@ def _added() -> dict[str, click.Command]:
 @click.version_option(__version__, prog_name="posefit")
 @click.option("--debug", is_flag=True, help="Show the traceback of a mistake instead of one line.")
 def main(debug: bool) -> None:
-    """Recover a person's 3D pose from silhouettes, by searching."""
+    """Recover a person's 3D motion from masks, by searching.
+
+    \b
+    posefit track walk --out walk           a first track: open walk/track.html
+    posefit track video.mp4 --out walker    a person before a still background
+    posefit sweep default --out results     compare nine methods
+    """  # noqa: D301
 
 
 for _command in BUILT_IN:

@@ -103,6 +103,30 @@ ENGINE = (
 )
 
 
+HEADINGS = {  # the options of a track in its help, by their names in Python
+    "What is seen": "live asf camera up view_degrees size fps frames frame height label holes",
+    "How the person is taken out of video": "extraction background roi ignore width",
+    "Method and budget": "method settings train without_subject evaluations population_size iterations ask_seconds "
+    "seed threads device",
+    "How it is followed": "translation first_pose restarts body_frames hypotheses smooth passes",
+    "Results": "out force resume rerun as_json",
+}
+
+
+class TrackCommand(click.Command):
+    """A command with the options of a track, whose help lists them under headings."""
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options: those of no heading last."""
+        flags = [one for one in self.get_params(context) if isinstance(one, click.Option)]
+        records = {one.name: record for one in flags if (record := one.get_help_record(context))}
+        for heading, names in HEADINGS.items():
+            with formatter.section(heading):
+                formatter.write_dl([records.pop(name) for name in names.split() if name in records])
+        with formatter.section("Others"):
+            formatter.write_dl(list(records.values()))
+
+
 def options(chosen: Sequence[Decorator]) -> Decorator:
     """Return a decorator that gives a command some options."""
 

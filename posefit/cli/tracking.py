@@ -7,13 +7,13 @@ from typing import Any
 
 import click
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, options
+from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options
 from posefit.cli.output import json_line, progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
 
 
-@click.command()
+@click.command(cls=TrackCommand)
 @options(TRACK)
 @FRAMES
 @click.option(
@@ -22,8 +22,14 @@ from posefit.progress import Progress
 def track(as_json: bool, live: str | None, **options: Any) -> None:
     """Track a person through SOURCE.
 
-    A built-in motion, an .amc or .bvh file, a folder or .npz of masks, a video; or what several cameras saw.
-    """
+    A video; masks as a folder, image files, .npz or .npy; a built-in or recorded motion, an .amc or .bvh file. Several
+    sources are what several cameras saw at the same time.
+
+    \b
+    posefit track masks/ --fps 25 --height 1.75 --out walker
+    posefit track left.mp4 right.mp4 --camera cameras.toml --out walker
+    posefit track walk --method sapso@pca --set sapso.cooling=0.9
+    """  # noqa: D301
     from posefit.tracking.front import track as run
 
     if live is not None:
@@ -34,11 +40,16 @@ def track(as_json: bool, live: str | None, **options: Any) -> None:
     _print(result.summary, as_json, {}, options["out"], "open track.html, watch overlay.mp4, look at summary.png")
 
 
-@click.command()
+@click.command(cls=TrackCommand)
 @options(TRACK)
 @click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
 def fit(as_json: bool, **options: Any) -> None:
-    """Find the pose in one frame of SOURCE."""
+    """Find the pose in one frame of SOURCE.
+
+    \b
+    posefit fit mask.png --height 1.75 --out pose
+    posefit fit walk --frame 20 --method cma
+    """  # noqa: D301
     from posefit.tracking.front import fit as run
 
     with results_alone() if as_json else nullcontext():
