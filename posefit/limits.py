@@ -14,6 +14,8 @@ from types import FrameType
 from posefit.errors import InputError
 from posefit.reading import quoted
 
+SECONDS = 1e-3, 1e8  # of a limit: what timers of operating systems take
+GIGABYTES = 1e-3, 1e6
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 PARENT_POLL_SECONDS = 0.5
 SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off

@@ -18,6 +18,7 @@ LINES = 1000  # that are printed at a time
 @click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
 @options(ENGINE)
 @click.option("--dry-run", is_flag=True, help="Print the cells and about how long they take, and run none.")
+@click.option("--keep-old", is_flag=True, help="Rows of another version of posefit or a plugin count, too.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 @click.pass_context
@@ -28,6 +29,7 @@ def sweep(
     out: str | None,
     dry_run: bool,
     retry_quarantined: bool,
+    keep_old: bool,
     as_json: bool,
     **places: Any,
 ) -> None:
@@ -51,7 +53,7 @@ def sweep(
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        tally = command.run_plan(plan, out, start, say, retry_quarantined)
+        tally = command.run_plan(plan, out, start, say, retry_quarantined=retry_quarantined, keep_old=keep_old)
     click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(command.exit_status(tally))
 

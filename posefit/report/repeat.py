@@ -16,7 +16,7 @@ _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x20
 def repeat_command(spec: Mapping[str, Any]) -> str:
     """Return the shell command that runs the cell of a spec again, with the ledger `rerun`."""
     if not is_search(spec):
-        return command_head(spec) + "".join(f"{name} = {spec[name]}\n" for name in LAST_FIELDS) + "END"
+        return command_head(spec) + "".join(f"{name} = {_toml(spec[name])}\n" for name in LAST_FIELDS) + "END"
     plan = {
         "suite": spec["suite"],
         "methods": [{"method": spec["method"], "settings": spec["settings"]}],

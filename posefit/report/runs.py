@@ -1,6 +1,7 @@
 """The finished rows of a ledger as arrays, small enough for a hundred thousand of them: tracks or single searches."""
 
 import json
+import marshal
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -93,8 +94,8 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
     quarantined = ledger.quarantined()
     rows: list[_Row] = []
     kinds: set[bool] = set()
-    places: dict[str, str] = {}  # so that equal texts are one
-    heads: dict[str, tuple[str, str]] = {}  # method and head of a spec without instance and seed
+    places: dict[bytes, str] = {}  # so that equal texts are one
+    heads: dict[bytes, tuple[str, str]] = {}  # method and head of a spec without instance and seed
     for row in chain(ledger.rows(), quarantined):
         spec = row["spec"]
         kinds.add(searches := is_search(spec))
@@ -102,24 +103,26 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
             raise InputError(f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one")
         if row["status"] != "done":
             continue
-        fields = _text({name: value for name, value in spec.items() if name not in LAST_FIELDS})
+        fields = marshal.dumps({**spec, **dict.fromkeys(LAST_FIELDS)}, 2)
         if fields not in heads:
             heads[fields] = _text(_variant(spec)), "" if searches else command_head(spec)
         figures, *data = _search_data(row) if searches else _track_data(row)
-        texts = (places.setdefault(place := _text(_place(spec)), place), *heads[fields])
-        rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row.get("warnings", ())), figures, tuple(data)))
-    if not kinds and not may_be_empty:
+        place = marshal.dumps(_place(spec), 2)
+        if place not in places:
+            places[place] = _text(_place(spec))
+        texts = (places[place], *heads[fields])
+        rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row["warnings"]), figures, tuple(data)))
+    if not kinds and not may_be_empty and not ledger.bad():
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    return _sorted_runs(ledger.version, True in kinds, rows, quarantined)
+    return _sorted_runs(ledger.version, True in kinds, rows, quarantined, ledger.bad())
 
 
 def _track_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
     """Return the figures of a track, its joints' errors, its modes, and its trace."""
-    joints = np.array(row.get("joint_errors_mm") or [np.nan] * len(JOINTS), dtype=np.float32)
-    trace = row.get("trace") or {"evaluations": [], "cost": []}
-    arrays = np.array(trace["evaluations"], np.float32), np.array(trace["cost"], np.float32)
+    joints = np.array(row["joint_errors_mm"], dtype=np.float32)
+    arrays = np.array(row["trace"]["evaluations"], np.float32), np.array(row["trace"]["cost"], np.float32)
     figures = [column.value(row) for column in COLUMNS.values()]
-    return figures, joints, _binned(row.get("mode_reliability") or []), arrays
+    return figures, joints, _binned(row["mode_reliability"]), arrays
 
 
 def _search_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -130,7 +133,9 @@ def _search_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
     return [100.0 - reached, reached, run.cost - run.best_known], run, evaluations
 
 
-def _sorted_runs(version: str, searches: bool, rows: list[_Row], quarantined: Sequence[Mapping[str, Any]]) -> Runs:
+def _sorted_runs(
+    version: str, searches: bool, rows: list[_Row], quarantined: Sequence[Mapping[str, Any]], bad: Sequence[str]
+) -> Runs:
     errors: dict[str, list[float]] = {}
     for row in rows:
         errors.setdefault(row.method, []).append(np.nan_to_num(row.figures[0], nan=np.inf))
@@ -165,7 +170,7 @@ def _sorted_runs(version: str, searches: bool, rows: list[_Row], quarantined: Se
         keys=tuple(row.key for row in rows),
         figures=dict(zip(names, figures.T, strict=True)),
         warnings={k: row.warnings for k, row in enumerate(rows) if row.warnings},
-        failures=tuple(_failure(cell) for cell in quarantined),
+        failures=(*map(_failure, quarantined), *map(_bad_row, bad)),
         failed=tuple(failed[text] for text in methods),
         unfinished=tuple(sorted({json.loads(text)["method"] for text in failed if text not in errors})),
         is_search=searches,
@@ -196,6 +201,12 @@ def _failure(cell: Mapping[str, Any]) -> dict[str, Any]:
         "reasons": list(dict.fromkeys(cell["reasons"])),
         "command": repeat_command(spec),
     }
+
+
+def _bad_row(reason: str) -> dict[str, Any]:
+    where, _, why = reason.partition(": ")
+    command = "The next sweep of the plan runs this cell again."
+    return {"name": where, "method": "damaged rows", "reasons": [why], "command": command}
 
 
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -269,10 +280,6 @@ def distinct(names: Sequence[str], details: Sequence[Sequence[str]]) -> tuple[st
             numbered[name] += 1
             longer[k] = f"{name} ({numbered[name]})"
     return tuple(longer)
-
-
-def _index(table: dict[str, int], key: str) -> int:
-    return table.setdefault(key, len(table))
 
 
 def _text(value: Any) -> str:

@@ -22,6 +22,7 @@ from posefit.tracking.method import method_names, parsed_settings
 from posefit.tracking.options import TrackOptions, declared
 
 FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
+MAX_VIEWS, MAX_FRAMES = 100, 1_000_000  # of a cell
 MAX_BODY_OFF = 50.0  # percent that a body may be off
 
 
@@ -55,7 +56,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
 
 def checked(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return fields of a cell, each by itself checked. Raises ValueError where a value makes no sense."""
-    return {name: _CHECKS[name](name, value) for name, value in spec.items()}
+    return {name: CHECKS[name](name, value) for name, value in spec.items()}
 
 
 def families(method: str) -> tuple[str, ...]:
@@ -158,9 +159,14 @@ def _learned_from(field: str, value: Any) -> str:
 
 def _views(field: str, value: Any) -> tuple[float, ...]:
     degrees: tuple[float, ...] = _OPTIONS[field](field, value)
-    if not degrees:
-        raise InputError(f"{field} must be at least one angle, got none")
+    if not 1 <= len(degrees) <= MAX_VIEWS:
+        raise InputError(f"{field} must be 1 to {MAX_VIEWS} angles, got {len(degrees)}")
     return degrees
+
+
+def _frames(field: str, value: Any) -> int:
+    between(field, frames := whole(field, value, 1), 1, MAX_FRAMES)
+    return frames
 
 
 def _corruption(field: str, value: Any) -> dict[str, float]:
@@ -194,7 +200,7 @@ def _within(high: float) -> Callable[[str, Any], float]:
 
 
 _OPTIONS = {one.name: check for one in fields(TrackOptions) if (check := declared(one).check) is not None}
-_CHECKS: dict[str, Callable[[str, Any], Any]] = {
+CHECKS: dict[str, Callable[[str, Any], Any]] = {
     **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
     "method": _method,
     "motion": _motion,
@@ -203,7 +209,7 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "view_degrees": _views,
     "corruption": _corruption,
     "instance": lambda field, value: whole(field, value, 0),
-    "frames": lambda field, value: whole(field, value, 1),
+    "frames": _frames,
     "yaw_off_degrees": _within(ALL_AROUND),
     "body_off_percent": _within(MAX_BODY_OFF),
 }

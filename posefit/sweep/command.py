@@ -4,12 +4,14 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
 from pathlib import Path
+from typing import Any
 
 from posefit.errors import InputError
-from posefit.sweep.cell import run_cell
+from posefit.reading import cut
+from posefit.sweep.cell import json_of, run_cell
 from posefit.sweep.driver import Cells, Driver, Tally, drive_cells, keys_of
 from posefit.sweep.engines.engine import Engine, Limits, Run
 from posefit.sweep.ledger import INDEX, Ledger
@@ -20,15 +22,20 @@ DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 Say = Callable[[str], None]
 
 
-def run_plan(plan: str, out: str, start: Callable[[], Engine], say: Say, retry_quarantined: bool = False) -> Tally:
-    """Return how the sweep of a plan to a folder ended."""
+def run_plan(plan: str, out: str, start: Callable[[], Engine], say: Say, **choices: bool) -> Tally:
+    """Return how the sweep of a plan to a folder ended; `choices` as for `swept`."""
     cells = Plan.read(plan)
     with closing(start()) as running:  # without an engine there is no folder either
-        return swept(cells, out, running, say, retry_quarantined)
+        return swept(cells, out, running, say, **choices)
 
 
-def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quarantined: bool = False) -> Tally:
-    """Return how cells ended that an engine ran into the ledger in a folder, with a bar on stderr."""
+def swept(
+    cells: Cells, out: str | Path, running: Engine, say: Say, *, retry_quarantined: bool = False, keep_old: bool = False
+) -> Tally:
+    """Return how cells ended that an engine ran into the ledger in a folder, with a bar on stderr.
+
+    With `keep_old` a cell does not run that has a row of another version of posefit or of a plugin.
+    """
     from tqdm import tqdm
 
     with Driver(out, say) as driver:
@@ -36,8 +43,12 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
             quarantined = driver.ledger.quarantined_keys()
             count = sum(driver.release_quarantined(key) for key in keys_of(cells) if key in quarantined)
             say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
-        if count := driver.ledger.outdated():
-            say(f"{count} of the {len(driver.ledger)} rows in {out} are of another version, and do not count here")
+        for version, count in (outdated := driver.ledger.outdated()).items():
+            kept = "are kept" if keep_old else "do not count here; --keep-old keeps them"
+            say(f"{count} of the {len(driver.ledger)} rows in {out} are of another version, {cut(version)}, and {kept}")
+        if keep_old and outdated:
+            old = {_unversioned(row["spec"]) for row in driver.ledger.rows() if row["spec"]["version"] in outdated}
+            cells = [cell for cell in cells if cell.key in driver.ledger or _unversioned(cell.spec) not in old]
         with suppress(OSError, ValueError):  # no room: the sweep will say so, if it needs any
             driver.ledger.begin(keys_of(cells))
         bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
@@ -60,6 +71,11 @@ def swept(cells: Cells, out: str | Path, running: Engine, say: Say, retry_quaran
 
         with bar:
             return drive_cells(cells, driver, running, say_beside_bar, watch)
+
+
+def _unversioned(spec: Mapping[str, Any]) -> str:
+    """Return a spec without its version, as JSON."""
+    return json_of({name: value for name, value in spec.items() if name != "version"})
 
 
 def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bool) -> Iterator[str]:

@@ -11,6 +11,7 @@ done. Only `LOSSES` of them, with no row between the first and the last, put it 
 
 import json
 import os
+import re
 import signal
 import socket
 import threading
@@ -39,6 +40,10 @@ LEFTOVER_SECONDS = 60.0  # after which a lease without a name was left behind
 SYNC_SECONDS = 1.0  # between two times that rows are brought to the disk
 POLL_SECONDS = 0.2  # between two checks for a wish to stop
 RECHECK_SECONDS = 0.5  # between two checks of cells that other drivers run
+
+_LEASE = {"driver": str, "process": int, "host": str, "rows": int}  # the fields of a lease
+_FAILED_LEASE = {**_LEASE, "failed": str, "own": bool}
+_DRIVER = re.compile("[0-9]{8}T[0-9]{6}-[0-9a-f]{8}")
 
 Say = Callable[[str], None]
 Cells = Plan | Sequence[Cell]
@@ -198,7 +203,7 @@ class Driver:
         for attempt in count(1):
             try:
                 self._path(key, attempt).unlink()
-            except FileNotFoundError:
+            except (FileNotFoundError, IsADirectoryError):
                 if attempt >= last:
                     return
 
@@ -209,7 +214,7 @@ class Driver:
                 with suppress(FileNotFoundError):  # it got its name just now
                     if self._log.began - entry.stat().st_mtime > LEFTOVER_SECONDS:
                         os.unlink(entry)
-            elif self.state(entry.name.partition(".")[0]):
+            elif self.state(entry.name.partition(".")[0]) and not entry.is_dir():
                 Path(entry).unlink(missing_ok=True)
 
     def _lives(self, held: dict[str, Any]) -> bool:
@@ -235,12 +240,13 @@ def read_lease(path: Path) -> dict[str, Any] | None:
     A damaged one has failed, and holds nothing.
     """
     try:
-        held: dict[str, Any] = parsed_json(path.read_bytes())
-        if all(isinstance(held[name], str) for name in ("driver", "host")) and held["process"]:
+        held: dict[str, Any] = parsed_json(path.read_bytes()) if path.is_file() or not path.exists() else {}
+        types = {name: type(value) for name, value in held.items()}
+        if types in (_LEASE, _FAILED_LEASE) and _DRIVER.fullmatch(held["driver"]):
             return held
     except FileNotFoundError:
         return None
-    except (ValueError, KeyError, TypeError):
+    except (OSError, ValueError, AttributeError):
         pass
     return {"failed": "its lease was damaged"}
 

@@ -16,6 +16,7 @@ import os
 import re
 import sys
 import time
+import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -24,11 +25,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from posefit.errors import InputError
 from posefit.files import create_once, replaced_file
+from posefit.fitting.check import finite_number, whole
+from posefit.geometry.skeleton import JOINTS as SKELETON_JOINTS
 from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.cell import other_version
 from posefit.sweep.log import JOINTS, SUFFIX, decoded, joints_at, lines
+from posefit.sweep.row import checked_quarantined, checked_row
 from posefit.sweep.table import dataframe
 from posefit.version import posefit_build
 
@@ -41,6 +47,8 @@ INDEX = "ledger.json"
 ROWS, LEASES, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "leases", "quarantine", "aside", "plans")
 FORMAT = 1
 MAX_INDEX_BYTES = 10_000
+REASON = 200  # characters of why a row is bad
+MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
 VERSION = re.compile(rb'"version": "([^"]*)"')  # in a row
 PLANNED, SHORT = b'{"cells": ', 8  # how the file of a plan begins; bytes of each key that it holds
 
@@ -65,6 +73,7 @@ class Ledger:
         self._ends: dict[str, int] = {}  # how far each log was read
         self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
         self._versions: dict[str, str] = {}  # of every finished row
+        self._bad: dict[tuple[str, int], tuple[str, str]] = {}  # of rows that were put aside: the key, and why
         self.refresh()
 
     def refresh(self) -> None:
@@ -74,19 +83,22 @@ class Ledger:
             self._ends.clear()  # one was cut off or removed: everything is read again
             self._places.clear()
             self._versions.clear()
+        aside = set(os.listdir(self.path / ASIDE))
         for name in sorted(logs):
             if logs[name] == self._ends.get(name, 0):
                 continue
             for offset, line in lines(self.path / ROWS / name, self._ends.get(name, 0)):
                 self._ends[name] = offset + len(line)
-                if (entry := decoded(line)) is None:
-                    self._set_aside(name, offset, line)
+                entry = decoded(line)
+                again = aside and _aside_name(name, offset) in aside
+                if (entry is None or again) and self._checked(name, offset, line, entry) is None:
                     continue
+                assert entry is not None
                 key, row = entry
                 # a row may be there twice, of a lock that a file system did not keep: the first one counts
                 self._places[key] = min((name, offset), self._places.get(key, (name, offset)))
                 version = VERSION.search(row)
-                self._versions[key] = sys.intern(version[1].decode()) if version else ""
+                self._versions[key] = sys.intern(version[1].decode(errors="replace")) if version else ""
 
     def __len__(self) -> int:
         return len(self._places)
@@ -104,10 +116,14 @@ class Ledger:
         builds = {version.partition(", ")[0] for version in self._versions.values()} or {posefit_build()}
         return ", ".join(sorted(build.removeprefix("posefit ") for build in builds))
 
-    def outdated(self) -> int:
-        """Return how many rows are of another version of posefit, or of a plugin, than the ones installed."""
+    def outdated(self) -> Counter[str]:
+        """Return how many rows are of each version of posefit and plugins that is not the one installed."""
         counts = Counter(self._versions.values())
-        return sum(count for version, count in counts.items() if any(map(other_version, version.split(", "))))
+        return Counter({one: count for one, count in counts.items() if any(map(other_version, one.split(", ")))})
+
+    def bad(self) -> list[str]:
+        """Return of each row that was put aside, and whose cell has no other row: its file, its line, and why."""
+        return [reason for key, reason in self._bad.values() if key and key not in self]
 
     def begin(self, keys: Iterable[str]) -> None:
         """Write down the cells of a plan that is begun, or gone on with, so that its progress can be read."""
@@ -124,22 +140,25 @@ class Ledger:
         """Return the plans that were begun here, the latest first; a damaged one is left out."""
         plans = []
         for path in (self.path / PLANS).glob("*.cells"):
+            if not path.is_file():
+                continue
             try:
                 head, _, short = path.read_bytes().partition(b"\n")
                 plan = BegunPlan(**parsed_json(head), keys=short)
+                finite_number("begun", plan.begun)
+                if whole("cells", plan.cells, 0) == len(short) // SHORT >= whole("settled", plan.settled, 0):
+                    plans.append(plan)
             except (OSError, ValueError, TypeError):
                 continue
-            if plan.cells == len(plan.keys) // SHORT:
-                plans.append(plan)
         return sorted(plans, key=lambda plan: -plan.begun)
 
     def in_quarantine(self, key: str) -> bool:
         """Return whether a cell is in quarantine."""
-        return (self.path / QUARANTINE / f"{key}.json").exists()
+        return (self.path / QUARANTINE / f"{key}.json").is_file()
 
     def quarantined_keys(self) -> set[str]:
         """Return the keys of all cells in quarantine that have no row."""
-        names = (entry.name.removesuffix(".json") for entry in os.scandir(self.path / QUARANTINE))
+        names = (entry.name.removesuffix(".json") for entry in os.scandir(self.path / QUARANTINE) if entry.is_file())
         return {name for name in names if name not in self}
 
     def quarantined(self) -> list[dict[str, Any]]:
@@ -153,18 +172,20 @@ class Ledger:
         for name in sorted(self._logs()):
             for offset, line in lines(self.path / ROWS / name):
                 entry = decoded(line)
-                if entry is not None and self._places.get(entry[0]) == (name, offset):
-                    yield json.loads(entry[1])
+                if entry is None or self._places.get(entry[0]) != (name, offset):
+                    continue
+                if (row := self._checked(name, offset, line, entry)) is not None:
+                    yield row
 
     def row(self, key: str) -> dict[str, Any]:
-        """Return the row of a cell. Raises KeyError where there is none."""
+        """Return the row of a cell. Raises KeyError where there is none, and InputError where it is damaged."""
         name, offset = self._places[key]
         with (self.path / ROWS / name).open("rb") as file:
             file.seek(offset)
-            entry = decoded(file.readline())
-        if entry is None or entry[0] != key:
+            line = file.readline()
+        row = self._checked(name, offset, line, decoded(line))
+        if row is None or row["key"] != key:
             raise InputError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
-        row: dict[str, Any] = json.loads(entry[1])
         return row
 
     def all_rows(self) -> Iterator[dict[str, Any]]:
@@ -174,32 +195,54 @@ class Ledger:
 
     def joints(self, key: str) -> dict[str, "Array"]:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
-        import numpy as np
-
         start, length, checksum = self.row(key)["joints"]
         path = (self.path / ROWS / self._places[key][0]).with_suffix(JOINTS)
         data = joints_at(path, start, length)
-        if zlib.crc32(data) != checksum:
-            raise InputError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
-        with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-            return dict(stored)
+        try:
+            if zlib.crc32(data) == checksum and _unpacked_bytes(data) <= MAX_JOINTS_BYTES:
+                with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+                    joints = {name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")}
+                shapes = {one.shape for one in joints.values() if np.isfinite(one).all()}
+                if len(shapes) == 1 and (shape := shapes.pop())[1:] == (len(SKELETON_JOINTS), 3) and shape[0]:
+                    return joints
+        except Exception:  # whatever a hostile archive raises
+            pass
+        raise InputError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
         return dataframe(self.all_rows())
 
-    def _set_aside(self, name: str, offset: int, line: bytes) -> None:
+    def _checked(self, name: str, offset: int, line: bytes, entry: tuple[str, bytes] | None) -> dict[str, Any] | None:
+        """Return the row of a line. A bad one counts no longer, and is put aside: its cell is run again."""
+        try:
+            if entry is None:
+                raise InputError("expected a row with its checksum, got a damaged one")
+            return checked_row(*entry)
+        except ValueError as error:
+            match = re.search(rb'"key": "([0-9a-f]{64})', line)
+            key = match[1].decode() if match else ""
+            reason = cut(str(error), REASON)
+        if self._places.get(key) == (name, offset):
+            del self._places[key], self._versions[key]
+        log = self.path / ROWS / name
+        with log.open("rb") as file:
+            number = 1 + file.read(offset).count(b"\n")
+        where = f"{log} line {number}"
+        if (name, offset) not in self._bad:
+            self._bad[name, offset] = key, f"{ROWS}/{name} line {number}: {reason}"
+            cell = f", the row of cell {key[:8]}," if key else ""
+            self._set_aside(self.path / ASIDE / _aside_name(name, offset), line, f"{where}{cell} is damaged: {reason}")
+        return None
+
+    def _set_aside(self, aside: Path, line: bytes, damage: str) -> None:
         """Keep a damaged line of a log for a human to look at."""
-        aside = self.path / ASIDE / f"{Path(name).stem}-{offset}.txt"
         if aside.exists():
             return
-        key = re.search(rb'"key": "([0-9a-f]{8})', line)
-        cell = f", the row of cell {key[1].decode()}," if key else ""
-        damage = f"{self.path / ROWS / name} at byte {offset}{cell} is damaged"
         try:
             aside.write_bytes(line)
         except OSError as error:
-            self._say(f"warning: {damage}, and cannot be put aside: {error.strerror}; it does not count")
+            self._say(f"warning: {damage}; it cannot be put aside: {error.strerror}; it does not count")
         else:
             self._say(f"warning: {damage}; put aside as {aside}, to be run again")
 
@@ -208,20 +251,19 @@ class Ledger:
         sizes = {}
         for entry in os.scandir(self.path / ROWS):
             with suppress(FileNotFoundError):  # an empty one that went away
-                if entry.name.endswith(SUFFIX):
+                if entry.name.endswith(SUFFIX) and entry.is_file():
                     sizes[entry.name] = entry.stat().st_size
         return sizes
 
     def _read_quarantined(self, path: Path) -> dict[str, Any] | None:
         """Return the content of a file of the quarantine. A damaged one is put aside, and its cell is tried again."""
         try:
-            cell: dict[str, Any] = parsed_json(path.read_bytes())
-            if cell["key"] == path.stem and isinstance(cell["spec"], dict) and isinstance(cell["reasons"], list):
-                return cell
-        except (ValueError, KeyError, TypeError):
-            pass
+            if path.is_file():
+                return checked_quarantined(path.stem, path.read_bytes())
         except FileNotFoundError:  # it is tried again just now
             return None
+        except (ValueError, OSError):
+            pass
         try:
             path.rename(self.path / ASIDE / path.name)
         except OSError as error:
@@ -229,6 +271,15 @@ class Ledger:
         else:
             self._say(f"warning: {path} is damaged; put aside, its cell is to be run again")
         return None
+
+
+def _aside_name(log: str, offset: int) -> str:
+    return f"{Path(log).stem}-{offset}.txt"
+
+
+def _unpacked_bytes(data: bytes) -> int:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return sum(one.file_size for one in archive.infolist())
 
 
 def create(path: Path) -> None:
@@ -262,3 +313,8 @@ def _check_format(path: Path) -> None:
         raise InputError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
     if form != FORMAT:
         raise InputError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
+    for name in (ROWS, LEASES, QUARANTINE, ASIDE):
+        if not (path / name).is_dir():
+            raise InputError(
+                f"{path / name}: expected a folder of the ledger, got {'a file' if (path / name).exists() else 'none'}"
+            )

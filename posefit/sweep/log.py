@@ -129,12 +129,14 @@ def lines(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 
 
 def joints_at(path: Path, start: int, length: int) -> bytes:
-    """Return the arrays of a row: bytes of the file beside its log, fewer where that was cut off."""
+    """Return the arrays of a row: bytes of the file beside its log, none where that was cut off."""
     try:
         with path.open("rb") as file:
+            if start + length > os.fstat(file.fileno()).st_size:
+                return b""
             file.seek(start)
             return file.read(length)
-    except FileNotFoundError:
+    except (FileNotFoundError, IsADirectoryError):
         return b""
 
 

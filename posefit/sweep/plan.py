@@ -236,9 +236,12 @@ def plan_text(path: str | Path) -> str:
         return (files("posefit.sweep") / "default.toml").read_text(encoding="utf-8")
     if str(path) == INPUT:
         try:
-            return sys.stdin.read(MAX_BYTES).removeprefix("\ufeff")
+            text = sys.stdin.read(MAX_BYTES + 1)
         except UnicodeDecodeError:
             raise InputError(f"{INPUT}: expected a plan in UTF-8, got other bytes") from None
+        if len(text) > MAX_BYTES:
+            raise InputError(f"{INPUT}: expected a plan of at most {MAX_BYTES:,} characters, got more")
+        return text.removeprefix("\ufeff")
     if not Path(path).is_file():
         what = "a folder" if Path(path).is_dir() else "no file of that name"
         raise InputError(f"{path}: expected a plan (.toml) or {DEFAULT}, got {what}")

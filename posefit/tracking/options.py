@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, cast
 
 from posefit.errors import InputError
-from posefit.fitting.check import finite_number, one_of, pair, positive, whole
+from posefit.fitting.check import finite_number, one_of, pair, whole
+from posefit.limits import SECONDS
 from posefit.reading import quoted
 from posefit.settings import POPULATION_SIZE
 
@@ -76,11 +77,6 @@ def _between(low: float, high: float, unit: str = "") -> Check:
     return check
 
 
-def _positive(name: str, value: Any) -> float:
-    positive(name, finite_number(name, value))
-    return float(value)
-
-
 def _rate(name: str, value: Any) -> float:
     from posefit.motion.motion import RATES
 
@@ -131,7 +127,7 @@ def _device(_name: str, value: Any) -> str:
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
     several = hasattr(value, "__len__") and not isinstance(value, str)
-    return tuple(finite_number(name, degrees) for degrees in (value if several else [value]))
+    return tuple(_between(-360.0, 360.0, " degrees")(name, degrees) for degrees in (value if several else [value]))
 
 
 def _cameras(_name: str, value: Any) -> tuple[Any, ...]:
@@ -239,7 +235,7 @@ class TrackOptions:
     population_size: int | None = option(None, "N, by default 40.", _whole(1), "N", parse=int)
     iterations: int | None = option(None, "C, by default 60.", _whole(1), "C", parse=int)
     ask_seconds: float | None = option(
-        None, "How long a plugin may take to propose a population.", _positive, "SECONDS", parse=float
+        None, "How long a plugin may take to propose a population.", _between(*SECONDS), "SECONDS", parse=float
     )
     translation: "Translation | None" = option(
         None,

@@ -6,6 +6,7 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 
 import csv
 import json
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
@@ -15,12 +16,13 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.files import Unfinished, other_entries
+from posefit.files import MARK, Unfinished, other_entries
+from posefit.fitting.check import finite_number, whole
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
-from posefit.reading import cut
+from posefit.reading import SHOWN, cut, quoted
 from posefit.tracking.evaluation import unseen
 from posefit.tracking.identity import ArgumentDigest, difference
 from posefit.tracking.measures import Rows
@@ -39,7 +41,16 @@ _TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json")
 FILES = (*_MOTION_FILES, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
-_ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
+# The arrays of a recorded frame: their shape, -1 for any, and whether they may be missing
+_ARRAYS = {
+    "pose": ((ANGLES,), False),
+    "translation": ((3,), False),
+    "areas": ((-1, 3), False),
+    "history": ((-1,), False),
+    "coordinates": ((-1,), True),
+    "spent": ((-1,), True),
+}
+_MAX_ITEM_BYTES = 10_000  # of one element of an array in a frame's details
 _PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "activity", "details")
 
 
@@ -93,6 +104,8 @@ class OutputFolder(Output):
         left = Unfinished.interrupted(self.path)
         if not left:
             raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
+        for folder in left:
+            _check_mark(folder)
         others = [difference(folder.info, self._spec) for folder in left]
         place = left[others.index(None)] if None in others else None
         for folder in left:
@@ -143,23 +156,32 @@ class OutputFolder(Output):
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
         frames: list[Frame] = []
-        whole: list[str] = []
+        kept: list[bytes] = []
         state: dict[str, Any] | None = None
         path = self._building / _RECORD
-        for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
+        for number, line in enumerate(recorded.splitlines(keepends=True), 1):
             try:
-                row = json.loads(line, object_hook=_decoded)
-                values = {name: row[name] for name in _PLAIN}
-                values |= {name: None if row[name] is None else np.array(row[name]) for name in _ARRAYS}
-                posterior = row["posterior"]
-                values["posterior"] = None if posterior is None else Posterior.from_dict(posterior)
-            except (ValueError, KeyError):
-                break  # the line that was being written when it ended
-            frames.append(Frame(**values))
-            state = row["state"]
-            whole.append(line)
+                frame, state = _frame_of(line)
+            except (
+                ValueError,
+                LookupError,
+                TypeError,
+                ArithmeticError,
+                AttributeError,
+                MemoryError,
+                RecursionError,
+            ) as error:
+                if line.endswith(b"\n"):  # else it was being written when the track ended
+                    reason = cut(" ".join(str(error).split()))
+                    self._say(
+                        f"warning: {path} line {number}: expected a frame, got {reason}; tracked again from there"
+                    )
+                break
+            frames.append(frame)
+            kept.append(line)
         if frames:
-            path.write_text("".join(f"{line}\n" for line in whole), encoding="utf-8")
+            path.write_bytes(b"".join(kept))
         self._recorded = len(frames)
         return frames, state
 
@@ -170,8 +192,9 @@ class OutputFolder(Output):
             value = getattr(frame, name)
             row[name] = None if value is None else np.asarray(value).tolist()
         row["posterior"] = None if frame.posterior is None else frame.posterior.as_dict()
-        with (self._building / _RECORD).open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row, default=_encoded) + "\n")
+        text = json.dumps(row, default=_encoded).encode()
+        with (self._building / _RECORD).open("ab") as file:
+            file.write(b"%08x %s\n" % (zlib.crc32(text), text))
         self._recorded += 1
 
     def finish(self, scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> None:
@@ -221,8 +244,50 @@ def _encoded(value: Any) -> Any:
 def _decoded(mapping: dict[str, Any]) -> Any:
     """Return a mapping of JSON, or the array that it holds."""
     if mapping.keys() == {"dtype", "values"}:
-        return np.array(mapping["values"], dtype=mapping["dtype"])
+        dtype = np.dtype(mapping["dtype"])
+        if dtype.kind not in "biufU" or dtype.itemsize > _MAX_ITEM_BYTES:
+            raise InputError(f"an array of {cut(str(dtype))}")
+        return np.array(mapping["values"], dtype=dtype)
     return mapping
+
+
+def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
+    """Return a recorded frame, and the state of the random generator after it. Raises an error where it is damaged."""
+    checksum, _, text = line.rstrip(b"\n").partition(b" ")
+    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
+        raise InputError("a damaged one")
+    row = json.loads(text, object_hook=_decoded)
+    if row.keys() != {*_PLAIN, *_ARRAYS, "posterior", "state"}:
+        raise InputError("one with other fields")
+    values = {name: row[name] for name in _PLAIN}
+    for name, (shape, optional) in _ARRAYS.items():
+        if row[name] is None and optional:
+            values[name] = None
+            continue
+        array = values[name] = np.array(row[name])
+        fits = array.ndim == len(shape) and all(
+            size in (-1, side) for size, side in zip(shape, array.shape, strict=True)
+        )
+        if not fits or (array.size and array.dtype.kind not in "iuf") or np.isnan(array.astype(float)).any():
+            raise InputError(f"{name} of shape {array.shape}")
+    for name in _PLAIN[:4]:
+        if not (row[name] is None and name == "cpu_seconds"):
+            finite_number(name, row[name])
+    whole("evaluations", row["evaluations"], 0)
+    if not isinstance(row["details"], dict) or not isinstance(row["activity"], str | type(None)):
+        raise InputError("details or an activity of another type")
+    posterior = row["posterior"]
+    values["posterior"] = None if posterior is None else Posterior.from_dict(posterior)
+    np.random.default_rng(0).bit_generator.state = row["state"]  # raises where it is none
+    return Frame(**values), row["state"]
+
+
+def _check_mark(folder: Unfinished) -> None:
+    """Raise InputError where the arguments of an interrupted track are damaged."""
+    for digest in folder.info.values():
+        texts = isinstance(digest, dict) and digest.keys() == {"text", "digest"} and [*digest.values()]
+        if not texts or not all(isinstance(text, str) and text.isprintable() and len(text) <= SHOWN for text in texts):
+            raise InputError(f"{folder.path / MARK}: expected the arguments of a track, got {quoted(digest)}")
 
 
 def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:

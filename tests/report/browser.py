@@ -87,6 +87,7 @@ def row_of(cell: TrackCell, error: float, **more: Any) -> dict[str, Any]:
         "dimensions": 9,
         "joint_errors_mm": [error * joint for joint in range(27)],
         "trace": {"evaluations": [40, 80, 120], "cost": [4.0 * error, 2.0 * error, error]},
+        "mode_reliability": [],
     } | more
 
 

@@ -92,6 +92,8 @@ def result(cell: TrackCell) -> CellResult:
         "error_degrees": {"mean": float(numbers[1]), "max": float(numbers[2])},
         "joint_errors_mm": [float(cell.seed)] * 27,
         "trace": {"evaluations": [40, 80], "cost": [2.0, 1.0]},
+        "warnings": [],
+        "mode_reliability": [],
         "seconds": time.time(),
     }
     joints = np.full((1, 27, 3), float(cell.seed))

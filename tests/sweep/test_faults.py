@@ -112,7 +112,20 @@ def test_a_damaged_file_of_the_quarantine_is_put_aside_and_its_cell_is_tried_aga
     filled(folder, 2)
 
 
-@each("content", [b'{"driver"', DEEP, b"\xff", b"{}"])
+LEASE = '{"driver": "20260101T000000-00000000", "process": 1, "host": "h", "rows": 0, '
+
+
+@each(
+    "content",
+    [
+        b'{"driver"',
+        DEEP,
+        b"\xff",
+        b"{}",
+        (LEASE + '"gailed": "it had to", "own": true}').encode(),  # one bit of "failed"
+        (LEASE + '"failed": 1, "own": true}').encode(),
+    ],
+)
 def test_a_damaged_lease_holds_nothing(content: bytes, tmp_path: Path) -> None:
     folder, cell = tmp_path / "ledger", cells(1)[0]
     with Driver(folder) as driver:
@@ -126,6 +139,35 @@ def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:
     (folder / "plans").mkdir(exist_ok=True)
     (folder / "plans" / "bad.cells").write_bytes(DEEP)
     assert Ledger(folder).plans() == []
+
+
+def test_folders_and_pipes_among_the_files_of_a_ledger_are_left_alone(tmp_path: Path) -> None:
+    folder = filled(tmp_path / "ledger", 1)
+    first, second = (cell.key for cell in cells(2))
+    for name in (
+        "rows/x.jsonl",
+        "rows/y.joints",
+        f"leases/{first}.1",
+        f"leases/{second}.1",
+        f"quarantine/{second}.json",
+    ):
+        (folder / name).mkdir()
+    for name in ("rows/pipe.jsonl", "plans/pipe.cells", f"leases/{second}.2"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        os.mkfifo(folder / name)
+    filled(folder, 2)
+    ledger = Ledger(folder, pytest.fail)
+    assert len(list(ledger.rows())) == 2
+    assert ledger.quarantined() == []
+    assert progress_of(ledger).running == 0
+
+
+def test_a_disk_without_hard_links_takes_a_sweep(tmp_path: Path, monkeypatch: Any) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", refuse)
+    assert len(Ledger(filled(tmp_path / "ledger", 3))) == 3
 
 
 @each("step", [-86_400.0, 86_400.0])

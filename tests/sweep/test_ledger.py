@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.report.runs import runs_of
 from posefit.sweep import log
 from posefit.sweep.command import swept
 from posefit.sweep.driver import ATTEMPTS, LOSSES, Driver, Lease, State, drive_cells
@@ -95,13 +96,57 @@ def test_a_damaged_row_is_named_put_aside_and_run_again(harm: Any, tmp_path: Pat
     assert sorted(row["key"] for row in Ledger(folder).rows()) == sorted(cell.key for cell in cells(5))
 
 
+SPEC = result(cells(1)[0]).row["spec"]
+
+
+@each(
+    ("change", "reason"),
+    [
+        ({"cost": "low"}, "cost must be a number, got 'low'"),
+        ({"cost": 10**400}, "cost must be a number"),
+        ({"cost": [1.0]}, "cost must be a number"),
+        ({"error_degrees": 1.0}, "error_degrees must be figures by their names, got 1.0"),
+        ({"error_degrees": {"mean": "x"}}, "mean must be a number, got 'x'"),
+        ({"spec": {}}, "spec must be the fields of a cell, got none called 'body_off_percent'"),
+        ({"spec": {**SPEC, "seed": "0\nEND\nrm -r x"}}, "seed must be a whole number"),
+        ({"spec": {**SPEC, "frames": 10**7}}, "frames must lie in 1 to 1e+06"),
+        ({"spec": {**SPEC, "settings": {"a": {}}}}, "settings a must be a value"),
+        ({"trace": {"evaluations": [1, 1], "cost": [2, 1]}}, "trace must be rising evaluations"),
+        ({"trace": {"evaluations": [1], "cost": []}}, "trace must be rising evaluations"),
+        ({"joint_errors_mm": [0.0] * 26}, "joint_errors_mm must be 27 numbers"),
+        ({"warnings": "none"}, "warnings must be a list of texts"),
+        ({"mode_reliability": [[1, -1.0, 0.5]]}, "mode_reliability must be triples"),
+        ({"key": "0" * 64}, "expected the row of cell"),
+        ({"status": "lost"}, "status must be one of done"),
+        ({"warnings": ["\ud800"]}, "a row must hold whole characters"),
+    ],
+)
+def test_a_row_with_a_right_checksum_that_is_none_is_named_counted_and_run_again(
+    change: dict[str, Any], reason: str, tmp_path: Path
+) -> None:
+    folder, cell = filled(tmp_path / "ledger", 2), cells(1)[0]
+    rows = the_log(folder).read_bytes().splitlines(keepends=True)
+    rows[0] = log.encoded(cell.key, {**result(cell).row, "joints": [0, 0, 0], **change})
+    the_log(folder).write_bytes(b"".join(rows))
+    messages: list[str] = []
+    runs = runs_of(Ledger(folder, messages.append))
+    assert len(runs) == len(runs.failures) == len(messages) == 1
+    assert runs.failures[0]["name"] == f"rows/{the_log(folder).name} line 1"
+    assert reason in messages[0]
+    assert str(the_log(folder)) in messages[0]
+    with Driver(folder, messages.append) as driver:
+        assert drive_cells(cells(2), driver, Instant(), print).ran == 1
+    again = runs_of(Ledger(folder, messages.append))
+    assert (len(again), len(again.failures)) == (2, 0)
+
+
 def test_of_two_rows_of_one_cell_the_first_counts(tmp_path: Path) -> None:
     cell, other = cells(2)
     folder = filled(tmp_path / "ledger", 1)
     path = the_log(folder)
 
     def line(cost: float) -> bytes:
-        return log.encoded(cell.key, {"key": cell.key, "cost": cost})
+        return log.encoded(cell.key, {**result(cell).row, "cost": cost, "joints": [0, 0, 0]})
 
     path.write_bytes(line(1.0) + line(2.0))
     (path.parent / "later.jsonl").write_bytes(line(3.0))
@@ -150,14 +195,27 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_are_run_ag
     with Driver(folder) as driver:
         drive_cells(old, driver, Instant(), print)
         assert driver.ledger.version == "0.0.9 a1"
-        assert driver.ledger.outdated() == 2
+        assert driver.ledger.outdated() == {"posefit 0.0.9 a1": 2}
         assert drive_cells(cells(3), driver, Instant(), print).ran == 3
     messages: list[str] = []
     assert swept(cells(4), folder, Instant(), messages.append).ran == 1
-    assert messages[0] == f"2 of the 5 rows in {folder} are of another version, and do not count here"
+    assert messages[0].startswith(
+        f"2 of the 5 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count"
+    )
     ledger = Ledger(folder)
-    assert (len(ledger), ledger.outdated()) == (6, 2)
+    assert (len(ledger), ledger.outdated().total()) == (6, 2)
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
+
+
+def test_rows_of_another_version_are_kept_where_that_is_asked(tmp_path: Path) -> None:
+    folder = tmp_path / "ledger"
+    with Driver(folder) as driver:
+        drive_cells([replace(cell, version="posefit 0.0.9 a1") for cell in cells(2)], driver, Instant(), print)
+    messages: list[str] = []
+    assert swept(cells(3), folder, Instant(), messages.append, keep_old=True).ran == 1
+    assert "2 of the 2 rows" in messages[0]
+    assert messages[0].endswith("and are kept")
+    assert swept(cells(3), folder, Instant(), messages.append).ran == 2
 
 
 @each(

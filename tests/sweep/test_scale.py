@@ -40,7 +40,15 @@ def real(cell: TrackCell) -> CellResult:
         name: dict.fromkeys(("mean_pose", "persistence", "nearest"), 1.0 / 3.0)
         for name in ("skill", "baselines_degrees")
     }
-    row = {"key": cell.key, "spec": cell.spec, "status": "done", **figures, **kinds, "warnings": []}
+    row = {
+        "key": cell.key,
+        "spec": cell.spec,
+        "status": "done",
+        **figures,
+        **kinds,
+        "warnings": [],
+        "mode_reliability": [],
+    }
     return CellResult({**row, "joint_errors_mm": [cell.seed / 3.0] * 27, "trace": trace, "seconds": 1.0}, b"\0" * 1000)
 
 

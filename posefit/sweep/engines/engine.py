@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from posefit.errors import InputError
+from posefit.fitting.check import between
+from posefit.limits import GIGABYTES, SECONDS
 from posefit.sweep.cell import Cell, CellResult
 
 J = TypeVar("J")  # a job: a cell, or whatever else its function takes
@@ -20,9 +22,8 @@ class Limits:
     gigabytes: float = 4.0
 
     def __post_init__(self) -> None:
-        for name in ("seconds", "gigabytes"):
-            if not getattr(self, name) > 0.0:
-                raise InputError(f"the limit of {name} must be above 0, got {getattr(self, name)}")
+        between("the limit of seconds", self.seconds, *SECONDS)
+        between("the limit of gigabytes", self.gigabytes, *GIGABYTES)
 
 
 @dataclass(frozen=True)

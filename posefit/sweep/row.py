@@ -1,0 +1,229 @@
+"""What a row of a ledger holds: one schema, made of the fields of a cell and of the measures.
+
+A row is checked once, when it is read; what passes is not checked again. A figure may be missing, or null.
+"""
+
+import json
+import marshal
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+from posefit.errors import InputError
+from posefit.fitting.check import one_of, whole
+from posefit.geometry.skeleton import JOINTS
+from posefit.reading import quoted
+from posefit.suites.functions import checked_address
+from posefit.suites.problem import INFEASIBLE
+from posefit.sweep.cell import SearchCell, TrackCell
+from posefit.sweep.check import CHECKS
+from posefit.sweep.table import is_search
+from posefit.tracking.measures import Measures
+
+LARGEST = 1e30  # of a number in a row: its square is finite, and so is itself in 32 bits
+LARGEST_PLACE = 2**50  # bytes of a file
+MAX_KNOWN_SPECS = 10_000  # in memory, of those that were checked
+_NUMBERS, _KINDS = frozenset((int, float)), frozenset((int, float, type(None)))
+_SCALARS = (str, int, float, bool, type(None))
+
+Check = Callable[[str, Any], object]
+
+
+def _refuse(constant: str) -> None:
+    raise InputError(f"expected finite numbers, got {constant}")
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse)
+
+
+def checked_row(key: str, text: bytes) -> dict[str, Any]:
+    """Return the finished row of a key from its JSON. Raises InputError saying what was expected instead."""
+    row = _parsed(key, text)
+    search = check_spec(row["spec"])
+    checks = _SEARCH_ROW if search else _TRACK_ROW
+    if missing := checks.keys() - row.keys():
+        raise InputError(f"a row must hold {min(missing)}, got none")
+    _check_figures({name: value for name, value in row.items() if name not in _FIGURES and name not in checks})
+    for name in _FIGURES.keys() & row.keys():
+        _figures(name, row[name])
+    for name, check in checks.items():
+        check(name, row[name])
+    return row
+
+
+def checked_quarantined(key: str, text: bytes) -> dict[str, Any]:
+    """Return a quarantined cell from its JSON: key, spec, status and reasons. Raises InputError as `checked_row`."""
+    cell = _parsed(key, text)
+    check_spec(cell["spec"])
+    _texts("reasons", cell.get("reasons"))
+    if cell.keys() != {"key", "spec", "status", "reasons"}:
+        raise InputError("a quarantined cell must hold key, spec, status and reasons, got other fields")
+    return cell
+
+
+def check_spec(spec: Any) -> bool:
+    """Return whether a spec is that of a search. Raises InputError where it is not that of a cell."""
+    if not isinstance(spec, dict):
+        raise InputError(f"spec must be the fields of a cell, got {quoted(spec)}")
+    search = is_search(spec)
+    checks = _SEARCH_SPEC if search else _TRACK_SPEC
+    if wrong := spec.keys() ^ checks.keys():
+        came = f"{'one' if min(wrong) in spec else 'none'} called {quoted(min(wrong))}"
+        raise InputError(f"spec must be the fields of a cell, got {came}")
+    same = marshal.dumps({**spec, "seed": 0, "instance": 0}, 2)
+    wanted = ("seed", "instance") if same in _known_specs else spec  # thousands of rows differ in nothing else
+    for name in wanted:
+        value = spec[name]
+        checks[name](name, value)
+        if name != "seed" and isinstance(value, int | float):
+            _number(name, value)
+    if search:
+        checked_address(*(spec[name] for name in ("suite", "function", "instance", "dimension")))
+    if len(_known_specs) < MAX_KNOWN_SPECS:
+        _known_specs.add(same)
+    return search
+
+
+def _parsed(key: str, text: bytes) -> dict[str, Any]:
+    """Return an object of JSON whose key is right, with a spec."""
+    try:
+        row = _DECODER.decode(text.decode())
+    except RecursionError:
+        raise InputError("expected values that are not nested so deeply, got too many brackets") from None
+    if not isinstance(row, dict) or row.get("key") != key or "spec" not in row:
+        raise InputError(f"expected the row of cell {key[:8]} with its spec, got {quoted(row)}")
+    if b"\\u" in text:  # one half of a character that takes two
+        try:
+            json.dumps(row, ensure_ascii=False).encode()
+        except UnicodeEncodeError:
+            raise InputError("a row must hold whole characters, got half of one") from None
+    return row
+
+
+def _number(name: str, value: Any) -> None:
+    if type(value) not in _NUMBERS or not -LARGEST < value < LARGEST:
+        raise InputError(f"{name} must be a number, got {quoted(value)}")
+
+
+def _figure(name: str, value: Any) -> None:
+    if value is not None:
+        _number(name, value)
+
+
+def _figures(name: str, value: Any) -> None:
+    if value is None:
+        return
+    if not isinstance(value, dict):
+        raise InputError(f"{name} must be figures by their names, got {quoted(value)}")
+    _check_figures(value)
+
+
+def _check_figures(figures: Mapping[str, Any]) -> None:
+    """Check that each figure is a number or null."""
+    try:
+        quick = (
+            _KINDS.issuperset(map(type, figures.values())) and sum(map(abs, filter(None, figures.values()))) < LARGEST
+        )
+    except OverflowError:  # a whole number beyond all floats
+        quick = False
+    if not quick:
+        for name, value in figures.items():
+            _figure(name, value)
+
+
+def _text(name: str, value: Any) -> None:
+    if not isinstance(value, str):
+        raise InputError(f"{name} must be a text, got {quoted(value)}")
+
+
+def _texts(name: str, value: Any) -> None:
+    if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+        raise InputError(f"{name} must be a list of texts, got {quoted(value)}")
+
+
+def _files(name: str, value: Any) -> None:
+    if not isinstance(value, dict) or not all(isinstance(one, str) for one in value.values()):
+        raise InputError(f"{name} must be digests by the names of files, got {quoted(value)}")
+
+
+def _settings(name: str, value: Any) -> None:
+    if not isinstance(value, dict):
+        raise InputError(f"{name} must be values by their names, got {quoted(value)}")
+    for setting, one in value.items():
+        if not all(isinstance(part, _SCALARS) for part in (one if isinstance(one, list) else [one])):
+            raise InputError(f"{name} {setting} must be a value or a list of some, got {quoted(one)}")
+
+
+def _are_numbers(value: Any) -> bool:
+    """Return whether a value is a list of numbers from 0."""
+    if type(value) is not list or not _NUMBERS.issuperset(map(type, value)):
+        return False
+    return not value or 0 <= min(value) <= max(value) < LARGEST
+
+
+def _joint_errors(name: str, value: Any) -> None:
+    if not _are_numbers(value) or len(value) != len(JOINTS):
+        raise InputError(f"{name} must be {len(JOINTS)} numbers, got {quoted(value)}")
+
+
+def _trace(name: str, value: Any) -> None:
+    if isinstance(value, dict) and value.keys() == {"evaluations", "cost"}:
+        used, best = value["evaluations"], value["cost"]
+        if type(used) is type(best) is list and len(used) == len(best):
+            numbers = _NUMBERS.issuperset(map(type, used)) and _NUMBERS.issuperset(map(type, best))
+            if numbers and not used:
+                return
+            rising = numbers and used == sorted(set(used)) and best == sorted(best, reverse=True)
+            if rising and 1 <= used[0] <= used[-1] < LARGEST and LARGEST > best[0] >= best[-1] > -LARGEST:
+                return
+    raise InputError(f"{name} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}")
+
+
+def _search_trace(name: str, value: Any) -> None:
+    _trace(name, value)
+    if not value["cost"]:
+        raise InputError(f"{name} of a search must hold a cost, got none")
+
+
+def _reliability(name: str, value: Any) -> None:
+    bins = value if isinstance(value, list) else [None]
+    if not all(_are_numbers(one) and len(one) == 3 and 0 <= one[1] <= 1 for one in bins):
+        raise InputError(f"{name} must be triples of frames, probability and share, got {quoted(value)}")
+
+
+def _place(name: str, value: Any) -> None:
+    whole_numbers = isinstance(value, list) and len(value) == 3 and set(map(type, value)) == {int}
+    if not whole_numbers or min(value) < 0 or max(value) > LARGEST_PLACE:
+        raise InputError(f"{name} must be start, length and checksum of the joints, got {quoted(value)}")
+
+
+def _made_of(kind: type, checks: Mapping[str, Check]) -> dict[str, Check]:
+    """Return the check of each field of a cell."""
+    return {one.name: checks[one.name] for one in fields(kind)}
+
+
+_NAMES = {"method": _text, "version": _text, "settings": _settings}
+_TRACK_SPEC = _made_of(TrackCell, {**CHECKS, **_NAMES, "motion": _text, "train": _texts, "files": _files})
+_SEARCH_SPEC = _made_of(
+    SearchCell,
+    {
+        **_NAMES,
+        **dict.fromkeys(("suite", "function", "dimension", "instance"), lambda *_: None),  # by `checked_address`
+        "evaluations": lambda name, value: whole(name, value, 1),
+        "infeasible": lambda name, value: one_of(name, value, INFEASIBLE),
+        "seed": CHECKS["seed"],
+    },
+)
+_known_specs: set[bytes] = set()
+# What a row holds that is not a single figure
+_FIGURES = {one.name: None for one in fields(Measures) if "Mapping" in str(one.type) or "Spread" in str(one.type)}
+_ROW: dict[str, Check] = {
+    "key": _text,
+    "spec": lambda *_: None,  # by `check_spec`
+    "status": lambda name, value: one_of(name, value, ("done",)),
+    "warnings": _texts,
+    "trace": _trace,
+    "joints": _place,
+}
+_TRACK_ROW = {**_ROW, "joint_errors_mm": _joint_errors, "mode_reliability": _reliability}
+_SEARCH_ROW: dict[str, Check] = {**_ROW, "trace": _search_trace, "cost": _number, "best_known": _number}
