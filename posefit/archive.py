@@ -53,7 +53,7 @@ class _RefusedError(InputError):
 
 @dataclass(frozen=True)
 class Stored:
-    """One array of an archive, which is not unpacked yet."""
+    """One array of an archive, which is unpacked by `numpy.asarray`, or row by row by a loop over it."""
 
     name: str
     shape: tuple[int, ...]
@@ -65,24 +65,22 @@ class Stored:
     _start: int = field(repr=False)  # bytes before the array
 
     @property
-    def size(self) -> int:
+    def nbytes(self) -> int:
         """How many bytes it unpacks to."""
         return math.prod(self.shape) * self.dtype.itemsize
 
-    def read(self) -> NDArray[Any]:
-        """Return the array."""
+    def __array__(self, dtype: object = None, copy: object = None) -> NDArray[Any]:
         with self._opened() as member:
-            content = _exactly(member, self.size)
+            content = _exactly(member, self.nbytes)
             _exactly(member, 0)
         array = np.frombuffer(content, self.dtype)
         return array.reshape(self.shape, order="F" if self.fortran else "C")
 
-    def rows(self) -> Iterator[NDArray[Any]]:
-        """Yield one row after the other, so that only one of them is in memory."""
+    def __iter__(self) -> Iterator[NDArray[Any]]:
         if self.fortran:
-            if self.size > TURNED:
+            if self.nbytes > TURNED:
                 raise InputError(f"{self._path}: expected {self.name} row by row, got it column by column")
-            yield from self.read()
+            yield from np.asarray(self)
             return
         size = math.prod(self.shape[1:]) * self.dtype.itemsize
         with self._opened() as member:
@@ -98,38 +96,13 @@ class Stored:
             yield member
 
 
-@dataclass(frozen=True)
-class Held:
-    """An array in memory or in an .npy file, to be read as one of an archive is."""
-
-    array: NDArray[Any]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Its shape."""
-        return self.array.shape
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Its type."""
-        return self.array.dtype
-
-    def read(self) -> NDArray[Any]:
-        """Return the array."""
-        return self.array
-
-    def rows(self) -> Iterator[NDArray[Any]]:
-        """Yield one row after the other."""
-        yield from self.array
-
-
-def mapped(path: Path) -> Held:
+def mapped(path: Path) -> NDArray[Any]:
     """Return the array of an .npy file, read from the disk row by row. Raises InputError where it is none."""
     check_size(path, sys.maxsize)
     with _as_input_error(f"{path}: expected an .npy file with an array"):
         with path.open("rb") as file:
             shape, fortran, dtype, start = _header(file, "one", path.stat().st_size)
-        return Held(np.memmap(path, dtype, "r", start, shape, "F" if fortran else "C"))
+        return np.memmap(path, dtype, "r", start, shape, "F" if fortran else "C")
 
 
 @contextmanager
@@ -156,11 +129,11 @@ def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mappi
     Raises InputError as `archived` does.
     """
     with archived(path, names, what, most) as arrays:
-        size = sum(max(one.size, 8 * math.prod(one.shape)) for one in arrays.values())
+        size = sum(max(one.nbytes, 8 * math.prod(one.shape)) for one in arrays.values())
         if size > most:
             came = f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most"
             raise InputError(f"{path}: expected an .npz file with {what}, got {came}")
-        return {name: one.read() for name, one in arrays.items()}
+        return {name: np.asarray(one) for name, one in arrays.items()}
 
 
 class _ArchiveFile(io.FileIO):

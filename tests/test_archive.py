@@ -32,7 +32,7 @@ def test_arrays_come_back_as_numpy_wrote_them(path, tmp_path):
     np.savez(tmp_path / "b.npz", a=turned)
     np.testing.assert_array_equal(read(tmp_path / "b.npz")["a"], turned)
     with archived(tmp_path / "b.npz", ["a"], "a", 10_000) as stored:
-        np.testing.assert_array_equal(np.stack(list(stored["a"].rows())), turned)
+        np.testing.assert_array_equal(np.stack(list(stored["a"])), turned)
 
 
 def test_any_cut_and_any_flipped_bit_is_read_or_refused_with_one_line(path):

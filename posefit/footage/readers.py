@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.archive import Held, Stored, archived, mapped
+from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import FORMATS, PIXELS, is_colourful, read_values
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
@@ -53,16 +53,16 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
     if isinstance(source, tuple):
         return read_images(source, name_of(source), frames, label)
     if isinstance(source, np.ndarray):
-        return _packed(name_of(source), {"masks": Held(source)}, frames, label)
+        return _packed(name_of(source), {"masks": source}, frames, label)
     if source.is_dir():
         return read_folder(source, frames, label)
     existing(source)
     if source.suffix.lower() == ".npy":
-        held = mapped(source)
-        check_decoded(str(source), held.array.nbytes)
-        return _packed(str(source), {"masks": held}, frames, label)
+        stack = mapped(source)
+        check_decoded(str(source), stack.nbytes)
+        return _packed(str(source), {"masks": stack}, frames, label)
     with archived(source, NAMES, "the key masks", PACKED) as arrays:
-        check_decoded(str(source), sum(array.size for array in arrays.values()))
+        check_decoded(str(source), sum(array.nbytes for array in arrays.values()))
         return _packed(str(source), arrays, frames, label)
 
 
@@ -121,12 +121,12 @@ def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     return [(int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p) for p in parts], file.name
 
 
-def _packed(name: str, arrays: Mapping[str, Stored | Held], frames: Range, label: int | None) -> PackedMasks:
+def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:
     """Return the masks of arrays by their names. Raises InputError naming what holds them where it holds none."""
     stack = _checked_stack(name, arrays)
     count, height, width = stack.shape
-    usable = arrays["usable"].read() if "usable" in arrays else np.ones(count, dtype=bool)
-    fps = float(arrays["fps"].read()) if "fps" in arrays else None
+    usable = np.asarray(arrays["usable"]) if "usable" in arrays else np.ones(count, dtype=bool)
+    fps = float(np.asarray(arrays["fps"])) if "fps" in arrays else None
     if fps is not None and not 0.0 < fps <= MAX_FPS:
         raise InputError(f"{name}: fps must be a number up to {MAX_FPS:g}, got {fps:g}")
     start, stop = span(frames, count)
@@ -138,7 +138,7 @@ def _packed(name: str, arrays: Mapping[str, Stored | Held], frames: Range, label
     return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps)
 
 
-def _checked_stack(name: str, arrays: Mapping[str, Stored | Held]) -> Stored | Held:
+def _checked_stack(name: str, arrays: Mapping[str, Stored | NDArray[Any]]) -> Stored | NDArray[Any]:
     """Return the masks of arrays. Raises InputError where one of them has another shape or type."""
     if "masks" not in arrays:
         raise InputError(f"{name}: expected an .npz file with the key masks, got none")
@@ -162,16 +162,16 @@ def _checked_stack(name: str, arrays: Mapping[str, Stored | Held]) -> Stored | H
     return stack
 
 
-def _described(stored: Stored | Held) -> str:
+def _described(stored: Stored | NDArray[Any]) -> str:
     return f"{quoted(tuple(stored.shape))} {stored.dtype}"
 
 
-def _stack_classifier(name: str, stored: Stored | Held, start: int, stop: int, label: int | None) -> Classifier:
+def _stack_classifier(name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None) -> Classifier:
     """Return how frames start to stop become masks; booleans need no count."""
     if stored.dtype.kind == "b" and label is None:
         return _above(0.0)
     counts = ValueCounts()
-    for k, frame in enumerate(stored.rows()):
+    for k, frame in enumerate(stored):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
             raise InputError(f"{name}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
@@ -179,10 +179,10 @@ def _stack_classifier(name: str, stored: Stored | Held, start: int, stop: int, l
     return counts.classifier(label, name)
 
 
-def _pack(stored: Stored | Held, start: int, stop: int, is_person: Classifier) -> Planes:
+def _pack(stored: Stored | NDArray[Any], start: int, stop: int, is_person: Classifier) -> Planes:
     """Return the bits of frames start to stop; the others are read to the end, for the checksum."""
     planes = empty_planes(stop - start, (stored.shape[2], stored.shape[1]))
-    for k, frame in enumerate(stored.rows()):
+    for k, frame in enumerate(stored):
         if start <= k < stop:
             planes[k - start] = np.packbits(is_person(frame))
     return planes
