@@ -17,3 +17,16 @@ def test_each_tag_has_one_home_and_a_test_and_each_test_a_tag_with_a_home() -> N
     assert {tag: count for tag, count in homes.items() if count > 1} == {}
     assert [tag for tag in homes if f"# {tag}" not in tests] == []
     assert set(TAG.findall(tests)) <= set(homes)
+
+
+def test_the_tests_that_the_page_of_items_names_are_there() -> None:
+    tests = Path(__file__).parents[1]
+    page = tests.parent / "docs" / "background" / "coverage.md"
+    cells = [row.split(" | ")[3] for row in page.read_text("utf-8").splitlines() if row.startswith("| ")]
+    assert len(cells) > 90
+    for cell in cells:
+        name = ""
+        for file, test in re.findall(r"([\w/]+\.py)::|\b(test_\w+)\b(?!\.py)", cell):
+            name = file or name
+            path = next(path for path in (tests / "sources" / name, tests / name) if path.exists())
+            assert not test or f"def {test}(" in path.read_text("utf-8"), (name, test)
