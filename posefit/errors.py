@@ -1,8 +1,16 @@
 """The error that a mistake of the user raises, as opposed to a fault of the program."""
 
+import re
+
+_LONG = re.compile(r"\S{300,}")  # longer than any one name of a file
+
 
 def printable(text: str) -> str:
-    r"""Return a text on one line: line breaks become \n, what steers a terminal is written out, too."""
+    r"""Return a text on one line: line breaks become \n, what steers a terminal is written out, too.
+
+    The middle of what is too long to be a name is left out, so that 80 characters remain.
+    """
+    text = _LONG.sub(lambda word: f"{word[0][:38]}...{word[0][-39:]}", text)
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)

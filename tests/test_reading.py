@@ -17,6 +17,7 @@ def test_what_a_message_quotes_is_cut_at_80_characters():
 
 
 def test_a_message_is_one_line_that_leaves_the_terminal_alone():
+    assert str(InputError("a" * 200 + "b" * 200 + ": bad")) == "a" * 38 + "..." + "b" * 38 + ":" + " bad"
     assert str(InputError("a\nb\x1b[31m\x9b\u202ec é 人: bad")) == r"a\nb\x1b[31m\x9b\u202ec é 人: bad"
 
 

@@ -70,8 +70,9 @@ class _Commands(click.Group):
         """Run a command."""
         try:
             return super().invoke(context)
-        except (click.UsageError, InputError, FileNotFoundError, PermissionError, ImportError) as error:
-            if context.params.get("debug"):
+        except (click.UsageError, InputError, OSError, ImportError) as error:
+            unnamed = isinstance(error, OSError) and error.filename is None  # a fault, no file that a user named
+            if unnamed or context.params.get("debug"):
                 raise
             message = error.format_message() if isinstance(error, click.UsageError) else str(error)
             say(f"posefit: {' '.join(message.split())}")

@@ -468,6 +468,8 @@ def test_a_command_loads_no_library_that_it_can_do_without(command: str, librari
 def test_names_from_outside_do_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     say("warning: a\x1b]0;b\x07.mp4\nsecond line")
     assert capsys.readouterr().err == "warning: a\\x1b]0;b\\x07.mp4\nsecond line\n"
+    for words in (["track", "n" * 3000], ["track", "walk", "--camera", "n" * 3000], ["n" * 3000]):
+        assert len(fails(*words)) < 400
     assert fails("track", "a\x1b[31m\nb.amc").startswith(r"posefit: a\x1b[31m\nb.amc: expected ")
 
 
