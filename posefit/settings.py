@@ -135,12 +135,14 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
 
     Raises ValueError where a text has another form, or `parse` does.
     """
-    given = {}
+    given: dict[str, str] = {}
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"--set must be SETTING=VALUE such as population_size=20, got {quoted(text)}")
-        given[setting.rpartition(".")[2]] = value
+        if (name := setting.rpartition(".")[2]) in given:
+            raise InputError(f"--set must give a setting once, got {quoted(name)} twice")
+        given[name] = value
     return parse(plugin, factory, given)
 
 

@@ -6,7 +6,7 @@ from numbers import Integral, Real
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.reading import quoted
+from posefit.reading import cut, quoted
 
 MAX_BITS = 1_024  # of a whole number, so that it can be written down
 
@@ -22,7 +22,7 @@ def between(name: str, value: float, low: float, high: float, *, ends: bool = Tr
     inside = low <= value <= high if ends else low < value < high
     if not inside:
         way = f"lie in {low:g} to {high:g}" if ends else f"lie between {low:g} and {high:g}"
-        raise InputError(f"{name} must {way}, got {value}")
+        raise InputError(f"{name} must {way}, got {cut(str(value))}")
 
 
 def positive(name: str, value: float) -> None:

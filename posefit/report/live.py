@@ -15,6 +15,7 @@ from time import monotonic, sleep, time
 from typing import Any
 
 from posefit.errors import InputError
+from posefit.reading import quoted
 from posefit.sweep.driver import read_lease
 from posefit.sweep.ledger import INDEX, LEASES, ROWS, SHORT, Ledger
 from posefit.sweep.log import SUFFIX, is_locked
@@ -119,7 +120,7 @@ def serving(path: str | Path, port: int, warn: Callable[[str], None]) -> Iterato
     Waits up to three seconds for a missing ledger. Raises ValueError where there is no ledger or the port is taken.
     """
     if not 0 <= port <= MAX_PORT:
-        raise InputError(f"--port must be 0 to {MAX_PORT}, got {port}")
+        raise InputError(f"--port must be 0 to {MAX_PORT}, got {quoted(port)}")
     until = monotonic() + LEDGER_TIMEOUT_SECONDS
     while not Path(path).is_file() and not (Path(path) / INDEX).exists() and monotonic() < until:
         sleep(POLL_SECONDS)

@@ -8,6 +8,7 @@ from typing import Any
 from posefit.errors import InputError
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
+from posefit.reading import cut
 from posefit.report.content import data_of
 from posefit.report.export import logged_runs, write_csv, write_iohprofiler
 from posefit.report.page import MARK, document
@@ -45,6 +46,8 @@ def write_report(
         library("figure")
     ledger = Ledger(path, warn)
     runs = runs_of(ledger)
+    if csv is not None and not len(ledger) and not ledger.quarantined_keys():
+        raise InputError(f"{csv}: expected a row to write, got a ledger with damaged ones alone")
     if runs.is_search and (figures is not None or iohprofiler is not None):
         name = "iohprofiler" if figures is None else "figures"
         table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
@@ -114,7 +117,7 @@ def _gap_lines(header: dict[str, Any]) -> list[str]:
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:
     """Raise ValueError where something could not be written."""
     if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"--out must be a file that ends in .html, got {out}")
+        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
     if out is not None and not replaceable(Path(out), MARK.encode()):
         raise InputError(f"{out}: expected a new name or an earlier report, got something else")
     places = [place for place in (out, *others) if place is not None]

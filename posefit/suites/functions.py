@@ -53,7 +53,7 @@ def checked_address(name: object, function: object, instance: object, dimension:
     chosen = suite_function(function)
     number = whole("instance", instance, 0)
     if number not in INSTANCES:
-        raise InputError(f"instance must be at most {INSTANCES[-1]}, got {number}")
+        raise InputError(f"instance must be at most {INSTANCES[-1]}, got {quoted(number)}")
     if not _among(dimension, chosen.dimensions):
         known = ", ".join(map(str, chosen.dimensions))
         raise InputError(f"dimension of function {chosen.number} must be one of {known}, got {quoted(dimension)}")

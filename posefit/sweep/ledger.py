@@ -47,7 +47,7 @@ INDEX = "ledger.json"
 ROWS, LEASES, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "leases", "quarantine", "aside", "plans")
 FORMAT = 1
 MAX_INDEX_BYTES = 10_000
-REASON = 200  # characters of why a row is bad
+REASON = 120  # characters of why a row is bad
 MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
 VERSION = re.compile(rb'"version": "([^"]*)"')  # in a row
 PLANNED, SHORT = b'{"cells": ', 8  # how the file of a plan begins; bytes of each key that it holds

@@ -46,7 +46,7 @@ import numpy as np
 from posefit import settings
 from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
-from posefit.reading import SHOWN, parsed_toml, quoted, read_text
+from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text
 from posefit.registry import registry
 from posefit.suites.functions import DIMENSIONS, FUNCTIONS, HELD_OUT, SUITES, checked_address, suite_function
 from posefit.suites.problem import EVALUATIONS, INFEASIBLE
@@ -168,7 +168,7 @@ class Plan:
             raise InputError("a plan must hold at least one cell, got none")
         if twice := _repeated(bytes(self._digests)):
             cell = next(cell for cell in self if cell.key == twice)
-            raise InputError(f"the cells of a plan must differ, got {cell} twice")
+            raise InputError(f"the cells of a plan must differ, got {cut(str(cell))} twice")
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -216,7 +216,9 @@ class Plan:
         cells = [make(_mapping("cells", spec)) for spec in listed]
         plan = cls(cells) if lists is None else cls(Product(lists, make), cells)
         if unused := [name for name in shared if name not in used]:
-            raise InputError(f"defaults.settings must be of the plan's methods, got {unused[0]!r}, which none uses")
+            raise InputError(
+                f"defaults.settings must be of the plan's methods, got {quoted(unused[0])}, which none uses"
+            )
         return plan
 
     def __len__(self) -> int:

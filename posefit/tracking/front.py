@@ -64,8 +64,9 @@ def track(
     chosen = resolved(sources[0], chosen)
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
     clips = training_clips(chosen.train, chosen.asf, followed=followed)  # before the work, as a name may be wrong
-    if resume and out is None:
-        raise InputError("resume must be given with out, the folder of the track that goes on, got none")
+    for name, value in (("resume", resume), ("force", force)):
+        if value and out is None:
+            raise InputError(f"{name} must be given with out, the folder of the track, got none")
     if rerun is not None:
         from posefit.tracking.recording import check_recording
 

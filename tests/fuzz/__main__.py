@@ -48,11 +48,11 @@ class Tally:
             self.find("hang", f"{number} hang {reader}: {seconds:.0f} s")
 
 
-def fuzz(seed: int, numbers: range, tally: Tally) -> None:
+def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
     """Have inputs read by child processes, one after the other where one of them dies or hangs."""
     start = numbers.start
     while start < numbers.stop:
-        command = [sys.executable, "-m", "tests.fuzz.worker", str(seed), str(start), str(numbers.stop)]
+        command = [sys.executable, "-m", "tests.fuzz.worker", str(seed), str(start), str(numbers.stop), kinds]
         with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0) as child:
             assert child.stdout is not None
             begun, since, patience = start, time.monotonic(), STARTING
@@ -85,10 +85,11 @@ def main() -> int:
     parser.add_argument("--inputs", type=int, default=5_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="one input alone, by its number")
+    parser.add_argument("--readers", default="", help="some alone, such as rows,frames")
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
     numbers = range(given.inputs) if given.only is None else range(given.only, given.only + 1)
-    tally = run(given.seed, numbers, given.workers)
+    tally = run(given.seed, numbers, given.workers, given.readers)
     for name in ("read", "refused", "unclean", "abort", "hang", "large"):
         print(f"{name:8} {tally.counts[name]:>8,}")
     for reader in sorted(tally.read | tally.refused):
@@ -97,12 +98,12 @@ def main() -> int:
     return int(bool(tally.findings))
 
 
-def run(seed: int, numbers: range, workers: int) -> Tally:
+def run(seed: int, numbers: range, workers: int, kinds: str = "") -> Tally:
     """Return what came of inputs, of which each worker reads a part."""
     tally = Tally()
     cuts = [numbers.start + len(numbers) * k // workers for k in range(workers + 1)]
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(lambda ends: fuzz(seed, range(*ends), tally), pairwise(cuts)))
+        list(pool.map(lambda ends: fuzz(seed, range(*ends), tally, kinds), pairwise(cuts)))
     return tally
 
 

@@ -22,6 +22,7 @@ from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
 from posefit_priors.union import Union
 from tests.footage.matroska import write_matroska
+from tests.fuzz.written import written
 from tests.geometry.calibrations import QUALISYS, TOML, opencv
 
 PLAN = """[defaults]
@@ -82,6 +83,7 @@ def corpus(folder: Path) -> list[Seed]:
     texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
     texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
+    seeds += [Seed(kind, ".jsonl", content) for kind, content in written(folder).items()]
     return [*seeds, Seed("plan", ".toml", PLAN.encode()), Seed("ledger", ".json", LEDGER.encode())]
 
 

@@ -7,6 +7,8 @@ import struct
 import zipfile
 import zlib
 
+from tests.fuzz.written import mended
+
 NUMBERS = (
     b"0", b"-1", b"1", b"3", b"2147483648", b"4294967295", b"99999999999999999999", b"1e308", b"-1e308", b"1e400", b"1e-320",
     b"nan", b"inf", b"-0.0", b"0x7fffffff", b"1" * 60, b"1" * 5000, b"16384", b"16385", b"0.5", b"true", b"''",
@@ -29,7 +31,7 @@ def mutated(rng: random.Random, content: bytes, suffix: str, other: bytes) -> by
         return _resized(rng, content)
     for _ in range(rng.choice((1, 1, 1, 2, 3, 8))):
         content = _changed(rng, content, other)
-    return content
+    return mended(content) if suffix == ".jsonl" and rng.random() < 0.8 else content
 
 
 def _changed(rng: random.Random, content: bytes, other: bytes) -> bytes:

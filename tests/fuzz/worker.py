@@ -17,6 +17,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from tests.fuzz import written
 from tests.fuzz.corpus import Seed, corpus
 from tests.fuzz.mutator import mutated
 
@@ -88,6 +89,7 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         "video": video,
         "plan": plan.Plan.read,
         "ledger": ledger,
+        **written.readers(),
         **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Union, Transformed)},
     }
 
@@ -123,13 +125,13 @@ def peak() -> int:
     return size // 1024
 
 
-def main(seed: int, numbers: range) -> None:
+def main(seed: int, numbers: range, kinds: str) -> None:
     """Read inputs."""
     say = os.fdopen(os.dup(1), "w", buffering=1)
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        seeds = corpus(folder)
+        seeds = [one for one in corpus(folder) if not kinds or one.reader in kinds.split(",")]
         known = readers(folder)
         for one in seeds:  # what is compiled or imported at first is not an input's
             (folder / f"{NAME}{one.suffix}").write_bytes(one.content)
@@ -159,4 +161,4 @@ def _clear(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), range(int(sys.argv[2]), int(sys.argv[3])))
+    main(int(sys.argv[1]), range(int(sys.argv[2]), int(sys.argv[3])), sys.argv[4])

@@ -1,5 +1,6 @@
 """A plan is checked as a whole, before anything runs; a mistake in it is one line."""
 
+import io
 import json
 import re
 import sys
@@ -264,8 +265,11 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
     assert row["trace"]["evaluations"][-1] <= 2440
 
 
+PLAIN = '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\n'
+
+
 def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(tmp_path: Path) -> None:
-    path, cells = tmp_path / "plan.toml", '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\n'
+    path, cells = tmp_path / "plan.toml", PLAIN
     path.write_bytes(b"\xef\xbb\xbf" + cells.encode())
     assert len(Plan.read(path)) == 1
     for line, message in (
@@ -280,6 +284,14 @@ def test_a_plan_may_have_a_byte_order_mark_and_numbers_of_any_size_are_checked(t
         path.write_text(cells + line)
         with pytest.raises(ValueError, match=message):
             Plan.read(path)
+
+
+def test_a_plan_on_standard_input_is_read_whole_or_refused(monkeypatch: Any) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO(PLAIN + "#" * 1_000_000))
+    with pytest.raises(ValueError, match="-: expected a plan of at most 1,000,000 characters, got more"):
+        Plan.read("-")
+    monkeypatch.setattr("sys.stdin", io.StringIO(PLAIN))
+    assert len(Plan.read("-")) == 1
 
 
 def test_a_product_gives_the_cells_and_keys_that_its_specs_give_one_by_one() -> None:
