@@ -12,10 +12,10 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, TypeVar, get_args
 
@@ -64,13 +64,17 @@ class Offer:
 
     @property
     def origin(self) -> str:
-        """What its results depend on: its distribution with its version, and a digest of its package's source.
+        """What its results depend on: its distribution with its version, a digest of its package's source, its library.
 
         The packages of posefit's own plugins, which have one version, are distinguished by name.
         """
         module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
         name = module.partition(".")[0] if self.distribution == PROJECT else f"{self.distribution} {self.version}"
-        return f"{name} {source_digest(module)}".rstrip()
+        library = ""
+        if self.needs is not None:
+            with suppress(PackageNotFoundError):
+                library = f" with {self.needs[0]} {version(self.needs[0])}"
+        return f"{name} {source_digest(module)}".rstrip() + library
 
     @property
     def summary(self) -> str:

@@ -296,8 +296,11 @@ def json_of(value: Any) -> str:
 
 
 def digest_of(path: str | Path) -> str:
-    """Return the SHA-256 of a file's content."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    """Return the SHA-256 of a file's content. Raises InputError where there is no file, or something else."""
+    if not Path(path).is_file():
+        raise InputError(f"{path}: expected a file, got none")
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def settings_text(settings: Mapping[str, Any]) -> list[str]:

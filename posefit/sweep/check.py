@@ -22,7 +22,7 @@ from posefit.tracking.method import method_names, parsed_settings
 from posefit.tracking.options import TrackOptions, declared
 
 FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
-MAX_VIEWS, MAX_FRAMES = 100, 1_000_000  # of a cell
+MAX_VIEWS, MAX_FRAMES = 100, 100_000  # of a cell
 MAX_BODY_OFF = 50.0  # percent that a body may be off
 
 

@@ -201,7 +201,9 @@ class Ledger:
         try:
             if zlib.crc32(data) == checksum and _unpacked_bytes(data) <= MAX_JOINTS_BYTES:
                 with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-                    joints = {name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")}
+                    joints: dict[str, Any] = {
+                        name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")
+                    }
                 shapes = {one.shape for one in joints.values() if np.isfinite(one).all()}
                 if len(shapes) == 1 and (shape := shapes.pop())[1:] == (len(SKELETON_JOINTS), 3) and shape[0]:
                     return joints

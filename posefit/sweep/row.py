@@ -186,7 +186,7 @@ def _search_trace(name: str, value: Any) -> None:
 
 
 def _reliability(name: str, value: Any) -> None:
-    bins = value if isinstance(value, list) else [None]
+    bins: list[Any] = value if isinstance(value, list) else [None]
     if not all(_are_numbers(one) and len(one) == 3 and 0 <= one[1] <= 1 for one in bins):
         raise InputError(f"{name} must be triples of frames, probability and share, got {quoted(value)}")
 

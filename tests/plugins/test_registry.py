@@ -195,3 +195,5 @@ def test_the_origin_of_results_changes_with_the_source_of_a_plugin(
     assert origins[0].startswith("posefit-growing 1.0 ")
     # a plugin without a file has its version alone
     assert Offer("optimiser", "plain", dict, "posefit-plain", "1.0").origin == "posefit-plain 1.0"
+    adapter = Offer("optimiser", "plain", dict, "posefit-plain", "1.0", needs=("numpy", "posefit[plain]"))
+    assert adapter.origin == f"posefit-plain 1.0 with numpy {np.__version__}"

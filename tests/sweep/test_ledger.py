@@ -109,7 +109,7 @@ SPEC = result(cells(1)[0]).row["spec"]
         ({"error_degrees": {"mean": "x"}}, "mean must be a number, got 'x'"),
         ({"spec": {}}, "spec must be the fields of a cell, got none called 'body_off_percent'"),
         ({"spec": {**SPEC, "seed": "0\nEND\nrm -r x"}}, "seed must be a whole number"),
-        ({"spec": {**SPEC, "frames": 10**7}}, "frames must lie in 1 to 1e+06"),
+        ({"spec": {**SPEC, "frames": 10**7}}, "frames must lie in 1 to 100000"),
         ({"spec": {**SPEC, "settings": {"a": {}}}}, "settings a must be a value"),
         ({"trace": {"evaluations": [1, 1], "cost": [2, 1]}}, "trace must be rising evaluations"),
         ({"trace": {"evaluations": [1], "cost": []}}, "trace must be rising evaluations"),
