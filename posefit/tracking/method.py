@@ -34,7 +34,7 @@ from posefit.silhouette.cost import BETA
 from posefit.tracking.modes import WeighingTracker
 from posefit.tracking.options import TrackOptions
 
-DEFAULT_OPTIMISER = "cma"
+DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
 DEFAULT_TRACKER = "exemplars"  # where it is installed
 FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
@@ -71,9 +71,9 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
 def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     """Return options whose method and training motions are known, by default those of the source.
 
-    That is `exemplars`, which learns from the library of recorded motions. A built-in motion is tracked by `cma@pca`;
-    so is all else for which an optimiser, a prior or settings of theirs are given, by the optimiser that settings name,
-    and footage with the prior `loose`. These and other trackers learn from the other styles of a built-in motion, or
+    That is `exemplars`, which learns from the library of recorded motions. A built-in motion, and all else for which an
+    optimiser, a prior or settings of theirs are given, is tracked by `annealed@pca`, or the optimiser that settings
+    name; footage with the prior `loose`. These and other trackers learn from the other styles of a built-in motion, or
     else from the built-in walks.
     """
     known = isinstance(source, str) and source in built_in.names()

@@ -173,7 +173,7 @@ class TrackOptions:
 
     method: "str | TrackerFactory | None" = option(
         None,
-        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or cma@pca "
+        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
         "for a built-in motion.",
         unit="METHOD",
     )

@@ -50,7 +50,9 @@ def browser() -> Iterator[Any]:
 @contextmanager
 def opened(chromium: Any, path: Path | str, width: int = 1280, **how: Any) -> Iterator[Watched]:
     """Give a file's page, or that of an address, in a window so many pixels wide; offline by default."""
-    context = chromium.new_context(viewport={"width": width, "height": 900}, **{"offline": True, **how})
+    context = chromium.new_context(
+        viewport={"width": width, "height": 900}, **{"offline": True, "reduced_motion": "reduce", **how}
+    )
     watched = Watched(context.new_page())
     watched.page.on("console", lambda message: watched.complaints.append(message.text))
     watched.page.on("pageerror", lambda error: watched.complaints.append(str(error)))

@@ -24,8 +24,8 @@ WALKS = ("walk-a", "walk-b", "walk-c")
 
 def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
     for source, given, expected, train in (
-        ("walk", {}, "cma@pca", WALKS),
-        ("run-a", {}, "cma@pca", ("run-b",)),
+        ("walk", {}, "annealed@pca", WALKS),
+        ("run-a", {}, "annealed@pca", ("run-b",)),
         ("16_15", {}, "exemplars", ["library"]),
         ("16_15.amc", {"method": "exemplars"}, "exemplars", ["library"]),
         ("16_15", {"method": "sapso"}, "sapso@pca", WALKS),
@@ -34,7 +34,7 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         ("masks/", {"method": "exemplars"}, "exemplars", ["library"]),
         ("a.npz", {"train": ["library:-16"]}, "exemplars", ["library:-16"]),
         ("a.npz", {"method": "annealed"}, "annealed@loose", WALKS),
-        ("a.npz", {"method": "@pca"}, "cma@pca", WALKS),
+        ("a.npz", {"method": "@pca"}, "annealed@pca", WALKS),
         ("a.npz", {"settings": {"sapso.cooling": 0.9}}, "sapso@loose", WALKS),
         ("a.npz", {"method": "vsmm"}, "vsmm", WALKS),
     ):
@@ -48,7 +48,7 @@ def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pyt
     without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
     options = resolved("a.npz", TrackOptions())
-    assert (options.method, options.train) == ("cma@loose", WALKS)
+    assert (options.method, options.train) == ("annealed@loose", WALKS)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
         (["--method", "exemplars"], "exemplars"),
         (["--set", "exemplars.lag=0"], "exemplars"),
         (["--set", "sapso.cooling=0.9"], "sapso@loose"),
-        (["--set", "tracker.floor=0.1"], "cma@loose"),
+        (["--set", "tracker.floor=0.1"], "annealed@loose"),
     ],
 )
 def test_settings_choose_the_method(masks: Path, words: list[str], method: str) -> None:

@@ -245,7 +245,7 @@ def test_a_given_first_pose_starts_the_first_frame_around_it(seed: int) -> None:
 @each("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
 def test_every_prior_can_be_searched(prior: str) -> None:
     summary = posefit.track("walk", method=f"@{prior}", **QUICK).summary
-    assert summary["method"] == f"cma@{prior}"
+    assert summary["method"] == f"annealed@{prior}"
     assert summary["iou"] > 0.4
 
 

@@ -277,7 +277,7 @@ def test_a_joint_has_intervals_and_a_clinical_angle_has_none(chromium: Any, doub
 def test_a_single_frame_has_no_player_and_no_curves(chromium: Any, tmp_path: Path) -> None:
     scene = walk(1)
     with opened(chromium, viewed(tmp_path / "out", scene, exact_frames(scene)), 390) as browser:
-        assert browser.page.locator("#lead").inner_text() == "A single frame."
+        assert browser.page.locator("#lead").inner_text().startswith("A single frame.")
         assert not browser.page.locator("#frame").is_visible()
         assert browser.page.locator("#curves").count() == 0
         browser.page.keyboard.press("n")

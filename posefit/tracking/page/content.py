@@ -49,6 +49,7 @@ def track_data(
     return {
         "version": __version__,
         "title": str(summary["motion"]),
+        "made": _made(summary),
         "verdict": _verdict(summary),
         "notes": [*_held(summary), *map(str, summary["warnings"])],
         "facts": _facts(summary),
@@ -90,6 +91,14 @@ def track_data(
         if intervals
         else None,
     }
+
+
+def _made(summary: dict[str, Any]) -> str:
+    """Return the method and how far it is off, in a sentence."""
+    if summary["mpjpe_mm"] is None:
+        return f"Tracked by {summary['method']}."
+    lost = "" if summary["lost_rate"] is None else f", {100.0 * summary['lost_rate']:.0f} % of the frames lost"
+    return f"Tracked by {summary['method']}, {summary['mpjpe_mm']:.0f} mm off the truth{lost}."
 
 
 def _verdict(summary: dict[str, Any]) -> str:

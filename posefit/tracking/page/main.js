@@ -15,7 +15,7 @@ function header() {
     `${thinned}${fewer}poses.npz and frames.csv in the same folder have every frame, overlay.mp4 the pictures.`;
   const time = `${number(D.count / D.fps, 1)} s at ${+D.fps.toPrecision(4)} frames a second`;
   const length = shown > 1 ? `${counted(D.count, "frame")}, ${time}.` : "A single frame.";
-  $("lead").textContent = `${length} ${thinned}${fewer}`.trimEnd();
+  $("lead").textContent = `${length} ${D.made} ${thinned}${fewer}`.trimEnd();
 }
 
 // A frame's time, figures and marks in words.
@@ -127,4 +127,6 @@ if (shown > 1) curves();
 else $("curves").remove();
 look(0.7, 0.15);
 turnable($("turning"), paint);
+for (const masks of D.masks) for (const [, uri] of masks.pictures) pictureOf(uri);
+play(shown > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches);
 new ResizeObserver(paint).observe($("picture"));

@@ -175,11 +175,66 @@ function paintPicture() {
 const lowest = (at) => Math.min(...range(shown).map((k) => Math.min(...at(k).map((point) => point[1]))));
 const floor = lowest(truthAt ?? estimateAt);
 
+// A line of points on the floor, round at its ends.
+function onFloor(pen, camera, points, width) {
+  const pixels = projected(
+    camera,
+    points.map(([x, , z]) => [x, floor, z]),
+  ).filter(([, , depth]) => depth > NEAR);
+  pen.lineWidth = width;
+  pen.beginPath();
+  for (const [x, y] of pixels) pen.lineTo(x, y);
+  pen.stroke();
+}
+
+// The path over the ground up to a frame, and the body's shadow.
+function ground(pen, camera, joints) {
+  pen.strokeStyle = ink("--line");
+  pen.lineCap = pen.lineJoin = "round";
+  onFloor(
+    pen,
+    camera,
+    range(show.frame + 1).map((frame) => estimateAt(frame)[0]),
+    3,
+  );
+  const [, , depth] = projected(camera, [joints[0]])[0];
+  BONES.forEach(([parent, joint], bone) => {
+    const wide = ((D.radii[bone][0] + D.radii[bone][1]) * camera.focal[0]) / depth;
+    onFloor(pen, camera, [joints[parent], joints[joint]], wide);
+  });
+}
+
+// Two eyes, where the head faces the camera: the way that the line across the hips faces.
+function face(pen, camera, joints) {
+  const at = (name) => joints[D.joints.indexOf(name)];
+  const [left, right, head, neck] = ["lfemur", "rfemur", "head", "upperneck"].map(at);
+  const across = [left[0] - right[0], left[2] - right[2]];
+  const long = Math.hypot(...across) || 1;
+  const [x, z] = [across[0] / long, across[1] / long];
+  const size = D.radii[BONES.findIndex(([, joint]) => D.joints[joint] === "head")][1];
+  const middle = head.map((value, k) => (value + neck[k]) / 2);
+  const points = [-1, 1].map((side) => [
+    middle[0] - size * (0.85 * z - 0.4 * side * x),
+    middle[1] + 0.1 * size,
+    middle[2] + size * (0.85 * x + 0.4 * side * z),
+  ]);
+  const [[, , depth], ...eyes] = projected(camera, [middle, ...points]);
+  pen.fillStyle = ink("--back");
+  for (const [a, b, near] of eyes) {
+    if (near <= NEAR || near > depth) continue;
+    pen.beginPath();
+    pen.arc(a, b, (0.16 * size * camera.focal[0]) / near, 0, 2 * Math.PI);
+    pen.fill();
+  }
+}
+
 function paintBody() {
   const joints = estimateAt(show.frame);
   const canvas = $("turning");
   const { pen, camera } = stage(canvas, joints[0], floor, canvas.clientWidth < 420 ? 0.9 : 0.75);
+  ground(pen, camera, joints);
   cones(pen, camera, projected(camera, joints), solids(show.frame), 1.5);
+  face(pen, camera, joints);
   if (truthAt && $("with-truth").checked) sticks(pen, projected(camera, truthAt(show.frame)), ink("--ink"), 1.5);
   const other = otherOf(show.frame);
   if (other) sticks(pen, projected(camera, other.joints), ink("--other"), 2.5);
