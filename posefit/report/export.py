@@ -20,7 +20,7 @@ from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import ANGLES
 from posefit.report.runs import damage, views
-from posefit.statistics.profiles import Trace, trace
+from posefit.statistics.profiles import Trace
 from posefit.version import __version__
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _write_problem(folder: Path, name: str, number: int, algorithm: Mapping[str,
             for run in sorted(runs, key=lambda run: (run.instance, run.seed)):
                 if run.dimension != dimension:
                     continue
-                used, best = _rows(trace(run.evaluations, run.costs))
+                used, best = _rows((np.asarray(run.evaluations, float), np.asarray(run.costs, float)))
                 file.write(_HEADER + "\n")
                 file.writelines(f"{e} {y!r}\n" for e, y in zip(used, best, strict=True))
                 least = {"evals": used[best.index(best[-1])], "y": best[-1], "x": []}
@@ -156,12 +156,6 @@ def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]
         for kind, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
             if not least <= value <= MAX_NUMBER:
                 raise InputError(f"{name}: {kind} must lie in {least} to {MAX_NUMBER}, got {value}")
-        try:
-            used, _ = trace(run.evaluations, run.costs)
-        except ValueError as error:
-            raise InputError(f"{name}: {error}") from None
-        if (used % 1.0).any():
-            raise InputError(f"{name}: evaluations must be whole numbers, got {used[used % 1.0 > 0.0][0]:g}")
         key = run.method, json.dumps(dict(run.settings), sort_keys=True, default=str)
         identity = (*key, run.problem, run.dimension, run.instance, run.seed)
         if identity in identities:

@@ -3,7 +3,7 @@
 An anytime trace is evaluations (k,), rising, and the best cost so far (k,) at each, never rising.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,18 +16,6 @@ TARGETS = 51
 LEAST_TARGET = 0.01  # a cost; what is below is a pixel or none
 
 Trace = tuple[Array, Array]
-
-
-def trace(evaluations: ArrayLike, costs: ArrayLike) -> Trace:
-    """Return an anytime trace as two arrays (k,), or raise ValueError where it is none."""
-    used, best = finite("evaluations", evaluations, ("k",)), finite("costs", costs, ("k",))
-    if used.shape != best.shape:
-        raise InputError(f"costs must be one for each of {len(used)} evaluations, got {len(best)}")
-    if used[0] < 1.0 or (np.diff(used) <= 0.0).any():
-        raise InputError(f"evaluations must rise from at least 1, got {_listed(used)}")
-    if (np.diff(best) > 0.0).any():
-        raise InputError(f"costs must be the best so far and never rise, got {_listed(best)}")
-    return used, best
 
 
 def targets(traces: Iterable[Trace], count: int = TARGETS) -> Array:
@@ -91,7 +79,3 @@ def performance_profile(errors: ArrayLike, levels: ArrayLike) -> Array:
     array, edges = finite("errors", errors, ("methods", "instances", "seeds")), finite("levels", levels, ("levels",))
     runs = np.sort(array.reshape(len(array), -1), axis=1)
     return np.array([np.searchsorted(row, edges, side="right") / len(row) for row in runs])
-
-
-def _listed(values: Sequence[float] | Array) -> str:
-    return ", ".join(f"{value:g}" for value in values[:4]) + (", ..." if len(values) > 4 else "")

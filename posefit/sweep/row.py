@@ -170,7 +170,7 @@ def _trace(name: str, value: Any) -> None:
     if isinstance(value, dict) and value.keys() == {"evaluations", "cost"}:
         used, best = value["evaluations"], value["cost"]
         if type(used) is type(best) is list and len(used) == len(best):
-            numbers = _NUMBERS.issuperset(map(type, used)) and _NUMBERS.issuperset(map(type, best))
+            numbers = {int}.issuperset(map(type, used)) and _NUMBERS.issuperset(map(type, best))
             if numbers and not used:
                 return
             rising = numbers and used == sorted(set(used)) and best == sorted(best, reverse=True)

@@ -65,14 +65,16 @@ def test_iohinspector_reads_every_cost_to_the_last_bit(tmp_path):
 def test_iohinspectors_expected_running_time_is_ours(tmp_path):
     from iohinspector.metrics.fixed_target import aggregate_running_time
 
-    from posefit.statistics.profiles import expected_running_time, hits, trace
+    from posefit.statistics.profiles import expected_running_time, hits
 
     runs = [run(seed=k, evaluations=(1, 40, 80), costs=(90.0, 20.0, last)) for k, last in enumerate((4.0, 9.0, 16.0))]
     write_iohprofiler(runs, tmp_path / "ioh")
     data = opened(tmp_path / "ioh").load(include_meta_data=True)
     table = aggregate_running_time(data, f_min=5.0, f_max=50.0, scale_f_log=False)
     targets = table["raw_y"].to_numpy()
-    ours = expected_running_time([hits(trace(logged.evaluations, logged.costs), targets) for logged in runs], [80] * 3)
+    ours = expected_running_time(
+        [hits((np.array(logged.evaluations), np.array(logged.costs)), targets) for logged in runs], [80] * 3
+    )
     between = (targets > 4.0) & ~np.isin(targets, [9.0, 16.0, 20.0])
     assert np.allclose(table["ERT"][between], ours[between])
 
@@ -145,9 +147,6 @@ def test_invalid_runs_and_folders_that_exist_are_refused_and_nothing_is_written(
         ([run(), run()], f"runs must differ in method, settings, .* got two of {name}"),
         ([run(dimension=0)], f"{name}: dimension must lie in 1 to 65535, got 0"),
         ([run(instance=70000)], "seed 0: instance must lie in 0 to 65535, got 70000"),
-        ([run(costs=(1.0, 2.0, 3.0))], "seed 0: costs must be the best so far and never rise, got 1, 2, 3"),
-        ([run(costs=(np.nan, 2.0, 1.0))], "seed 0: costs must be finite, got 1 that are not"),
-        ([run(evaluations=(1, 2.5, 3))], "seed 0: evaluations must be whole numbers, got 2.5"),
     ):
         with pytest.raises(ValueError, match=message):
             write_iohprofiler(runs, tmp_path / "ioh")

@@ -2,7 +2,8 @@
 
 Cells take half a second. While they run, events come at random moments: a process that runs a cell is killed, or a
 Dask worker, the driver, or the driver with its whole group; one is stopped and goes on; a log is cut off as power
-failure may, a byte of it is flipped; a lease is deleted. Whenever the driver has ended, it is started again, by the
+failure may, a byte of it is flipped, a line of it comes twice; a lease is deleted, or a byte of it is flipped; a
+second driver joins. Whenever the driver has ended, it is started again, by the
 same command. At the end every cell must have one row, none may be in quarantine, and every row that the last driver
 counted must be whole. Prints one JSON object of what happened; its exit status is 1 where something was lost.
 """
@@ -29,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 DASK = "kill a Dask worker"
 EVENTS = (
     "kill a worker", DASK, "kill the driver", "kill the group", "stop and go on", "cut a log off",
-    "flip a byte", "delete a lease",
+    "flip a byte", "repeat a line", "delete a lease", "flip a byte of a lease", "start a second driver",
 )  # fmt: skip
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.1, 0.8  # seconds between two events, at least and at most
@@ -52,6 +53,7 @@ class Chaos:
         self._random = random.Random(self.seed)
         self._ledger, self._starts = self.folder / "ledger", self.folder / "starts"
         self._driver: subprocess.Popen[bytes] | None = None
+        self._others: list[subprocess.Popen[bytes]] = []  # drivers beside it
 
     def run(self) -> dict[str, object]:
         """Return what happened, and what became of the cells."""
@@ -87,20 +89,24 @@ class Chaos:
 
     def _start(self) -> None:
         before = len(starts(self._starts))
-        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), self.engine, str(self.count), "slow"]
-        environment = {**os.environ, STARTS: str(self._starts), "PYTHONPATH": str(ROOT)}
-        with (self.folder / "output.txt").open("ab") as output:
-            self._driver = subprocess.Popen(
-                words, cwd=ROOT, env=environment, start_new_session=True, stdout=output, stderr=subprocess.STDOUT
-            )
+        self._driver = self._begun()
         until = time.monotonic() + PATIENCE
         while self._driver.poll() is None and len(starts(self._starts)) == before and time.monotonic() < until:
             time.sleep(0.1)
 
+    def _begun(self) -> subprocess.Popen[bytes]:
+        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), self.engine, str(self.count), "slow"]
+        environment = {**os.environ, STARTS: str(self._starts), "PYTHONPATH": str(ROOT)}
+        with (self.folder / "output.txt").open("ab") as output:
+            return subprocess.Popen(
+                words, cwd=ROOT, env=environment, start_new_session=True, stdout=output, stderr=subprocess.STDOUT
+            )
+
     def _end(self) -> None:
-        if self._driver is not None and self._driver.poll() is None:
-            os.killpg(self._driver.pid, signal.SIGKILL)
-            self._driver.wait()
+        for driver in (self._driver, *self._others):
+            if driver is not None and driver.poll() is None:
+                os.killpg(driver.pid, signal.SIGKILL)
+                driver.wait()
 
     def _missing(self) -> bool:
         """Return whether rows that the last driver counted were damaged since."""
@@ -124,6 +130,13 @@ class Chaos:
                 done = self._signalled([driver, *self._running()], signal.SIGSTOP)
             elif event == "delete a lease":
                 done = self._harmed("leases/*", lambda path: path.unlink())
+            elif event == "flip a byte of a lease":
+                done = self._harmed("leases/*", self._flip)
+            elif event == "repeat a line":
+                done = self._harmed("rows/*.jsonl", self._repeat)
+            elif event == "start a second driver":
+                self._others.append(self._begun())
+                done = True
             elif event == "cut a log off":
                 done = self._harmed("rows/*", lambda path: os.truncate(path, self._place(path)))
             else:
@@ -159,6 +172,13 @@ class Chaos:
         """Return a place near the end of a file: a power failure takes what was written last."""
         size = path.stat().st_size
         return self._random.randrange(max(0, size - 4000), size)
+
+    def _repeat(self, path: Path) -> None:
+        """Write a whole line of a log once more, to another log."""
+        whole = [line for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+        if whole:
+            with (path.parent / "repeated.jsonl").open("ab") as file:
+                file.write(self._random.choice(whole))
 
     def _flip(self, path: Path) -> None:
         file = os.open(path, os.O_RDWR)
