@@ -2,6 +2,7 @@
 
 import json
 import marshal
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -94,7 +95,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
     quarantined = ledger.quarantined()
     rows: list[_Row] = []
     kinds: set[bool] = set()
-    places: dict[bytes, str] = {}  # so that equal texts are one
+    places: dict[tuple[bytes, int], str] = {}  # by a spec without instance and seed, and the instance
     heads: dict[bytes, tuple[str, str]] = {}  # method and head of a spec without instance and seed
     for row in chain(ledger.rows(), quarantined):
         spec = row["spec"]
@@ -107,9 +108,9 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
         if fields not in heads:
             heads[fields] = _text(_variant(spec)), "" if searches else command_head(spec)
         figures, *data = _search_data(row) if searches else _track_data(row)
-        place = marshal.dumps(_place(spec), 2)
+        place = fields, spec["instance"]
         if place not in places:
-            places[place] = _text(_place(spec))
+            places[place] = sys.intern(_text(_place(spec)))
         texts = (places[place], *heads[fields])
         rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row["warnings"]), figures, tuple(data)))
     if not kinds and not may_be_empty and not ledger.bad():

@@ -41,11 +41,13 @@ def checked_row(key: str, text: bytes) -> dict[str, Any]:
     row = _parsed(key, text)
     search = check_spec(row["spec"])
     checks = _SEARCH_ROW if search else _TRACK_ROW
-    if missing := checks.keys() - row.keys():
-        raise InputError(f"a row must hold {min(missing)}, got none")
-    _check_figures({name: value for name, value in row.items() if name not in _FIGURES and name not in checks})
-    for name in _FIGURES.keys() & row.keys():
-        _figures(name, row[name])
+    if not checks.keys() <= row.keys():
+        raise InputError(f"a row must hold {min(checks.keys() - row.keys())}, got none")
+    several = _SEVERAL if search else _TRACK_SEVERAL
+    _check_figures({name: value for name, value in row.items() if name not in several})
+    for name in _FIGURES:
+        if (value := row.get(name)) is not None:
+            _figures(name, value)
     for name, check in checks.items():
         check(name, row[name])
     return row
@@ -67,7 +69,8 @@ def check_spec(spec: Any) -> bool:
         raise InputError(f"spec must be the fields of a cell, got {quoted(spec)}")
     search = is_search(spec)
     checks = _SEARCH_SPEC if search else _TRACK_SPEC
-    if wrong := spec.keys() ^ checks.keys():
+    if spec.keys() != checks.keys():
+        wrong = spec.keys() ^ checks.keys()
         came = f"{'one' if min(wrong) in spec else 'none'} called {quoted(min(wrong))}"
         raise InputError(f"spec must be the fields of a cell, got {came}")
     same = marshal.dumps({**spec, "seed": 0, "instance": 0}, 2)
@@ -111,8 +114,6 @@ def _figure(name: str, value: Any) -> None:
 
 
 def _figures(name: str, value: Any) -> None:
-    if value is None:
-        return
     if not isinstance(value, dict):
         raise InputError(f"{name} must be figures by their names, got {quoted(value)}")
     _check_figures(value)
@@ -173,7 +174,9 @@ def _trace(name: str, value: Any) -> None:
             numbers = {int}.issuperset(map(type, used)) and _NUMBERS.issuperset(map(type, best))
             if numbers and not used:
                 return
-            rising = numbers and used == sorted(set(used)) and best == sorted(best, reverse=True)
+            rising = (
+                numbers and used == sorted(used) and len(used) == len(set(used)) and best == sorted(best, reverse=True)
+            )
             if rising and 1 <= used[0] <= used[-1] < LARGEST and LARGEST > best[0] >= best[-1] > -LARGEST:
                 return
     raise InputError(f"{name} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}")
@@ -216,7 +219,7 @@ _SEARCH_SPEC = _made_of(
 )
 _known_specs: set[bytes] = set()
 # What a row holds that is not a single figure
-_FIGURES = {one.name: None for one in fields(Measures) if "Mapping" in str(one.type) or "Spread" in str(one.type)}
+_FIGURES = tuple(one.name for one in fields(Measures) if "Mapping" in str(one.type) or "Spread" in str(one.type))
 _ROW: dict[str, Check] = {
     "key": _text,
     "spec": lambda *_: None,  # by `check_spec`
@@ -227,3 +230,4 @@ _ROW: dict[str, Check] = {
 }
 _TRACK_ROW = {**_ROW, "joint_errors_mm": _joint_errors, "mode_reliability": _reliability}
 _SEARCH_ROW: dict[str, Check] = {**_ROW, "trace": _search_trace, "cost": _number, "best_known": _number}
+_SEVERAL, _TRACK_SEVERAL = {*_FIGURES, *_SEARCH_ROW}, {*_FIGURES, *_TRACK_ROW}
