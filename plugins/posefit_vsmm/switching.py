@@ -38,17 +38,18 @@ Measure = Callable[[Array], Measurement]
 def requested_group(points: Sequence[Array], how: Settings) -> int | None:
     """Return which group, 0 to 2, the latest points (17, 2) in the image ask for; None where it is no other.
 
-    Changes of angles are means over `smoothing` frames; those below `floor_degrees` count as none. Interpretation V10.
+    Changes of angles are means over `smoothing` frames; those below `floor_degrees`, and none at all, count as none.
+    Interpretation V10. The hips of rule a are both of them. Interpretation V15.
     """
     if len(points) < 2 * how.smoothing + 1:
         return None
     angles = np.array([limb_angles(frame, how.hip_angle) for frame in points[-2 * how.smoothing - 1 :]])
     changes = np.degrees(np.abs(wrapped(np.diff(angles, axis=0))))
     before, now = changes[: how.smoothing].mean(axis=0), changes[how.smoothing :].mean(axis=0)
-    moves, moved = now >= how.floor_degrees, before >= how.floor_degrees
+    moves, moved = ((change >= how.floor_degrees) & (change > 0.0) for change in (now, before))
     grown, shrunk = (now >= TWICE * before) & moves, (now <= HALF * before) & moved
     hips, limbs = slice(4, 6), slice(0, 4)
-    if grown[hips].any():  # VSMM 7a
+    if grown[hips].all():  # VSMM 7a
         return 2
     if grown[limbs].sum() >= how.most:  # VSMM 7b
         return 1
@@ -186,7 +187,7 @@ class Models:
         return self._made(self.active)
 
     def cycle(self, before: Belief, measure: Measure, surprise: float) -> Belief:
-        """Return the belief one frame later. Groups come and go; `surprise` is of the latest frame."""
+        """Return the belief one frame later. Groups come and go by the points recorded; `surprise` is of the frame."""
         if self._vector:
             measure = _of_numbers(measure)
         after = self.imm.cycle(before, measure)
@@ -199,11 +200,8 @@ class Models:
             if self._cycles < FIRST:
                 return after
             return self._keep(self.topology.most_probable(self.active, after.probabilities), after)  # VSMM 5
-        if self.newcomer is not None and self._rivalry is not None:
-            decision = self._rivalry.decide(after, self.active)
-            if decision is None:
-                return after
-            return self._keep(self.newcomer if decision == "new" else self.group, after)
+        if self.newcomer is not None:
+            return self._judged(after)
         self._rested += 1
         if self._rested <= self._how.dwell:
             return after
@@ -214,8 +212,16 @@ class Models:
             return self._rerun(before, old, self._made(old), measure)
         return self._activated(before, after, measure)
 
+    def _judged(self, after: Belief) -> Belief:
+        """Return the belief after a cycle over both groups: of one of them as soon as the other has to go."""
+        assert self._rivalry is not None
+        assert self.newcomer is not None
+        assert self.group is not None
+        decision = self._rivalry.decide(after, self.active)
+        return after if decision is None else self._keep(self.newcomer if decision == "new" else self.group, after)
+
     def record(self, points: Array) -> None:
-        """Take where the points (17, 2) of the latest frame are."""
+        """Take where the points (17, 2) of a frame are, for the rules of step 7."""
         self._drawn = [*self._drawn, points][-2 * self._how.smoothing - 1 :]
 
     def _rerun(self, before: Belief, old: Sequence[str], imm: IMM, measure: Measure) -> Belief:
@@ -227,23 +233,29 @@ class Models:
 
     def _activated(self, before: Belief, after: Belief, measure: Measure) -> Belief:
         """Bring the group that the rules ask for into force beside the present one, if they ask for one."""
-        groups, names = self.topology.groups, tuple(self.topology.groups)
+        names = tuple(self.topology.groups)
         number = requested_group(self._drawn, self._how)
         if self.group is None or number is None or number >= len(names) or names[number] == self.group:
             return after
         old, imm = self.active, self.imm
-        self.newcomer, self.active = names[number], self.topology.union((self.group, names[number]))  # VSMM 8.4
-        self._rivalry = Rivalry(self._how, old=groups[self.group], new=groups[self.newcomer])
+        joined = self.joined(before, names[number])
         if self._how.new == "rerun":
             return self._rerun(before, old, imm, measure)
-        state, _ = imm.fused(after)
-        top = after.log_probabilities.max()  # VSMM 8.1
+        return self._judged(self.imm.cycle(joined, measure))  # run again, and judged
+
+    def joined(self, belief: Belief, newcomer: str) -> Belief:
+        """Return a belief with another group's models beside those in force, as the patent starts them. VSMM 8."""
+        assert self.group is not None
+        old, groups, (state, _) = self.active, self.topology.groups, self.imm.fused(belief)
+        self.newcomer, self.active = newcomer, self.topology.union((self.group, newcomer))  # VSMM 8.4
+        self._rivalry = Rivalry(self._how, old=groups[self.group], new=groups[newcomer])
+        top = belief.log_probabilities.max()  # VSMM 8.1
         new = {}
         for name in set(self.active) - set(old):
             pose = self.known[name].nearest(state, self._how.poses)  # VSMM 8.3
             noise = self.known[name].noise  # VSMM 8.2
             new[name] = pose, lifted(pose, noise) if self._vector else noise, top
-        return normalised(regrouped(after, old, self.active, new))
+        return normalised(regrouped(belief, old, self.active, new))
 
     def _keep(self, group: str, belief: Belief) -> Belief:
         """Let one group alone go on."""

@@ -172,6 +172,8 @@ class TrackFilter:
             used += 1
             return replace(measurement, log_likelihood=self._searcher.likelihood(one, observation))
 
+        if self._how.angles == "detected":
+            models.record(details["joints"][0])
         surprise = float(np.mean([one.surprise for one in measured if one.surprise is not None] or [0.0]))
         self._belief = models.cycle(belief, measure, surprise)
         state, spread = models.fused(self._belief)
@@ -186,10 +188,8 @@ class TrackFilter:
                 used += evaluations
                 self._belief = models.imm.updated(self._belief, search_measure)
                 place = models.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
-        drawn = details["joints"][0]
         if self._how.angles == "state":
-            drawn, _ = self._cameras.figure.project(self._task.cameras[0], models.fused(self._belief)[0])
-        models.record(drawn)
+            models.record(self._cameras.figure.project(self._task.cameras[0], models.fused(self._belief)[0])[0])
         details |= {"surprise": surprise, **self._model_details()}
         return self._frame(pose, place, observation, used + 1, began, details)
 

@@ -72,7 +72,7 @@ class TrackCell(_Spec):
 
     Of the person a method knows where they face at first, at most `yaw_off_degrees` off, nothing at 180; and their
     body, each bone's length and radii at most `body_off_percent` off. Both are drawn from the instance and the motion's
-    name.
+    name. A field that has the name of an option of `posefit.tracking.options.TrackOptions` is that option.
     """
 
     method: str
@@ -128,7 +128,7 @@ class TrackCell(_Spec):
         from posefit.footage.training import training_clips, training_motions
         from posefit.geometry.skeleton import joint_distances
         from posefit.tracking.measures import MEASURES
-        from posefit.tracking.options import TrackOptions
+        from posefit.tracking.options import VIEW, TrackOptions
         from posefit.tracking.pipeline import track_scene
 
         for path, digest in self.files.items():
@@ -136,8 +136,9 @@ class TrackCell(_Spec):
                 raise InputError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
-        same = {name: getattr(self, name) for name in ("method", "evaluations", "translation", "first_pose", "seed")}
-        options = TrackOptions(settings=settings_text(self.settings), hypotheses=self.hypotheses, **same)
+        shared = {one.name for one in fields(TrackOptions)} & {one.name for one in fields(self)} - {*VIEW, "train"}
+        values = {name: getattr(self, name) for name in shared}
+        options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, options)
         truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
