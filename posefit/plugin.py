@@ -15,6 +15,8 @@ with a space is a function here.
 | claim of a publication | `ClaimedOrder` | `posefit_register_claims` |
 """
 
+from typing import TYPE_CHECKING, Any
+
 from posefit import hookimpl
 from posefit.arrays import Array
 from posefit.fitting.box import (
@@ -45,6 +47,11 @@ from posefit.hooks import (
 from posefit.silhouette.cost import areas, mismatch
 from posefit.silhouette.foreground import Footage, Segmenter
 
+if TYPE_CHECKING:
+    from posefit.testing import check_optimiser, check_prior, check_segmenter, check_tracker
+
+_CHECKS = ("check_optimiser", "check_prior", "check_segmenter", "check_tracker")  # imported when first used
+
 __all__ = [
     "Array",
     "ClaimedOrder",
@@ -69,6 +76,10 @@ __all__ = [
     "areas",
     "at_least",
     "between",
+    "check_optimiser",
+    "check_prior",
+    "check_segmenter",
+    "check_tracker",
     "converted",
     "displacement",
     "draw_population",
@@ -84,3 +95,11 @@ __all__ = [
     "whole",
     "wrap",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _CHECKS:
+        raise AttributeError(f"module 'posefit.plugin' has no attribute {name!r}")
+    from posefit import testing
+
+    return getattr(testing, name)

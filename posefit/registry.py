@@ -181,6 +181,16 @@ def claimed_orders() -> tuple[ClaimedOrder, ...]:
     return tuple(claim for plugin in claim_plugins() for claim in plugin.offers)
 
 
+def optimiser(name: str) -> "OptimiserFactory":
+    """Return the factory of an installed optimiser. Raises ValueError listing the known names."""
+    return registry().optimiser(name)
+
+
+def prior(name: str) -> "PriorFactory":
+    """Return the factory of an installed prior. Raises ValueError listing the known names."""
+    return registry().prior(name)
+
+
 def registry_of(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
     """Return what the plugins behind these entry points offer; see `load`."""
     return Registry(load(points, _methods, lambda offer: f"{offer.kind} {offer.name!r}", variables))

@@ -19,7 +19,7 @@ from posefit.fitting.check import between, finite_number, one_of
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.footage.instance import motion_of_instance, variation
-from posefit.footage.source import motion_of
+from posefit.footage.source import load_motion
 from posefit.geometry.body import varied
 from posefit.motion import built_in
 from posefit.reading import quoted, suggestion
@@ -158,7 +158,7 @@ def instance_number(number: Any) -> int:
 
 @lru_cache(maxsize=32)
 def _source(motion: str) -> Motion:
-    return motion_of(motion, None, FPS)
+    return load_motion(motion, FPS)
 
 
 @lru_cache(maxsize=32)
@@ -169,7 +169,7 @@ def body_of(motion: str) -> Body:
 
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
-    angles = np.concatenate([motion_of(name, None, FPS).poses[:, 3:] for name in train])
+    angles = np.concatenate([load_motion(name, FPS).poses[:, 3:] for name in train])
     fitted: Prior = registry().prior(prior)().fit(angles, _source(motion).skeleton)
     return fitted
 

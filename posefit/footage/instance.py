@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.footage.source import motion_of
+from posefit.footage.source import load_motion
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 
@@ -57,7 +57,7 @@ def motion_of_instance(source: str | Motion, number: int, *, frames: int, fps: f
     varied = variation(number)
     if isinstance(source, str) and source in built_in.names():
         return built_in.motion(source, frames=frames, fps=fps, speed=varied.speed, phase=varied.phase)
-    motion = motion_of(source, None, fps)
+    motion = load_motion(source, fps)
     if frames > len(motion):
         name = source if isinstance(source, str) else source.name
         raise InputError(f"frames must be at most {len(motion)}, the length of {name}, got {frames}")

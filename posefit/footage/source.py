@@ -90,7 +90,7 @@ def scene_of(
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
         cameras = [placed for source in camera for placed in _cameras(source, up)]
-        motion = motion_of(cast(Source, sources[0]), asf, fps or FPS)
+        motion = load_motion(cast(Source, sources[0]), fps or FPS, asf)
         return synthetic(motion, view_degrees, size or SIZE, cameras, frames)
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
@@ -177,8 +177,11 @@ def _motion_in(source: str | Path, asf: str | Path | None) -> Motion:
     return built_in.motion(str(source))  # raises: there is none of that name
 
 
-def motion_of(source: Source, asf: str | Path | None, fps: float) -> Motion:
-    """Return the motion that a source names, at `fps`; see `clip_of`."""
+def load_motion(source: Source, fps: float = FPS, asf: str | Path | None = None) -> Motion:
+    """Return the motion that a source names, at a rate: built-in, recorded, or of an .amc or .bvh file.
+
+    The .asf of an .amc is `asf`, or the only one beside it. Raises InputError where there is no such motion.
+    """
     return clip_of(source, asf)(fps)
 
 

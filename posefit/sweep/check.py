@@ -10,7 +10,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import between, finite_number, whole
 from posefit.fitting.tracker import Prediction
 from posefit.footage.masks import FPS
-from posefit.footage.source import MOTIONS, motion_of
+from posefit.footage.source import MOTIONS, load_motion
 from posefit.footage.training import training_clips
 from posefit.motion import built_in, recorded
 from posefit.reading import quoted, suggestion
@@ -111,7 +111,7 @@ def _files(motion: str) -> tuple[tuple[str, str], ...]:
     if Path(motion).is_dir():
         training_clips([motion])  # raises where one cannot be read
         return tuple((str(one), digest_of(one)) for one in sorted(Path(motion).iterdir()) if one.is_file())
-    motion_of(motion, None, FPS)  # raises where it cannot be read
+    load_motion(motion, FPS)  # raises where it cannot be read
     path = Path(motion)
     beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
     return tuple((str(one), digest_of(one)) for one in (path, *beside))
@@ -119,7 +119,7 @@ def _files(motion: str) -> tuple[tuple[str, str], ...]:
 
 @lru_cache(maxsize=1024)
 def _length(motion: str, fps: float) -> int:
-    return len(motion_of(motion, None, fps))
+    return len(load_motion(motion, fps))
 
 
 def _name(field: str, value: Any) -> str:

@@ -1,6 +1,7 @@
 """Every block of code in README and the handbook runs, or says why it does not and is right as far as can be checked."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -77,3 +78,8 @@ def test_the_check_of_commands_notices_wrong_ones() -> None:
         (words,) = shell.commands(line)
         with pytest.raises((AssertionError, click.UsageError)):
             shell.check(words)
+
+
+def test_pages_import_posefit_and_its_plugin_module_alone() -> None:
+    deep = [str(block) for block in BLOCKS if re.search(r"(from|import) posefit\.(?!plugin\b)", block.text)]
+    assert deep == []

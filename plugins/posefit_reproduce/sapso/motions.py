@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
-from posefit.footage.source import motion_of
+from posefit.footage.source import load_motion
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit_reproduce.sapso.design import FirstYaw
@@ -54,7 +54,7 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
 
 def _from_clips(folder: str | Path, name: str) -> PaperMotion:
     test, training = CLIPS[name]
-    motions = [motion_of(path, None, FPS) for path in [clip_path(folder, clip) for clip in (test, *training)]]
+    motions = [load_motion(path, FPS) for path in [clip_path(folder, clip) for clip in (test, *training)]]
     motions = [motion.frames(BROKEN, len(motion)) for motion in motions]
     return PaperMotion(name, motions[0], motions[1:])
 
