@@ -115,7 +115,8 @@ def others_clause(names: Sequence[str], method: int, tests: Tests, paired: str) 
     if better:
         clause += f", and on most {paired} {listed(better)} {_are(better)} better"
     if worse and (same or better):
-        clause += f", and {counted(len(worse), 'other')} {_are(worse)} worse"
+        named = listed(worse) if len(worse) <= NAMED else counted(len(worse), "other")
+        clause += f", and {named} {_are(worse)} worse"
     elif worse:
         clause = "; every other method is worse"
     return f"{clause} (Wilcoxon's signed ranks over {blocks}, after Holm, at 5 %)"

@@ -17,7 +17,7 @@ from posefit.footage.training import training_clips, training_motions
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.progress import Progress, interactive
-from posefit.reading import quoted
+from posefit.reading import quoted, suggestion
 from posefit.tracking.identity import ArgumentDigest
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
@@ -51,6 +51,9 @@ def track(
     recording for the Rerun viewer goes; `progress` where messages and bars go, by default a terminal or a notebook.
     Raises InputError for every mistake in the arguments or files.
     """
+    known = [option.name for option in fields(TrackOptions)]
+    if unknown := [name for name in options if name not in known]:
+        raise TypeError(f"track has no option {unknown[0]!r}{suggestion(unknown[0], known)}")
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     sources = _sources(source)
@@ -127,7 +130,7 @@ def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage])
     if options.asf is not None and not captured:
         raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
     if options.restarts == 0:
-        raise InputError("restarts must be at least 1 for a motion, which is searched once where it is left out, got 0")
+        raise InputError("restarts must be at least 1 for a motion, where it is 1 by default, got 0")
 
 
 def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]) -> dict[str, ArgumentDigest]:
@@ -145,7 +148,8 @@ def _documented(function: Callable[..., Any]) -> None:
     """Show the options of a track in a function's signature and docstring, as if it declared them itself."""
     own = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
     listed = [option for option in fields(TrackOptions) if function is track or option.name != "frames"]
-    more = [inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=option.default) for option in listed]
+    kind = inspect.Parameter.KEYWORD_ONLY
+    more = [inspect.Parameter(option.name, kind, default=option.default, annotation=option.type) for option in listed]
     function.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
     lines = "\n".join(f"    {option.name}: {declared(option).help}" for option in listed)
     function.__doc__ = f"{(function.__doc__ or '').rstrip()}\n\n    Options:\n{lines}\n"

@@ -26,7 +26,7 @@ def test_the_leader_and_methods_not_shown_to_be_worse_are_one_sentence(tmp_path:
     first = leaderboard(contest)[0]
     assert sentence(contest) == (
         f"a leads with an error of 1.26° (95 % interval {first['low']:.2f}° to {first['high']:.2f}°), 0.00° ahead of "
-        "c, on 6 instances of walk with 2 seeds each; c is not shown to be worse, and 1 other is worse (Wilcoxon's "
+        "c, on 6 instances of walk with 2 seeds each; c is not shown to be worse, and b is worse (Wilcoxon's "
         "signed ranks over 12 paired runs, after Holm, at 5 %). The best baseline, the mean training pose, has 4.00°."
     )
 
@@ -47,7 +47,7 @@ def test_the_sentence_counts_worse_methods_and_names_better_ones() -> None:
         "pairs": [[0, 1, 0.1, 0.2, 0.2], [0, 2, -3.0, 0.01, 0.01], [0, 3, 2.0, 0.01, 0.01], [1, 2, 0.0, 1.0, 1.0]],
     }
     assert others_clause(("a", "b", "c", "d"), 0, tests, "runs") == (
-        "; b is not shown to be worse, and on most runs d is better, and 1 other is worse (Wilcoxon's signed ranks "
+        "; b is not shown to be worse, and on most runs d is better, and c is worse (Wilcoxon's signed ranks "
         "over 9 paired runs, after Holm, at 5 %)"
     )
     assert [not_worse(tests, 0), not_worse(tests, 3), not_worse(None, 0)] == [[1], [], []]
@@ -75,7 +75,7 @@ def test_too_few_runs_for_any_difference_are_reported(tmp_path: Path) -> None:
         "10 pairs, and must be below 0.05)."
     ) in sentence(contest_of_errors(tmp_path / "eight", errors))
     text = sentence(contest_of_errors(tmp_path / "eleven", errors | full(methods, instances=3, seeds=3)))
-    assert "b, c and d are not shown to be worse, and 1 other is worse (" in text
+    assert "b, c and d are not shown to be worse, and e is worse (" in text
 
 
 def test_the_lead_is_in_degrees_and_lost_frames_of_the_first_two_are_counted(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"asf": "a.asf"}, "asf must be given for .amc files and footage only, got 'a.asf'"),
     ({"extraction": Extraction()}, "extraction must be given for video only, got Extraction.* for a motion"),
     ({"up": "y"}, "up must be given for calibrations only, got 'y' for a motion"),
-    ({"restarts": 0}, "restarts must be at least 1 for a motion, which is searched once where it is left out, got 0"),
+    ({"restarts": 0}, "restarts must be at least 1 for a motion, where it is 1 by default, got 0"),
 ]
 
 
