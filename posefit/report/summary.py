@@ -37,9 +37,9 @@ def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests
     sentence = f"{first['name']} {'has' if alone else 'leads with'} {score}{ahead} on {where}{others}."
     if searches:
         return sentence + _random_sentence(contest, first, baselines)
-    return (
-        sentence + _lost_sentence(contest, board[: min(2, len(contest.methods))]) + _baseline_sentence(first, baselines)
-    )
+    close = {board[0]["method"], board[min(1, len(board) - 1)]["method"], *not_worse(tests, first["method"])}
+    rows = [row for row in board if row["method"] in close]
+    return sentence + _lost_sentence(contest, rows[:NAMED]) + _baseline_sentence(first, baselines)
 
 
 def _motions(contest: Contest) -> str:
@@ -70,10 +70,10 @@ def _ahead(board: Rows) -> str:
 
 
 def _lost_sentence(contest: Contest, rows: Rows) -> str:
-    """Return how many of all compared tracks of the first methods lost frames; "" if none did."""
+    """Return how many of all compared tracks of some methods lost frames; "" if none did."""
     lost = contest.runs.figures["lost"][contest.blocks] > 0.0
     counts = {row["name"]: int(lost[contest.methods.index(row["method"])].sum()) for row in rows}
-    by = " and ".join(f"{name} in {count}" for name, count in counts.items())
+    by = _series([f"{name} in {count}" for name, count in counts.items()])
     return f" Frames are lost by {by} of {counted(lost[0].size, 'track')}." if any(counts.values()) else ""
 
 

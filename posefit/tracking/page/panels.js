@@ -212,13 +212,13 @@ function face(pen, camera, joints) {
   const long = Math.hypot(...across) || 1;
   const [x, z] = [across[0] / long, across[1] / long];
   const size = D.radii[BONES.findIndex(([, joint]) => D.joints[joint] === "head")][1];
-  const middle = head.map((value, k) => (value + neck[k]) / 2);
+  const centre = head.map((value, k) => (value + neck[k]) / 2);
   const points = [-1, 1].map((side) => [
-    middle[0] - size * (0.85 * z - 0.4 * side * x),
-    middle[1] + 0.1 * size,
-    middle[2] + size * (0.85 * x + 0.4 * side * z),
+    centre[0] - size * (0.85 * z - 0.4 * side * x),
+    centre[1] + 0.1 * size,
+    centre[2] + size * (0.85 * x + 0.4 * side * z),
   ]);
-  const [[, , depth], ...eyes] = projected(camera, [middle, ...points]);
+  const [[, , depth], ...eyes] = projected(camera, [centre, ...points]);
   pen.fillStyle = ink("--back");
   for (const [a, b, near] of eyes) {
     if (near <= NEAR || near > depth) continue;
