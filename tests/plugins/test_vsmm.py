@@ -25,6 +25,7 @@ from posefit_vsmm.imm import PLACED
 from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
+from posefit_vsmm.switching import Models
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, vsmm
 from tests.cases import each
 
@@ -255,6 +256,18 @@ def test_a_senseless_setting_is_one_line_and_status_2(method: str, setting: str,
 def test_other_forms_run(settings: dict[str, Any]) -> None:
     task, observations = seen(frames=40)
     follow(task, observations, **settings)
+
+
+def test_the_rules_of_a_frame_look_at_the_joints_detected_in_it(monkeypatch: pytest.MonkeyPatch) -> None:  # VSMM 7
+    events: list[np.ndarray | None] = []
+    record, cycle = Models.record, Models.cycle
+    monkeypatch.setattr(Models, "record", lambda self, points: (events.append(points), record(self, points))[1])
+    monkeypatch.setattr(Models, "cycle", lambda self, *given: (events.append(None), cycle(self, *given))[1])
+    frames = follow(*seen(frames=6))
+    for frame, points, cycled in zip(frames, events[::2], events[1::2], strict=True):
+        assert cycled is None
+        assert points is not None
+        assert np.array_equal(points, frame.details["joints"][0])
 
 
 @pytest.mark.slow
