@@ -114,7 +114,7 @@ class JointCameras:
         gates = np.clip(gates, NARROWEST * leg, WIDEST * leg) if self.how.gates else np.full_like(gates, FAR * leg)
         errors, radius = rule_errors(self.how.joint_errors), head_radius(self.body) * metre
         detection = detected(lines, pixels, gates, leg, radius, errors.bias, self.how.assignment)
-        variances = (errors.deviation * leg) ** 2
+        variances = self.how.joint_noise * (errors.deviation * leg) ** 2
         if self.how.joint_errors == "measured":
             variances = variances / np.maximum(detection.confidence, LEAST)[:, None]
         off = detection.points - pixels

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from posefit.fitting.check import at_least, between, one_of, whole
+from posefit.fitting.check import at_least, between, one_of, positive, whole
 
 Variant = Literal["default", "patent"]
 Structure = Literal["variable", "all"]
@@ -33,6 +33,8 @@ class Settings:
     models: str = ""
     clip_rate: ClipRate = "video"
     joint_errors: JointErrors = "measured"
+    process_noise: float = 1.0
+    joint_noise: float = 1.0
     hidden: Hidden = "dropped"
     assignment: Assignment = "optimal"
     gates: bool = True
@@ -58,6 +60,8 @@ class Settings:
         for name in ("smoothing", "most", "longest"):
             whole(name, getattr(self, name), 1)
         whole("dwell", self.dwell, 0)
+        positive("process_noise", self.process_noise)
+        positive("joint_noise", self.joint_noise)
         at_least("floor_degrees", self.floor_degrees, 0.0)
         for name in ("false_alarm", "miss"):
             between(name, getattr(self, name), 0.0, 0.5, ends=False)
@@ -89,5 +93,7 @@ OURS: Mapping[str, Any] = {
     "smoothing": 4,  # Interpretation V10
     "floor_degrees": 2.0,  # Interpretation V10
     "test": "sequential",  # Interpretation V12
+    "process_noise": 2.0,  # Interpretation V7
+    "joint_noise": 2.0,  # Interpretation V7
     "restart": True,  # Interpretation V14
 }

@@ -139,7 +139,8 @@ class Models:
         self._how, self.topology, self.groups = how, topology, topology.groups
         self.every = topology.union(topology.groups)
         fps = fps if how.clip_rate == "video" else CLIP_FPS  # Interpretation V6
-        self.known = {name: library.models[name].fitted_to(skeleton, fps) for name in self.every}
+        fitted = {name: library.models[name].fitted_to(skeleton, fps) for name in self.every}
+        self.known = {name: replace(one, noise=how.process_noise * one.noise) for name, one in fitted.items()}
         self._vector = how.quaternions == "vector"  # Interpretation V4
         self._made = lru_cache(self._make)
         self.restarts = 0  # because the models in force did not explain the measurements (Interpretation V14)

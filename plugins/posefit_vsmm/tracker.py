@@ -316,6 +316,8 @@ def vsmm(task: Task, **given: Any) -> VSMM:
         models: path of a file of models, with another lambda; "" is the package's own. Step 3, Interpretation V5.
         clip_rate: F is a step of the "video", or of the "clip" at 120 a second, as in the patent. Interpretation V6.
         joint_errors: of the joint rules, "measured", or "plain": unbiased, the torso's the root's. Interpretation V8.
+        process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
+        joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
         hidden: joints that are not detected are "dropped", or "imputed", as in the patent. Interpretation V9.
         assignment: of end points to hands and feet, "optimal", or each the "nearest". Interpretation V15.
         gates: whether detections far from where they are expected are rejected. Interpretation V15; no in the patent.

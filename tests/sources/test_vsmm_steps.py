@@ -320,6 +320,11 @@ def models(**given: Any) -> Models:
     return Models(Settings.of(given), carried, read_topology(None, carried.names), built_in.average_skeleton(), 30.0)
 
 
+def test_process_noise_is_a_multiple_of_the_models_own() -> None:  # Interpretation V7
+    single, double = models().known["walk"], models(process_noise=2.0).known["walk"]
+    assert np.array_equal(double.noise, 2.0 * single.noise)
+
+
 def telling(name: str, running: Models) -> Callable[[Array], Measurement]:
     """Return a measurement of nothing, but that the model's prediction is the most likely."""
     asked = iter(range(10**6))
