@@ -239,17 +239,16 @@ class Models:
         if self.group is None or number is None or number >= len(names) or names[number] == self.group:
             return after
         old, imm = self.active, self.imm
-        joined = self.joined(before, names[number])
         if self._how.new == "rerun":
+            self._bring_in(names[number])
             return self._rerun(before, old, imm, measure)
+        joined = self.joined(before, names[number])
         return self._judged(self.imm.cycle(joined, measure))  # run again, and judged
 
     def joined(self, belief: Belief, newcomer: str) -> Belief:
         """Return a belief with another group's models beside those in force, as the patent starts them. VSMM 8."""
-        assert self.group is not None
-        old, groups, (state, _) = self.active, self.topology.groups, self.imm.fused(belief)
-        self.newcomer, self.active = newcomer, self.topology.union((self.group, newcomer))  # VSMM 8.4
-        self._rivalry = Rivalry(self._how, old=groups[self.group], new=groups[newcomer])
+        old, (state, _) = self.active, self.imm.fused(belief)
+        self._bring_in(newcomer)
         top = belief.log_probabilities.max()  # VSMM 8.1
         new = {}
         for name in set(self.active) - set(old):
@@ -257,6 +256,13 @@ class Models:
             noise = self.known[name].noise  # VSMM 8.2
             new[name] = pose, lifted(pose, noise) if self._vector else noise, top
         return normalised(regrouped(belief, old, self.active, new))
+
+    def _bring_in(self, newcomer: str) -> None:
+        """Bring another group into force beside the present one."""
+        assert self.group is not None
+        groups = self.topology.groups
+        self.newcomer, self.active = newcomer, self.topology.union((self.group, newcomer))  # VSMM 8.4
+        self._rivalry = Rivalry(self._how, old=groups[self.group], new=groups[newcomer])
 
     def _keep(self, group: str, belief: Belief) -> Belief:
         """Let one group alone go on."""
