@@ -1,13 +1,14 @@
-"""posefit recovers a person's 3D pose from silhouettes, by searching.
+"""posefit recovers a person's 3D motion from silhouettes, by searching.
 
     import posefit
-    result = posefit.track("walk")          # follow a built-in motion; the same as `posefit track walk`
-    print(result.summary["error_degrees"])
+    track = posefit.track("walk")           # or masks (T, H, W), a folder, a video; the same as `posefit track walk`
+    print(track)                            # its errors, or signs of trust
+    track.joints, track.angles("left_knee_flexion"), track.to_pandas(), track.show(), track.save("out")
 
-The pieces: `Skeleton`, `Body` and `Camera` describe the person and the view; `Silhouette` an observation; `SearchSpace`
-the box that optimisers search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows a sequence;
-`suite` numbers problems for a benchmark.
-Plugins add optimisers and priors: see `posefit.hooks`. Each name is imported when it is first used.
+`fit` takes one mask, `compare` runs a small sweep, `suite` numbers problems for a benchmark. The pieces: `Skeleton`,
+`Body` and `Camera` describe the person and the view; `Silhouette` an observation; `SearchSpace` the box that optimisers
+search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows a sequence. What the author of a plugin
+imports is in `posefit.plugin`. Each name is imported when it is first used.
 """
 
 from importlib import import_module
