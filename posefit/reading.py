@@ -42,6 +42,11 @@ def cut(text: str, most: int = SHOWN) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
+def counted(count: int, word: str) -> str:
+    """Return a count with its noun: `1 run`, `2,000 runs`."""
+    return f"{count:,} {word}" if count == 1 else f"{count:,} {word}s"
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return the end of a message about a wrong name, which asks for the nearest known one; "" where none is near."""
     near = get_close_matches(name[:SHOWN], list(known), 1)

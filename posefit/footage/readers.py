@@ -67,10 +67,12 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
 
 
 def name_of(source: str | Path | Masks) -> str:
-    """Return what messages call masks: their path, the folder of their images, or `masks` for an array."""
-    if isinstance(source, np.ndarray):
-        return "masks"
-    return str(source[0].parent if isinstance(source, tuple) else source)
+    """Return what messages call masks: their path, that of a single image, the folder of several, or `masks`."""
+    if isinstance(source, str | Path):
+        return str(source)
+    if isinstance(source, tuple) and len(source) == 1:
+        return str(source[0])
+    return str(source[0].parent) if isinstance(source, tuple) and source[0].parent.name else "masks"
 
 
 def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMasks:

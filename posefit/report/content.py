@@ -8,6 +8,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
+from posefit.reading import counted
 from posefit.registry import claimed_orders
 from posefit.report import curves
 from posefit.report.animations import animations_of
@@ -25,7 +26,6 @@ from posefit.report.page import COLOURS
 from posefit.report.runs import Runs, damage, views
 from posefit.report.selection import selection_of
 from posefit.report.summary import (
-    counted,
     leader_sentence,
     not_worse,
     published_claims,

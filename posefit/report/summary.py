@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from posefit.hooks import ClaimedOrder
+from posefit.reading import counted
 from posefit.report.contest import Contest, interquartile_mean, is_random
 from posefit.statistics.ranks import LEVEL, wilcoxon
 from posefit.tracking.measures import BASELINES
@@ -220,11 +221,6 @@ def _series(values: Sequence[Any]) -> str:
     """Return all values as a sentence lists them."""
     texts = [str(value) for value in values]
     return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))
-
-
-def counted(count: int, word: str) -> str:
-    """Return a count with its noun: `1 run`, `2,000 runs`."""
-    return f"{count:,} {word}" if count == 1 else f"{count:,} {word}s"
 
 
 def _are(names: Sequence[str]) -> str:

@@ -8,12 +8,11 @@ from typing import Any
 from posefit.errors import InputError
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
-from posefit.reading import cut
+from posefit.reading import counted, cut
 from posefit.report.content import data_of
 from posefit.report.export import logged_runs, write_csv, write_iohprofiler
 from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
-from posefit.report.summary import counted
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
 

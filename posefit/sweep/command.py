@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
-from posefit.reading import cut
+from posefit.reading import counted, cut
 from posefit.sweep.cell import json_of, run_cell
 from posefit.sweep.driver import Cells, Driver, Tally, drive_cells, keys_of
 from posefit.sweep.engines.engine import Engine, Limits, Run
@@ -112,7 +112,7 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
         return
     for cell_text, reason in estimate.untried.items():
         yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
-    takes = f": about {duration_text(estimate.seconds)} on {workers} workers" if left else ""
+    takes = f": about {duration_text(estimate.seconds)} on {counted(workers, 'worker')}" if left else ""
     yield f"{len(cells)} cells, {count} of them to run{takes}"
 
 

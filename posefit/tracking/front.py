@@ -113,9 +113,10 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
         if len({each.shape for each in sources}) > 1:
             raise InputError(f"masks must have one shape, got {', '.join(sorted({str(e.shape) for e in sources}))}")
         return [np.stack(sources)]
-    if all(isinstance(each, str | Path) and Path(each).suffix.lower() in IMAGES for each in sources):
+    images = [isinstance(each, str | Path) and Path(each).suffix.lower() in IMAGES for each in sources]
+    if all(images):
         return [tuple(Path(each) for each in sources)]
-    return sources
+    return [(Path(each),) if image else each for each, image in zip(sources, images, strict=True)]
 
 
 def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from posefit.errors import printable
+from posefit.reading import counted
 from posefit.tracking.measures import BASELINES, MEASURES
 from posefit.tracking.trust import trust_line
 
@@ -19,7 +20,7 @@ def table(summary: Mapping[str, Any]) -> str:
     names = summary["train"]
     training = ", ".join(names) if len(names) <= MAX_NAMED else f"{len(names)} clips, {names[0]} to {names[-1]}"
     lines.append(
-        f"{summary['motion']}: {summary['frames']} frames, {summary['method']}, seed {summary['seed']}, "
+        f"{summary['motion']}: {counted(summary['frames'], 'frame')}, {summary['method']}, seed {summary['seed']}, "
         f"translation {summary['translation']}, trained on {training}"
     )
     if (error := summary["error_degrees"]) is not None:
