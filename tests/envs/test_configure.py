@@ -10,7 +10,6 @@ from gymnasium.utils.seeding import np_random
 
 import posefit_envs  # noqa: F401, registers it
 from posefit.fitting.box import draw_population
-from posefit_envs import population
 from posefit_envs.policies import sapso_action
 from posefit_envs.population import ControlAction, action_of, control_of, differential, normal
 from posefit_swarm.sapso import SAPSO
@@ -139,36 +138,6 @@ def test_a_kick_goes_into_its_layer_alone() -> None:
         moved = own.ask()[row] - leader
         assert (np.abs(moved[columns]) > 1e-6).all()
         assert np.count_nonzero(np.abs(moved) > 1e-12) == 3  # but for rounding, where the box is folded
-
-
-@each(
-    ("shares", "differences", "draws"),
-    [
-        ((0.26, 0.37, 0.37), 15, 15),  # of 40: 10.4, 14.8, and what is left
-        ((0.5125, 0.4875, 0.0), 20, 0),  # 20.5 and 19.5, both rounded to 20
-        ((0.0, 0.4875, 0.5125), 20, 20),
-    ],
-)
-def test_shares_become_whole_numbers_of_particles(
-    monkeypatch: pytest.MonkeyPatch, shares: Any, differences: int, draws: int
-) -> None:
-    counted = {"differences": 0, "draws": 0}
-
-    def different(space: Any, rng: Any, own: Any, *others: Any) -> Any:
-        counted["differences"] = len(own)
-        return own
-
-    def drawn(space: Any, rng: Any, bests: Any, order: Any, count: int, stride: float) -> Any:
-        counted["draws"] = count
-        return bests[:count]
-
-    monkeypatch.setattr(population, "differential", different)
-    monkeypatch.setattr(population, "normal", drawn)
-    env = made(population_size=40, every=1)
-    env.reset(seed=0)
-    population_of(env).begin_step(ControlAction(shares))
-    population_of(env).ask()
-    assert counted == {"differences": differences, "draws": draws}
 
 
 def test_differences_and_draws_are_those_of_their_formulas() -> None:

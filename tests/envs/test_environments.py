@@ -3,16 +3,14 @@
 import copy
 import pickle
 import sys
-import warnings
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium import error, wrappers
+from gymnasium import error
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
-from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -92,42 +90,6 @@ def test_it_can_be_pickled_and_copied_in_the_middle(name: str) -> None:
     env.close()
 
 
-@each("name", SEARCHES)
-def test_the_usual_wrappers_wrap_it(name: str, tmp_path: Any) -> None:
-    pytest.importorskip("moviepy", reason="needs posefit[rl]")
-    env: Any = gym.make(name, render_mode="rgb_array", **SHORT[name])
-    env = wrappers.RecordEpisodeStatistics(env)
-    env = wrappers.RescaleAction(env, np.float32(-2.0), np.float32(2.0))
-    env = wrappers.FlattenObservation(wrappers.FrameStackObservation(env, 2))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # moviepy's own
-        env = wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda k: k == 0, disable_logger=True)
-        env.reset(seed=0)
-        ended = False
-        while not ended:
-            _, _, terminated, truncated, info = env.step(env.action_space.sample())
-            ended = terminated or truncated
-        assert 4 <= info["episode"]["l"] <= 9
-        env.reset()
-        env.close()
-    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
-
-
-def make_short() -> gym.Env[Any, Any]:
-    return gym.make("posefit_envs:posefit/FitImage-v0", max_evaluations=5)
-
-
-@each("kind", [SyncVectorEnv, AsyncVectorEnv])
-def test_it_runs_in_gymnasiums_own_vector_environments(kind: Any) -> None:
-    vector = kind([make_short] * 2)
-    first, _ = vector.reset(seed=3)
-    for _ in range(8):
-        observations, rewards, *_ = vector.step(vector.action_space.sample())
-        assert observations.shape == first.shape
-        assert (rewards <= 0.0).all()
-    vector.close()
-
-
 @each("name", IDS)
 def test_pictures_are_rgb_and_a_window_opens(name: str) -> None:
     env = gym.make(name, render_mode="rgb_array")
@@ -154,14 +116,6 @@ def test_without_pygame_or_a_display_the_error_names_the_remedy(monkeypatch: pyt
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(error.DependencyNotInstalled, match=r"needs pygame: .* pip install 'posefit\[human\]'"):
         gym.make("posefit/FitImage-v0", render_mode="human").reset(seed=0)
-
-
-def test_a_number_is_the_same_silhouette_everywhere() -> None:
-    fixed, chosen = gym.make("posefit/FitImage-v0", instance=17), gym.make("posefit/FitImage-v0")
-    picture = fixed.reset(seed=0)[0]
-    np.testing.assert_array_equal(picture, fixed.reset(seed=99)[0])
-    np.testing.assert_array_equal(picture, chosen.reset(options={"instance": 17})[0])
-    assert (picture != chosen.reset(options={"instance": 18})[0]).any()
 
 
 # what the steps mean
@@ -251,7 +205,6 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
         ({"prior": "pcb"}, "prior must be one of .* did you mean 'pca'"),
         ({"train": ["wakl"]}, "did you mean 'walk'"),
         ({"instance": 20_000}, "instance must lie in 0 to 19999, got 20000"),
-        ({"instance": -1}, "instance must lie in 0 to 19999, got -1"),
         ({"split": "dev"}, "split must be one of train, test, got 'dev'"),
         ({"noise": {"rain": 0.5}}, "noise must be of occluder, .*, got 'rain'"),
         ({"noise": {"holes": 2.0}}, "noise holes must have a strength of 0 to 1, got 2.0"),
@@ -259,13 +212,8 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
         ({"translation": "free"}, "translation must be one of known, searched, aligned"),
         ({"view_degrees": float("nan")}, "view_degrees must be a finite number or several"),
         ({"mismatch_percent": 80.0}, "mismatch_percent must lie in 0 to 50"),
-        ({"noise": 0.5}, r"noise must be strengths such as \{'holes': 0.3\}, got 0.5"),
-        ({"size": 64}, r"size must be \(width, height\) of 36 to 4096 pixels, got 64"),
-        ({"instance": 1.5}, "instance must be a whole number from 0 to 19999, got 1.5"),
         ({"train": "walk"}, r"train must be a list of motions such as \['walk-a'\], got 'walk'"),
         ({"motion": 5}, "motion must be a name, got 5"),
-        ({"view_degrees": "front"}, "view_degrees must be a finite number or several, got 'front'"),
-        ({"mismatch_percent": "much"}, "mismatch_percent must be a finite number, got 'much'"),
         ({"errors": "no"}, "errors must be true or false, got 'no'"),
     ],
 )
@@ -315,18 +263,6 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))
     env.step(np.full(size, -2.0))  # a second warning would be an error
-
-
-@each("name", IDS)
-def test_a_step_after_the_end_asks_for_a_reset(name: str) -> None:
-    env = gym.make(name, **SHORT[name]).unwrapped
-    env.reset(seed=0)
-    ended = False
-    while not ended:
-        _, _, terminated, truncated, _ = env.step(env.action_space.sample())
-        ended = terminated or truncated
-    with pytest.raises(error.ResetNeeded, match="the episode has ended"):
-        env.step(env.action_space.sample())
 
 
 worlds = st.fixed_dictionaries(

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from posefit.geometry.camera import Camera
-from posefit.motion import built_in
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.silhouette.cost import areas, mismatch
 from posefit.sweep.cell import cell_scene
@@ -35,12 +34,6 @@ def test_a_built_in_motion_and_its_views_are_the_same(number):
     assert made.truth.translations.tobytes() == cell.truth.translations.tobytes()
     for camera, expected in zip(made.task.cameras, cell.cameras, strict=True):
         assert azimuth(camera) == pytest.approx(azimuth(expected), abs=1e-9)
-
-
-def test_instance_0_is_the_motion_as_it_is():
-    _, made = both("run", 0, 5)
-    assert made.truth.poses.tobytes() == built_in.motion("run", frames=5).poses.tobytes()
-    assert azimuth(made.task.cameras[1]) - made.truth.poses[0, 0] == pytest.approx(np.pi / 2.0)
 
 
 def test_what_is_drawn_besides_changes_neither_the_motion_nor_the_cameras():

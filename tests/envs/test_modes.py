@@ -5,7 +5,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.vector import SyncVectorEnv
 
 import posefit_envs  # noqa: F401, registers it
 from posefit.niching import niche_instance
@@ -49,15 +48,6 @@ def test_an_episode_without_a_report_ends_with_the_worst_brier_score() -> None:
     env.step(np.append(np.zeros(8), -1.0))
     _, reward, terminated, truncated, info = env.step(np.append(np.zeros(8), -1.0))
     assert (reward, terminated, truncated, info["brier"]) == (-2.0, False, True, 2.0)
-
-
-def test_many_of_them_run_side_by_side() -> None:
-    many = SyncVectorEnv([lambda: gym.make(NAME, instance=1, max_evaluations=3)] * 2)
-    many.reset(seed=3)
-    for _ in range(5):
-        observations, *_ = many.step(many.action_space.sample())
-    assert observations.shape == (2, 96, 128, 2)
-    many.close()
 
 
 @each(

@@ -9,7 +9,6 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars import kernels
 from posefit_exemplars.beam import (
-    BINS,
     FACINGS,
     MAX_EXCESS_COST,
     MAX_SHARES,
@@ -21,8 +20,6 @@ from posefit_exemplars.beam import (
     Transition,
     bins_of,
     diverse_best,
-    jump_states,
-    merged,
     next_states,
     root_deviation_costs,
     squared_distances,
@@ -156,20 +153,6 @@ def test_only_the_best_few_of_similar_states_are_kept(small: Exemplars) -> None:
     assert diverse_best(small, many, totals, most).tolist() == twin[:most]
 
 
-def test_of_one_pose_in_one_bin_the_cheapest_state_is_kept() -> None:
-    width = 2.0 * np.pi / BINS
-    both = merged(beam([5, 5], [0.0, width], [3.0, 1.0]), beam([5, 6], [0.1 * width, 0.0], [2.0, 7.0]))
-    assert sorted(zip(both.states.tolist(), both.totals.tolist(), strict=True)) == [(5, 1.0), (5, 2.0), (6, 7.0)]
-
-
-def test_a_jump_is_from_the_best_state() -> None:
-    before = beam([1, 2], [0.0, 0.0], [4.0, 3.0], np.array([[0.0] * 3, [1.0, 2.0, 3.0]]))
-    states = jump_states(np.array([7, 9]), np.array([1.0, 2.0]), before, STEPS)
-    assert states.parents.tolist() == [1, 1]
-    assert states.totals.tolist() == [15.0, 15.0]
-    assert states.places.tolist() == [[1.0, 2.0, 3.0]] * 2
-
-
 def test_a_root_strays_more_easily_along_the_line_of_sight() -> None:
     eye, place = np.zeros(3), np.array([[0.0, 0.0, 5.0]])
     along, across = np.array([[0.0, 0.0, 5.03]]), np.array([[0.01, 0.0, 5.0]])
@@ -196,17 +179,6 @@ def test_steps_between_beams_cost_what_the_twin_says_and_a_jump_at_most(small: E
     costs = steps_to(small, before, after, root)
     np.testing.assert_allclose(costs, np.minimum(twin, STEPS.jump), rtol=1e-3, atol=1e-3)
     assert costs[0, 0] < 8.0 < STEPS.jump == costs.max()
-
-
-def test_turns_to_the_left_and_right_cost_the_same_and_whole_turns_nothing(small: Exemplars) -> None:
-    before = beam([3], [0.0])
-    _, turned, ways = small.after(before.states, SECONDS)
-    after = beam([4] * 5, [float(turned[0]) + turn for turn in (-0.2, -0.1, 0.0, 0.1, 0.2)])
-    costs = steps_to(small, before, after, ways[0])[0]
-    np.testing.assert_allclose(costs, costs[::-1], atol=1e-9)
-    np.testing.assert_allclose(costs[3:] - costs[2], 0.5 * (np.array([0.1, 0.2]) / STEPS.turning) ** 2)
-    whole = steps_to(small, before, replace(after, yaws=after.yaws + 2.0 * np.pi), ways[0])[0]
-    np.testing.assert_allclose(whole, costs, atol=1e-9)
 
 
 def test_turns_beyond_the_fastest_cost_more_than_a_jump(small: Exemplars) -> None:

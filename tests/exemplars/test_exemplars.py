@@ -1,7 +1,5 @@
 """Poses of clips, what came after each of them, and groups of similar poses."""
 
-import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -48,25 +46,10 @@ def test_distances_of_codes_are_those_of_joints_and_never_greater() -> None:
             assert true - least < np.linalg.norm(codes[i] - codes[j]) < true + 1e-6
 
 
-def test_codes_do_not_depend_on_the_yaw() -> None:
-    walk = built_in.motion("walk-a", frames=20)
-    turned = walk.poses.copy()
-    turned[:, 0] += 1.2
-    coding = Coding.of(SKELETON, [walk.poses])
-    np.testing.assert_allclose(coding.coded(turned), coding.coded(walk.poses), atol=1e-6)
-
-
 def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
     codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32) * SAME
     assert thinned_frames(codes).tolist() == [0, 3, 4, 6]
     assert thinned_frames(codes[:2]).tolist() == [0, 1]
-
-
-def test_codes_do_not_depend_on_the_division_into_clips() -> None:
-    walk = built_in.motion("walk-a", frames=30).poses
-    whole, parts = Coding.of(SKELETON, [walk]), Coding.of(SKELETON, [walk[:7], walk[7:]])
-    apart = [np.linalg.norm(coding.coded(walk)[:, None] - coding.coded(walk), axis=-1) for coding in (whole, parts)]
-    np.testing.assert_allclose(*apart, atol=1e-5)
 
 
 def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> None:
@@ -100,11 +83,6 @@ def test_states_are_interpolated_between_frames_and_not_between_clips(two: Exemp
     np.testing.assert_allclose(two.after(np.array([0]), half)[0][0], 0.5 * (two.codes[0] + two.codes[1]), atol=1e-6)
 
 
-def test_vectors_are_turned_about_the_vertical() -> None:
-    ahead = np.array([[0.0, 0.5, 2.0]])
-    np.testing.assert_allclose(about_vertical(ahead, np.array([0.5 * np.pi])), [[2.0, 0.5, 0.0]], atol=1e-12)
-
-
 def test_a_mirror_image_is_the_reflection_of_every_joint() -> None:
     walk = built_in.motion("run-a", frames=15)
     tilted = walk.poses + np.append([0.3, 0.2, 0.1], np.zeros(63))
@@ -117,16 +95,6 @@ def test_a_mirror_image_is_the_reflection_of_every_joint() -> None:
     twice = mirror_image(image)
     np.testing.assert_allclose(twice.poses, walk.poses, atol=1e-9)
     np.testing.assert_allclose(twice.translations, walk.translations, atol=1e-12)
-
-
-def test_the_mirror_image_of_a_clip_is_a_clip() -> None:
-    walk = built_in.motion("walk-a", frames=20)
-    both, one = (Exemplars.of([walk], SKELETON, mirrored=mirrored) for mirrored in (True, False))
-    assert (len(both.lasts), len(one.lasts)) == (2, 1)
-    np.testing.assert_array_equal(both.poses[both.clips == 0], one.poses)
-    image = mirror_image(walk)
-    own = both.poses[both.clips == 1]
-    assert np.abs(own[:, None] - image.poses).max(axis=2).min(axis=1).max() < 1e-12
 
 
 def test_poses_are_drawn_by_the_square_root_of_the_size_of_their_group(two: Exemplars) -> None:
@@ -158,19 +126,6 @@ def test_states_are_made_once_for_the_same_motions(monkeypatch: pytest.MonkeyPat
         other = exemplars_of(motions, SKELETON, False)
         assert other is not made
         made = other
-
-
-def test_threads_with_different_motions_get_their_own_states(monkeypatch: pytest.MonkeyPatch) -> None:
-    motions = [built_in.motion(name, frames=2) for name in ("walk-a", "run-a")]
-    monkeypatch.setattr(Exemplars, "of", lambda motions, skeleton, mirrored: motions[0].name)
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    try:
-        with ThreadPoolExecutor(4) as pool:
-            made = list(pool.map(lambda k: exemplars_of([motions[k % 2]], SKELETON, False), range(1000)))
-    finally:
-        sys.setswitchinterval(interval)
-    assert made == [motions[k % 2].name for k in range(1000)]
 
 
 def test_a_motion_of_one_frame_or_none_is_refused() -> None:

@@ -70,23 +70,6 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     assert result.summary["iou"] > 0.4
 
 
-def test_frames_without_a_whole_person_are_not_usable(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    path, _ = filmed
-    extract(path, tmp_path / "out", Extraction("mean", f"0:{EMPTY}"), frames=(0, EMPTY + 20))
-    usable = arrays(tmp_path / "out" / "masks.npz")["usable"]
-    assert not usable[: EMPTY - 1].any()
-    assert usable[EMPTY + 8 :].mean() > 0.8
-
-
-def test_the_person_is_searched_within_the_roi(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
-    path, masks = filmed
-    extract(path, tmp_path / "out", Extraction(roi=(0, 0, 80, 120)), frames=(EMPTY, None))
-    extracted = arrays(tmp_path / "out" / "masks.npz")["masks"]
-    assert extracted[:, :, 81:].sum() == 0
-    assert extracted[:, :, :80].any()
-    assert any(mask[:, 81:].any() for mask in masks)
-
-
 # the pieces
 
 
@@ -218,16 +201,10 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     assert result.summary["iou"] == pytest.approx(
         np.mean([row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok])
     )
+    carried = posefit.track(path, method="annealed", view_degrees=90, evaluations=400).summary
+    assert carried["evaluations"] == 9 * 400
     text = run("track", path, "--method", "@loose", "--view-degrees", "90", "--evaluations", "400").stdout
     assert "3 frames show too little of the person: the pose is held or carried on, not searched" in text
-
-
-def test_a_filter_goes_on_after_a_frame_that_was_held(tmp_path: Path) -> None:
-    usable = np.arange(12) != 4
-    path = tmp_path / "a.npz"
-    np.savez(path, masks=np.stack(truth()[10:22]), usable=usable)
-    summary = posefit.track(path, method="annealed", view_degrees=90, evaluations=400).summary
-    assert summary["evaluations"] == 11 * 400
 
 
 @each(

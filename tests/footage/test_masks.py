@@ -80,12 +80,6 @@ def test_two_values_are_a_mask_whichever_they_are(
     check(tmp_path / "a.npz", walk)
 
 
-def test_jpeg_is_cut_half_way(walk: list[Any], tmp_path: Path) -> None:
-    lossy = folder(tmp_path / "lossy", [np.where(mask, 255, 0).astype(np.uint8) for mask in walk], ".jpg")
-    wanted = [cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) > 127 for file in sorted(lossy.iterdir())]
-    check(lossy, wanted)
-
-
 def softened(mask: Any) -> Any:
     """Return a mask as a network gives it: degrees from 0 to 1."""
     return cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) * 0.97

@@ -12,7 +12,6 @@ import pytest
 
 import posefit
 from posefit.fitting.validation import BrokenRuleError
-from posefit.footage.extract import extract
 from posefit.footage.masks import Views
 from posefit.footage.quality import FrameQuality, disagreement, verdict
 from posefit.footage.readers import read_masks
@@ -56,12 +55,6 @@ def test_a_person_who_is_always_there_is_refused_before_any_tracking(
     assert f"{kind}.avi: the person seems to stand in the background" in error
     assert "give --background with an empty picture, or --extraction mediapipe" in error
     assert list(tmp_path.iterdir()) == []
-
-
-def test_extract_shows_the_masks_that_track_refuses(films: dict[str, Any], tmp_path: Path) -> None:
-    summary = extract(films["jumping"][0], tmp_path / "out")
-    assert "the person seems to stand in the background" in summary["warnings"][0]
-    assert summary["usable"] < 0.3 * summary["frames"]
 
 
 @each("kind", ["passing", "leaving", *ALWAYS])
@@ -282,15 +275,6 @@ def test_a_segmenter_that_breaks_a_rule_is_named(
     ]:
         with pytest.raises(BrokenRuleError, match=message):
             segmented(filmed[0], Extraction("half", settings={"wrong": wrong}))
-
-
-def test_settings_of_a_segmenter_are_checked(filmed: tuple[Path, list[Any]]) -> None:
-    with pytest.raises(ValueError, match="a setting of mixture must be one of history, threshold, got 'colour'"):
-        Extraction(settings={"colour": 3})
-    with pytest.raises(ValueError, match="history must be at least 1, got 0"):
-        segmented(filmed[0], Extraction(settings={"history": 0}))
-    assert "threshold must be above 0, got -3" in error_of("track", filmed[0], "--set", "mixture.threshold=-3")
-    assert "--set must name one of " in error_of("track", filmed[0], "--set", "median.samples=3")
 
 
 def test_settings_of_a_segmenter_reach_it(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:

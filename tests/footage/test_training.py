@@ -7,16 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import posefit
 from posefit.footage import training
 from posefit.footage.training import POSE_BYTES, training_clips, training_motions
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
-from posefit.sweep.plan import Plan
 from tests.cases import each
-from tests.footage.conftest import error_of, run
+from tests.footage.conftest import error_of
 
 
 def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:
@@ -24,19 +22,6 @@ def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:
     assert [clip(60.0).name for clip in clips] == ["17_03", "17_10", "walk-a"]
     whole = recorded.clip("17_03").motion()
     assert len(clips[0](15.0)) == (len(whole) + 1) // 2
-
-
-def test_a_recorded_person_is_tracked_with_the_motions_of_others() -> None:
-    track = posefit.track("09_01", train=["library:17", "library:-02,-05,-09,-14,-16,-29,-49,-127,-135"], frames=(0, 2))
-    assert track.summary["train"] == ["17_03", "17_10", "17_03", "17_10"]
-    assert track.motion.skeleton.name == "09"
-
-
-def test_a_plan_may_train_on_people_of_the_library() -> None:
-    (cell,) = Plan.of({"cells": [{"method": "sapso@pca", "motion": "16_15", "train": ["library:-16"], "frames": 3}]})
-    assert cell.train == ("library:-16",)
-    with pytest.raises(ValueError, match="a subject of the library must be one of 02"):
-        Plan.of({"cells": [{"method": "sapso@pca", "motion": "walk", "train": ["library:99"]}]})
 
 
 def test_mistakes_are_one_line() -> None:
@@ -47,11 +32,6 @@ def test_mistakes_are_one_line() -> None:
         (["--train", "library:16", "--without-subject", "16"], "the library must keep at least one person"),
     ]:
         assert error_of("track", "walk", *words).startswith(f"posefit: {message}")
-
-
-def test_many_clips_are_counted_not_listed() -> None:
-    result = run("track", "walk", "--train", "library:16", "--frames", "0:1")
-    assert "trained on 54 clips, 16_01 to 16_58" in result.stdout.splitlines()[0]
 
 
 def test_clips_of_a_folder_have_their_own_rates(tmp_path: Path) -> None:

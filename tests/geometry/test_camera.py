@@ -38,37 +38,6 @@ def test_a_camera_survives_its_file(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(again, name), getattr(camera, name))
 
 
-@each(
-    "change",
-    [
-        {"width": 0},
-        {"width": 2.5},
-        {"focal": [0.0, 1.0]},
-        {"focal": "far"},
-        {"centre": [float("nan"), 1.0]},
-        {"camera_from_world": np.zeros((4, 4)).tolist()},
-        {"camera_from_world": [[1, 2], [3, 4]]},
-        {"camera_from_world": None},
-        {"more": 1},
-    ],
-)
-def test_a_bad_camera_file_is_named_in_one_line(tmp_path: Path, change: dict[str, object]) -> None:
-    path = tmp_path / "camera.json"
-    values = json.loads(Camera.around(np.zeros(3), 0.4, 5.0, (32, 24)).to_json())
-    path.write_text(json.dumps({**values, **change}))
-    with pytest.raises(ValueError, match="must|expected") as caught:
-        Camera.from_json(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert "\n" not in str(caught.value)
-
-
-@each("text", ["", "[]", "{", "{}", "\x00"])
-def test_a_file_that_is_no_camera_is_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "camera.json").write_text(text)
-    with pytest.raises(ValueError, match="expected a JSON object"):
-        Camera.from_json(tmp_path / "camera.json")
-
-
 def test_around_by_hand_from_the_side() -> None:
     # It stands at (4 + 1, 2, 3) and looks along -x; its right is -z, so who walks along +z walks to the left.
     camera = Camera.around(np.array([1.0, 2.0, 3.0]), np.pi / 2, 4.0, (320, 240), field_of_view=np.pi / 2)
@@ -147,22 +116,22 @@ def test_a_camera_that_cannot_be_is_refused(change: dict[str, Any], message: str
         Camera(**{**values, "rotation": np.eye(3), "translation": np.zeros(3), **change})
 
 
-def test_a_camera_file_of_more_than_a_megabyte_is_not_read(tmp_path: Path) -> None:
-    (tmp_path / "camera.json").write_text(" " * 1_000_001)
-    with pytest.raises(ValueError, match="expected at most 1 MB, got 1.0 MB"):
-        Camera.from_json(tmp_path / "camera.json")
-
-
 @each(
     ("key", "text"),
     [
+        ("width", "0"),
+        ("width", "9" * 5000),
+        ("focal", '"far"'),
         ("focal", "[" * 100_000),
         ("focal", f"[{10**400}, 1]"),
-        ("width", "9" * 5000),
+        ("centre", "[NaN, 1.0]"),
         ("camera_from_world", "[[1], [1, 2]]"),
+        ("camera_from_world", "null"),
+        ("more", "1"),
+        ("more", " " * 1_000_001 + "1"),
     ],
 )
-def test_a_hostile_camera_file_is_refused_in_one_line(tmp_path: Path, key: str, text: str) -> None:
+def test_a_wrong_camera_file_is_refused_in_one_line(tmp_path: Path, key: str, text: str) -> None:
     path = tmp_path / "camera.json"
     values = json.loads(Camera.around(np.zeros(3), 0.4, 5.0, (32, 24)).to_json())
     path.write_text(json.dumps({**values, key: "here"}).replace('"here"', text))

@@ -78,11 +78,6 @@ def clips(cmu: Path) -> list[tuple[Path, Path, int]]:
     return [(next((cmu / row["file"]).parent.glob("*.asf")), cmu / row["file"], int(row["frames"])) for row in rows]
 
 
-def test_every_frame_is_kept(cmu: Path) -> None:
-    lengths = {clip.name: len(read_clip(skeleton, clip)) for skeleton, clip, _ in clips(cmu)}
-    assert lengths == {clip.name: frames for _, clip, frames in clips(cmu)}
-
-
 def turn(x: float, y: float, z: float) -> Array:
     """Return Rz @ Ry @ Rx of angles in degrees."""
     (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians([x, y, z])), np.sin(np.radians([x, y, z]))
@@ -181,25 +176,19 @@ def test_angles_may_be_radians(skeleton: Skeleton, tmp_path: Path) -> None:
         ("name lfemur", "name femur", "small.asf: the skeleton needs bone 'lfemur', which this file does not define"),
         ("order TX TY TZ RX RY RZ", "order TX TY TZ RZ RY RX", "11: expected root order TX TY TZ RX RY RZ, got 'order"),
         ("order TX TY TZ RX RY RZ", "", "expected root order TX TY TZ RX RY RZ, got none"),
-        ("axis XYZ", "axis ZYX", "12: expected root axis XYZ, got 'axis ZYX'"),
-        ("position 0 0 0", "position 0 1 0", "13: expected root position 0 0 0, got 'position 0 1 0'"),
         ("length 0.45", "length 0", "6: expected a positive length unit"),
-        ("length 0.45", "length nan", "6: expected 'length' and finite numbers"),
         ("angle deg", "angle grad", "7: expected 'angle deg' or 'angle rad'"),
         ("axis 0 0 20  XYZ", "axis 0 0 20  ZYX", "21: expected axis order XYZ"),
         ("direction 0 -2 0", "direction 0 0 0", "19: expected a direction that is not zero"),
         ("length 1\n", "length -1\n", "20: expected a length of 0 or more"),
-        ("     length 1\n", "", "expected a bone with a length"),
         ("dof rx ry rz", "dof rz ry rx", "expected dof out of rx ry rz, in this order, got 'dof rz ry rx'"),
         ("name lfemur", "name ltibia", "expected one new name"),
         ("lhipjoint lfemur\n", "", "expected bone 'lfemur' in the hierarchy"),
         ("lhipjoint lfemur\n", "rhipjoint lfemur\n", "expected bone 'lfemur' under 'lhipjoint', got it under 'rhip"),
-        ("lhipjoint lfemur\n", "lhipjoint lfemur wing\n", "expected bones that :bonedata defines, got 'wing'"),
         ("lhipjoint lfemur\n", "lhipjoint lfemur head\n", "expected one parent a bone"),
         (":hierarchy", ":hierarch", "expected a section :hierarchy, got the end of the file"),
         (":hierarchy", ":units", "expected one section :units"),
         ("  end\n:hierarchy", ":hierarchy", "expected 'end' of the bone"),
-        (":version", "version", "2: expected a section such as :units"),
     ],
 )
 def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: str, message: str) -> None:
@@ -210,14 +199,6 @@ def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: st
         read_asf(path)
     assert str(tmp_path / "small.asf") in str(caught.value)
     assert message in str(caught.value)
-
-
-def test_a_synthetic_skeleton_survives_writing(skeleton: Skeleton, tmp_path: Path) -> None:
-    write_asf(tmp_path / "again.asf", skeleton, metres_per_unit=0.01)
-    again = read_asf(tmp_path / "again.asf")
-    np.testing.assert_allclose(again.offsets, skeleton.offsets, atol=1e-12)
-    np.testing.assert_allclose(again.axes, skeleton.axes, atol=1e-12)
-    assert again.channels == skeleton.channels
 
 
 # Motions.
@@ -234,25 +215,12 @@ def test_a_frame_is_read_into_radians_and_metres(skeleton: Skeleton, tmp_path: P
     assert np.count_nonzero(np.abs(motion.poses[1]) > 1e-12) == 1 + 3 + 1 + 1 + 2  # no toes, no thumb
 
 
-def test_the_root_turns_as_acclaim_says(skeleton: Skeleton, tmp_path: Path) -> None:
-    text = amc_text(FRAME.replace("0 90 0", "16.712 37.9505 8.93735"))
-    motion = read_amc(amc_file(tmp_path, text), skeleton)
-    expected = turn(16.712, 37.9505, 8.93735)
-    np.testing.assert_allclose(rotation_from_root_angles(motion.poses[0, :3]), expected, atol=1e-12)
-
-
 def test_line_ends_blank_lines_and_comments_make_no_difference(skeleton: Skeleton, tmp_path: Path) -> None:
     plain = read_amc(amc_file(tmp_path, amc_text()), skeleton)
     for text in (amc_text().replace("\n", "\r\n"), amc_text().replace("\n", " \n\n# caf\u00e9\n"), amc_text().rstrip()):
         np.testing.assert_array_equal(read_amc(amc_file(tmp_path, text), skeleton).poses, plain.poses)
     (tmp_path / "crlf.asf").write_bytes(asf_text().replace("\n", "\r\n").encode())
     np.testing.assert_array_equal(read_asf(tmp_path / "crlf.asf").offsets, skeleton.offsets)
-
-
-def test_bones_may_come_in_any_order(skeleton: Skeleton, tmp_path: Path) -> None:
-    turned = "".join(reversed(FRAME.splitlines(keepends=True)))
-    motion = read_amc(amc_file(tmp_path, amc_text(FRAME, turned)), skeleton)
-    np.testing.assert_array_equal(motion.poses[0], motion.poses[1])
 
 
 def test_radians_are_understood(skeleton: Skeleton, tmp_path: Path) -> None:
@@ -286,12 +254,9 @@ def test_a_clip_is_scaled_by_its_own_skeleton(tmp_path: Path) -> None:
         ("ltibia 40\n", "", ":11: expected bone 'ltibia' in frame 1, got frame 2"),
         ("ltibia 40\n", "ltibia 40\nltibia 40\n", ":8: expected each bone once in frame 1, got 'ltibia' again"),
         ("ltibia 40", "ltibia 40 41", ":7: expected 1 values for 'ltibia', got 2"),
-        ("ltibia 40", "ltibia 4o", ":7: expected numbers for 'ltibia', got '4o'"),
         ("ltibia 40", "ltibia nan", ":7: expected finite numbers below 1e+06 for 'ltibia', got 'nan'"),
-        ("10 20 30", "10 nan 30", ":6: expected finite numbers below 1e+06 for 'lfemur', got '10 nan 30'"),
         ("ltibia 40", "lfin 40", ":7: expected a bone of skeleton 'small' or a frame's number, got 'lfin 40'"),
         ("\n2\n", "\n3\n", ":12: expected frame 2, got frame 3"),
-        ("\n2\n", "\n2.0\n", ":12: expected a bone of skeleton 'small' or a frame's number, got '2.0'"),
         (":DEGREES\n", "", ":3: expected :DEGREES or :RADIANS before the first frame, got frame 1"),
         (":DEGREES", ":GRADS", ":3: expected :FULLY-SPECIFIED, :DEGREES or :RADIANS, got ':GRADS'"),
         ("\n1\n", "\n", ":4: expected a header such as :DEGREES or the number of a frame, got 'root 1 2 3"),
@@ -308,24 +273,6 @@ def test_mistakes_in_a_motion_are_named(
     assert f"{path}{message}" in str(caught.value)
 
 
-@each(
-    ("content", "message"),
-    [
-        (HEADER.encode(), ":3: expected at least one frame, got the end of the file"),
-        ((HEADER + "1\n").encode(), ":4: expected bone 'root' in frame 1, got the end of the file"),
-        ((HEADER + "1\n" + FRAME[:-9]).encode(), ":11: expected 2 values for 'rfoot', got 0"),
-        (b"\xff\xd8\xff\xe0\x00\x10JFIF", ":1: expected a header such as :DEGREES or the number of a frame, got"),
-        (HEADER.encode() + b"1\n\x80\x81 1 2\n", ":5: expected a bone of skeleton 'small'"),
-    ],
-)
-def test_cut_off_and_alien_files_are_named(skeleton: Skeleton, tmp_path: Path, content: bytes, message: str) -> None:
-    path = tmp_path / "clip.amc"
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match="expected") as caught:
-        read_amc(path, skeleton)
-    assert f"{path}{message}" in str(caught.value)
-
-
 def test_huge_files_are_refused_unread(skeleton: Skeleton, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (tmp_path / "huge.amc").open("wb") as file:
         file.truncate(500_000_001)
@@ -335,11 +282,6 @@ def test_huge_files_are_refused_unread(skeleton: Skeleton, tmp_path: Path, monke
         file.truncate(20_000_000)
     with pytest.raises(ValueError, match=r"huge\.asf: expected at most 1 MB, got 20\.0 MB"):
         read_asf(tmp_path / "huge.asf")
-
-
-def test_units_must_be_positive(skeleton: Skeleton, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"metres_per_unit must be a positive number, got 0\.0"):
-        read_amc(amc_file(tmp_path, amc_text()), skeleton, metres_per_unit=0.0)
 
 
 def test_what_a_file_cannot_hold_is_not_written(skeleton: Skeleton, tmp_path: Path) -> None:

@@ -150,14 +150,6 @@ def test_an_exercise_is_done_on_the_spot_facing_z(name: str) -> None:
     assert abs(lowest.min() - 0.03) < away
 
 
-@each("kind", ["squat", "jump"])
-def test_at_phase_0_a_squat_or_jump_is_down(kind: str) -> None:
-    for name in (kind, *built_in.other_styles(kind)):
-        height = cycle(name).translations[:, 1]
-        assert height @ np.cos(TURNS) < 0.0
-        assert abs(height @ np.sin(TURNS)) < 1e-3 * abs(height @ np.cos(TURNS))
-
-
 @each_motion
 def test_twice_the_speed_is_every_second_frame_and_a_phase_starts_later(name: str) -> None:
     slow, fast = built_in.motion(name, frames=39), built_in.motion(name, frames=20, speed=2.0)
@@ -166,15 +158,6 @@ def test_twice_the_speed_is_every_second_frame_and_a_phase_starts_later(name: st
     plain, shifted = cycle(name, 2), cycle(name, phase=0.25)
     np.testing.assert_allclose(shifted.poses, plain.poses[CYCLE // 4 : CYCLE // 4 + CYCLE], atol=1e-9)
     np.testing.assert_allclose(cycle(name, phase=1.0).poses, cycle(name).poses, atol=1e-9)
-
-
-def test_frames_and_rate_are_as_asked() -> None:
-    motion = built_in.motion("walk")
-    assert (len(motion), motion.fps, motion.name) == (60, 30.0, "walk")
-    motion = built_in.motion("run-b", frames=7, fps=120)
-    assert (len(motion), motion.fps, motion.name) == (7, 120.0, "run-b")
-    twice = built_in.motion("walk", frames=21, fps=60.0)
-    np.testing.assert_allclose(twice.poses[::2], built_in.motion("walk", frames=11).poses, atol=1e-12)
 
 
 def test_the_skeleton_is_its_own_mirror_image_and_an_adults() -> None:

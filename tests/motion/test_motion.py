@@ -43,14 +43,6 @@ def test_mistakes_are_named(poses: np.ndarray, translations: np.ndarray, fps: fl
         Motion("m", SKELETON, poses, translations, fps)
 
 
-def test_frames_cuts_a_clip() -> None:
-    motion = clip(10)
-    part = motion.frames(2, 5)
-    np.testing.assert_array_equal(part.poses, motion.poses[2:5])
-    np.testing.assert_array_equal(part.translations, motion.translations[2:5])
-    assert (part.name, part.fps) == ("clip", 120.0)
-
-
 @each(("start", "stop"), [(3, 3), (-1, 4), (0, 11), (5, 2)])
 def test_frames_outside_the_clip_are_refused(start: int, stop: int) -> None:
     with pytest.raises(ValueError, match=rf"start < stop <= 10, got start {start} and stop {stop}"):
@@ -65,11 +57,6 @@ def test_a_whole_ratio_takes_every_kth_frame_as_it_is(frames: int, kept: int) ->
     assert slow.fps == 30.0
     np.testing.assert_array_equal(slow.poses, motion.poses[::4])
     np.testing.assert_array_equal(slow.translations, motion.translations[::4])
-
-
-def test_the_same_rate_changes_nothing() -> None:
-    motion = clip(6)
-    np.testing.assert_array_equal(motion.resampled(120.0).poses, motion.poses)
 
 
 @each(

@@ -82,11 +82,3 @@ def test_ribs_separates_two_minima() -> None:
         optimiser.tell(proposals, costs(proposals))
     modes = optimiser.modes()
     assert np.linalg.norm(modes[:, None] - centres, axis=-1).min(axis=0).max() < 0.1
-
-
-def test_a_variant_is_a_setting_too() -> None:
-    offer = registry().offer("optimiser", "pymoo:GA")
-    assert offer.name == "pymoo:GA"
-    assert {setting.name: setting.default for setting in offer.settings}["variant"] == "GA"
-    assert offer.summary == registry().offer("optimiser", "pymoo").summary
-    assert np.isfinite(offer.factory(Toy(3), np.random.default_rng(0)).ask()).all()

@@ -2,7 +2,6 @@
 
 import copy
 import gc
-import os
 import pickle
 import threading
 from typing import Any
@@ -12,7 +11,6 @@ import pytest
 
 from posefit import minimise
 from posefit.arrays import Array
-from posefit.plugin import finite_costs
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_nevergrad import GlobalRandom
 from posefit_scipy.bridge import Bridged
@@ -101,18 +99,6 @@ def test_a_copy_goes_on_as_the_original(copied: Any) -> None:
         second.tell(proposals, sphere(proposals))
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
-@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
-def test_a_forked_process_goes_on_by_itself() -> None:
-    optimiser = Bridged(Toy(3), np.random.default_rng(0), climbs)
-    optimiser.tell(optimiser.ask(), np.arange(5.0))
-    expected = optimiser.ask()
-    child = os.fork()
-    if child == 0:
-        os._exit(0 if np.array_equal(optimiser.ask(), expected) else 1)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-
-
 def test_a_tell_that_does_not_fit_is_refused() -> None:
     optimiser = Bridged(Toy(3), np.random.default_rng(0), climbs)
     with pytest.raises(ValueError, match="tell must follow ask"):
@@ -120,12 +106,6 @@ def test_a_tell_that_does_not_fit_is_refused() -> None:
     optimiser.ask()
     with pytest.raises(ValueError, match="tell must get 5 costs, got 3"):
         optimiser.tell(np.zeros((3, 3)), np.zeros(3))
-
-
-def test_no_library_gets_a_cost_that_is_not_finite() -> None:
-    np.testing.assert_array_equal(
-        finite_costs(np.array([3.0, np.nan, np.inf, -np.inf, 1e300])), [3.0, 1e15, 1e15, -1e15, 1e15]
-    )
 
 
 def test_a_borrowed_global_generator_is_put_back() -> None:

@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import posefit
 from posefit.arrays import Array
-from posefit.cli import main
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion import built_in
 from posefit_priors import sklearn
@@ -160,12 +158,6 @@ def test_factor_analysis_is_inverted_though_scikit_learn_does_not() -> None:
     assert floor(Transformed(variant="FactorAnalysis").fit(poses), poses) < 1.0
 
 
-def test_parameters_of_a_transformer_can_be_given() -> None:
-    poses = angles("walk-a", "walk-b")
-    loose, tight = (Transformed(options=f'{{"gamma": {gamma}}}').fit(poses) for gamma in (0.05, 5.0))
-    assert floor(loose, poses) != floor(tight, poses)
-
-
 def test_a_file_may_name_decompositions_alone_and_has_a_limited_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -238,12 +230,6 @@ def test_no_freedom_at_all_is_the_space_of_pca() -> None:
     np.testing.assert_allclose(
         prior.inverse_transform(latents), pca.inverse_transform(pca.transform(poses)), atol=1e-12
     )
-
-
-def test_a_setting_that_makes_no_sense_is_one_line_of_check_and_not_one_a_rule() -> None:
-    result = CliRunner().invoke(main, ["check", "prior", "loose", "--set", "slack=-1"])
-    assert result.exit_code == 2
-    assert result.stderr.splitlines() == ["posefit: slack must be above 0, got -1"]
 
 
 # files and settings

@@ -3,7 +3,7 @@
 import importlib
 import sys
 from functools import partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -167,12 +167,6 @@ def test_variables_choose_what_is_loaded() -> None:
         assert {offer.distribution for offer in methods.offers["optimiser"].values()} == loaded, variables
         left_out = [plugin.cause for plugin in methods.plugins if plugin.state != "loaded"]
         assert all("names it" in cause or "not name it" in cause for cause in left_out), variables
-
-
-def test_built_ins_are_loaded_whatever_the_load_variable_says_but_may_be_blocked() -> None:
-    points = [entry for entry in entry_points(group="posefit") if entry.name in ("swarm", "priors")]
-    assert "sapso" in registry_of(points, {"POSEFIT_LOAD_PLUGINS": ""}).offers["optimiser"]
-    assert "sapso" not in registry_of(points, {"POSEFIT_BLOCK_PLUGINS": "swarm"}).offers["optimiser"]
 
 
 def test_the_origin_of_results_changes_with_the_source_of_a_plugin(

@@ -5,7 +5,6 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -84,13 +83,6 @@ def test_a_body_is_cut_by_any_image_and_the_near_plane_and_both_focal_lengths_co
         view = Camera.around(np.zeros(3), 0.0, 3.0, (width, 61), field_of_view=0.6)
         poses = random_poses(np.random.default_rng(width), 12)
         assert sum(assert_equals_the_twin(body, view, pose, np.zeros(3)) for pose in poses) >= 4
-
-
-@pytest.mark.slow
-def test_full_hd_is_drawn(body: Body) -> None:
-    camera = Camera.around(np.zeros(3), 0.7, 2.6, (1920, 1080))
-    for pose in random_poses(np.random.default_rng(5), 3):
-        assert_equals_the_twin(body, camera, pose, np.zeros(3))
 
 
 def test_radii_are_seen_at_the_mean_of_two_focal_lengths(body: Body) -> None:
@@ -272,26 +264,3 @@ def test_small_images_equal_the_twin_even_uncompiled(body: Body) -> None:
     places = [0.0 * towards, np.array([0.9, 0.5, 0.0]), 3.9 * towards, 9.0 * towards, np.full(3, np.nan)]
     for pose, place in zip(poses, places, strict=True):
         assert_equals_the_twin(body, camera, pose, place)
-
-
-def test_masks_are_those_that_opencv_draws_eight_times_as_large(body: Body) -> None:
-    small, large = (Camera.around(np.zeros(3), 0.4, 3.0, (160 * k, 120 * k)) for k in (1, 8))
-    for pose in random_poses(np.random.default_rng(17), 20):
-        pixels, depths = large.project(body.skeleton.joints(pose))
-        image = np.zeros((large.height, large.width), np.uint8)
-        for bone, parent in enumerate(PARENTS[1:]):
-            ends = (pixels[[parent, bone + 1]] - 0.5) * 16
-            reach = large.focal[0] * body.radii[bone] / depths[[parent, bone + 1]] * 16
-            for end, radius in zip(ends, reach, strict=True):
-                cv2.circle(image, tuple(np.rint(end).astype(int).tolist()), round(radius), 1, cv2.FILLED, shift=4)
-            axis = ends[1] - ends[0]
-            length = float(np.hypot(*axis))
-            if length <= abs(reach[0] - reach[1]):
-                continue
-            along, sine = axis / length, (reach[0] - reach[1]) / length
-            across = np.sqrt(1.0 - sine**2) * np.array([-along[1], along[0]])
-            normals = [sine * along + across, sine * along - across]
-            corners = [ends[e] + reach[e] * normals[n] for e, n in ((0, 0), (1, 0), (1, 1), (0, 1))]
-            cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), 1, shift=4)
-        theirs, ours = image[4::8, 4::8] > 0, project(body, small, pose, np.zeros(3))
-        assert (ours & theirs).sum() / (ours | theirs).sum() > 0.98

@@ -71,14 +71,6 @@ def test_the_command_writes_the_best_costs_and_keeps_what_is_there(tmp_path: Pat
     assert "expected a new name to write to, got one that exists" in again.stderr
 
 
-def test_a_file_without_longer_searches_names_its_methods(tmp_path: Path) -> None:
-    words = ["suite", "audit", "--function", "1", "--instances", "3:4", "--times", "0", "--method", "random"]
-    done = CliRunner().invoke(main, [*words, "--method", "pso", "--write", str(tmp_path / "known.json")])
-    assert done.exit_code == 0, done.output
-    known = json.loads((tmp_path / "known.json").read_text("utf-8"))
-    assert known == {"made_by": "random, pso with the usual budget", "problems": 1, "best": {}}
-
-
 @each(
     ("words", "message"),
     [(["--times", "-1"], "times must be 0 or more, got -1"), (["--method", "sapsoo"], "optimiser must be one of")],

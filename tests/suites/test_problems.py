@@ -211,16 +211,11 @@ def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
     [
         (("posefit-2025", 1, 0, 9), "suite must be one of posefit-2026.1, got 'posefit-2025'"),
         ((SUITE, 9, 0, 9), "function must be a whole number from 1 to 8, got 9"),
-        ((SUITE, True, 0, 9), "function must be a whole number from 1 to 8, got True"),
-        ((SUITE, "1", 0, 9), "function must be a whole number from 1 to 8, got '1'"),
-        ((SUITE, [1], 0, 9), r"function must be a whole number from 1 to 8, got \[1\]"),
-        ((SUITE, 1.0, 0, 9), "function must be a whole number from 1 to 8, got 1.0"),
         ((SUITE, np.array([1, 2]), 0, 9), r"function must be a whole number from 1 to 8, got array\(\[1, 2\]\)"),
         ((SUITE, 1, -1, 9), "instance must be 0 or more, got -1"),
         ((SUITE, 1, 20_000, 9), "instance must be at most 19999, got 20000"),
         ((SUITE, 1, 1.5, 9), "instance must be a whole number of at least 0, got 1.5"),
         ((SUITE, 7, 0, 9), "dimension of function 7 must be one of 24, 40, 66, got 9"),
-        ((SUITE, 1, 0, 10), "dimension of function 1 must be one of 9, 16, 24, 40, got 10"),
         ((SUITE, 1, 0, np.array([9, 16])), r"dimension of function 1 must be one of .*, got array\(\[ 9, 16\]\)"),
     ],
 )
@@ -265,8 +260,6 @@ def test_wrong_arguments_of_a_problem_are_named(arguments: dict[str, object], me
         ({"functions": [1], "dimensions": [66]}, r"at least one problem, got none in \[66\] dimensions"),
         ({"dimensions": [10]}, "dimension must be one of 9, 16, 24, 40, 66, got 10"),
         ({"functions": 9}, "functions must be a list of numbers, got 9"),
-        ({"dimensions": 9}, "dimensions must be a list of numbers, got 9"),
-        ({"instances": 9}, "instances must be a list of numbers, got 9"),
     ],
 )
 def test_wrong_arguments_of_a_suite_are_named(arguments: dict[str, Any], message: str) -> None:

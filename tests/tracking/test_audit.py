@@ -1,7 +1,5 @@
 """The poses that trackers draw are counted, their costs computed, and differences from their reports are warned of."""
 
-import threading
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +9,7 @@ import pytest
 import posefit
 from posefit.fitting.validation import Audit, AuditedTracker, BrokenRuleError
 from posefit.progress import Progress
-from posefit.silhouette.drawn import PoseCount
-from posefit.testing.tracker_rules import FRAMES, scene
+from posefit.testing.tracker_rules import scene
 from tests.cases import each
 from tests.testing import planted
 
@@ -93,59 +90,6 @@ def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
     assert len(free.summary["warnings"]) == 1
 
 
-@each("method", [{"method": "sapso"}, {"method": "vsmm"}, {"method": "sapso+vsmm"}])
-def test_posefits_own_methods_lead_to_no_warning(method: dict[str, str]) -> None:
-    summary = posefit.track("walk", view_degrees=(45.0, 135.0), **method, **{**QUICK, "evaluations": 400}).summary
-    assert summary["warnings"] == []
-
-
-def test_trackers_in_several_threads_are_counted_each_for_itself() -> None:
-    together = threading.Barrier(4)
-
-    class Patient(planted.SpendsInSecret):
-        def frame(self, observation: Any) -> Any:
-            together.wait(60.0)
-            return super().frame(observation)
-
-    class Honest(Patient):
-        def draw(self, observation: Any, poses: int) -> None:
-            super().draw(observation, 49)
-
-    with ThreadPoolExecutor(4) as pool:
-        results = list(pool.map(audited, [Patient, Honest, Patient, Honest]))
-    assert [bool(warnings) for _, warnings in results] == [True, False, True, False]
-    assert {frame.evaluations for frames, _ in results[::2] for frame in frames} == {20_001}
-
-
-def test_a_count_within_a_count_is_in_both() -> None:
-    task, _, observations = scene()
-    outer, inner = PoseCount(), PoseCount()
-    draw = planted.Holds(task).draw
-    with outer.counting():
-        draw(observations[0], 3)
-        with inner.counting():
-            draw(observations[0], 4)
-    draw(observations[0], 5)
-    assert (outer.poses, inner.poses) == (7, 4)
-
-
-class LooksAhead(planted.Holds):
-    """Takes the observation after next before it gives a frame, which the kit allows, and spends all it may."""
-
-    def track(self, observations: Any, rng: Any) -> Any:
-        latest = None
-        for observation in observations:
-            self.draw(observation, self.task.evaluations - 1)
-            if latest is not None:
-                yield latest
-            latest = replace(super().frame(observation), evaluations=self.task.evaluations)
-        yield latest
-
-
-def test_a_tracker_that_looks_ahead_is_honest() -> None:
-    assert audited(LooksAhead)[1] == []
-
-
 @each(
     ("kind", "rule"),
     [
@@ -185,7 +129,3 @@ def test_figures_that_are_none_are_named(change: dict[str, Any], rule: str) -> N
 
     with pytest.raises(BrokenRuleError, match=rule):
         audited(Odd)
-
-
-def test_the_scene_is_as_long_as_the_counts_above() -> None:
-    assert FRAMES == 12

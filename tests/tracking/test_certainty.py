@@ -14,10 +14,9 @@ from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.tracking.evaluation import evaluated
 from posefit.tracking.measures import Measures
 from posefit.tracking.outputs import OutputFolder
-from posefit.tracking.table import table, undetermined
+from posefit.tracking.table import table
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
-from tests.cases import each
 from tests.files import arrays
 from tests.tracking.scenes import MAXWELL, SPREAD, exact_frames, tracked, truth_of, uncertain_frames, walk
 
@@ -83,22 +82,6 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) 
     without_truth = evaluated(replace(scene, truth=None), frames, None, np.zeros((1, 63)), 0.5)[1]
     assert without_truth.interval_mm == measures.interval_mm
     assert without_truth.coverage is None
-
-
-@each(
-    ("sides", "lost", "sentence"),
-    [
-        (41, 3, "left and right: unknown in 41 of 60 frames; 3 frames lost"),
-        (41, 0, "left and right: unknown in 41 of 60 frames"),
-        (1, 1, "left and right: unknown in 1 of 60 frames; 1 frame lost"),
-        (0, 3, "3 of 60 frames lost"),
-        (0, 0, ""),
-        (None, None, ""),
-    ],
-)
-def test_one_sentence_says_what_was_not_determined(sides: int | None, lost: int | None, sentence: str) -> None:
-    numbers = [None if count is None else list(range(count)) for count in (sides, lost)]
-    assert undetermined({"frames": 60, "unknown_sides": numbers[0], "lost_frames": numbers[1]}) == sentence
 
 
 def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:

@@ -26,7 +26,7 @@ from posefit.tracking.smoothing.contours import (
     pose_jacobian,
     projected_body,
 )
-from posefit.tracking.smoothing.path import Squares, Visibility
+from posefit.tracking.smoothing.path import Visibility
 from posefit.tracking.smoothing.smooth import smoothed_frames
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
@@ -225,17 +225,6 @@ def test_the_gradient_of_the_bones_is_that_of_their_points_in_the_field() -> Non
     slopes = np.array([(offs(here + step) - offs(here - step)) / 2e-4 for step in steps])
     np.testing.assert_allclose(out[1][0], slopes @ offs(here), rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(out[0][0], slopes @ slopes.T, rtol=1e-4, atol=1e-4)
-
-
-def test_several_slopes_are_solved_for_at_once() -> None:
-    rng = np.random.default_rng(4)
-    squares = Squares.of(5, 2)
-    squares.add(slice(0, 2), np.eye(2) * 3.0, rng.normal(size=(5, 2)))
-    squares.add_bends(slice(0, 1), rng.normal(size=(5, 1)), 2.0)
-    others = rng.normal(size=(5, 2, 3))
-    steps = squares.steps_for(others)
-    for k in range(3):
-        np.testing.assert_allclose(Squares(squares.curves, others[..., k]).least(), steps[..., k], atol=1e-12)
 
 
 @each("views", [(60.0,), (0.0, 90.0)])

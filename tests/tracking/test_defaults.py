@@ -17,7 +17,6 @@ from posefit.registry import registry
 from posefit.tracking import method
 from posefit.tracking.method import resolved
 from posefit.tracking.options import TrackOptions
-from tests.cases import each
 
 WALKS = ("walk-a", "walk-b", "walk-c")
 
@@ -36,6 +35,8 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         ("a.npz", {"method": "annealed"}, "annealed@loose", WALKS),
         ("a.npz", {"method": "@pca"}, "annealed@pca", WALKS),
         ("a.npz", {"settings": {"sapso.cooling": 0.9}}, "sapso@loose", WALKS),
+        ("a.npz", {"settings": {"tracker.floor": 0.1}}, "annealed@loose", WALKS),
+        ("a.npz", {"settings": {"exemplars.lag": 0}}, "exemplars", ["library"]),
         ("a.npz", {"method": "vsmm"}, "vsmm", WALKS),
     ):
         options = resolved(source, TrackOptions(**given))
@@ -73,23 +74,6 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
     log: list[str] = []
     posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, progress=Progress(log.append))
     assert "looking for the first pose, 1 times" in log
-
-
-@each(
-    ("words", "method"),
-    [
-        ([], "exemplars"),
-        (["--method", "exemplars"], "exemplars"),
-        (["--set", "exemplars.lag=0"], "exemplars"),
-        (["--set", "sapso.cooling=0.9"], "sapso@loose"),
-        (["--set", "tracker.floor=0.1"], "annealed@loose"),
-    ],
-)
-def test_settings_choose_the_method(masks: Path, words: list[str], method: str) -> None:
-    quick = ["--train", "walk-a", "--frames", "0:2", "--evaluations", "400", "--restarts", "1", "--body-frames", "0"]
-    done = CliRunner().invoke(main, ["track", str(masks), *quick, *words])
-    assert done.exit_code == 0, done.output
-    assert f": 2 frames, {method}, " in done.stdout
 
 
 def test_people_are_left_out_of_the_default_library(masks: Path) -> None:

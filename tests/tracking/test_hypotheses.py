@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,17 +19,15 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.silhouette.drawn import PoseCount
-from posefit.tracking.restarts import SEARCHED_AGAIN, SYMMETRIC_POSES, initial_guess, stream
+from posefit.tracking.restarts import SEARCHED_AGAIN, SYMMETRIC_POSES, initial_guess
 from posefit.tracking.trajectory import (
     MIN_TYPICAL_SPEED,
     WALKING_SPEED,
     TrajectoryCost,
     trajectory_cost,
     typical_speed,
-    with_total_effort,
 )
 from tests.cases import each
-from tests.testing import planted
 from tests.tracking.scenes import walk
 
 WALK = built_in.motion("walk", frames=30)
@@ -148,24 +146,6 @@ def test_guesses_do_not_contradict_what_is_known() -> None:
     assert given == [(SEARCHED_AGAIN, task)] * 5
 
 
-def test_each_hypothesis_has_random_numbers_of_its_own() -> None:
-    assert stream(3, "hypothesis", 1).random() == np.random.default_rng([3, 2005, 1]).random()
-    assert len({stream(seed, "hypothesis", number).random() for seed in range(3) for number in range(3)}) == 9
-
-
-def test_the_track_that_is_kept_has_the_effort_of_all() -> None:
-    one, two = (frames_of(WALK.poses[:2], costs) for costs in ([1.0, 2.0], [3.0, 4.0]))
-    two = [replace(frame, evaluations=30, spent=np.array([15, 30])) for frame in two]
-    kept = with_total_effort([one, two], 1)
-    assert [(f.cost, f.evaluations, f.seconds, f.cpu_seconds) for f in kept] == [
-        (3.0, 40, 1.0, 0.5),
-        (4.0, 40, 1.0, 0.5),
-    ]
-    np.testing.assert_array_equal(kept[0].spent, [20, 40])
-    one[0] = replace(one[0], cpu_seconds=None)
-    assert with_total_effort([one, two], 0)[0].cpu_seconds is None
-
-
 @each("method", [{}, {"method": "vsmm"}, {"method": "exemplars"}, {"method": "annealed"}])
 def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -> None:
     drawn = PoseCount()
@@ -182,30 +162,6 @@ def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -
     assert hypotheses[int(np.argmin(totals))]["cost"] == pytest.approx(summary["cost"])
     assert hypotheses[0]["cost"] == pytest.approx(single.summary["cost"])  # the first is the track without others
     assert single.summary["hypotheses"] == []
-
-
-class RecordedTasks(planted.Holds):
-    """Holds a pose, and records its tasks."""
-
-    tasks: ClassVar[list[Task]] = []
-
-    def track(self, observations: Any, rng: Any) -> Iterator[Frame]:
-        self.tasks.append(self.task)
-        return super().track(observations, rng)
-
-
-def test_a_tracker_gets_the_guesses_as_tasks() -> None:
-    RecordedTasks.tasks.clear()
-    track = posefit.track("walk", method=RecordedTasks, hypotheses=3, view_degrees=90.0, **QUICK)
-    assert [task.first_pose is None for task in RecordedTasks.tasks[-3:]] == [True, False, False]
-    assert [row["guess"] for row in track.summary["hypotheses"]] == ["searched", "mirrored", "reflected"]
-    assert track.summary["hypotheses"][0]["kept"]  # which all cost the same
-
-
-@each("hypotheses", [0, -1, 1.5, "2"])
-def test_hypotheses_that_are_no_number_are_a_mistake(hypotheses: Any) -> None:
-    with pytest.raises(ValueError, match=f"hypotheses must be .* got {hypotheses!r}"):
-        posefit.track("walk", hypotheses=hypotheses, **QUICK)
 
 
 def stopping(after: int) -> Any:

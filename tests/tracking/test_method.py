@@ -37,31 +37,6 @@ def test_a_budget_is_the_population_times_iterations_and_one() -> None:
     assert TrackOptions(population_size=10, evaluations=300).budget == 300
 
 
-def test_mistakes_are_named() -> None:
-    for settings, message in [
-        ({"evaluations": 0}, "evaluations must be at least 1, got 0"),
-        ({"evaluations": 100, "iterations": 4}, "evaluations and iterations must not both be given"),
-        ({"evaluations": 30, "method": "sapso"}, "evaluations must hold one population of 40, got 30"),
-        ({"ask_seconds": 0.0}, "ask_seconds must lie in 0.001 to 1e\\+08, got 0.0"),
-        ({"view_degrees": float("nan")}, "view_degrees must be a finite number, got nan"),
-        ({"fps": 0.0}, "fps must be a positive number, got 0.0"),
-        ({"fps": float("inf")}, "fps must be a positive number, got inf"),
-        ({"method": "sapzo"}, "method must be OPTIMISER@PRIOR, or one of .*, got 'sapzo'; did you mean 'sapso'"),
-        ({"method": "sapzo@pca"}, "optimiser must be one of .*did you mean 'sapso'"),
-        ({"method": "@pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
-        ({"method": "vsmn"}, "method must be .*, got 'vsmn'; did you mean 'vsmm'"),
-        ({"method": "vsmm", "optimiser": Registry}, "optimiser must not be given beside a tracker, got .* and vsmm"),
-        ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
-        ({"settings": {"sapso.coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),
-        ({"settings": {"pca.components": "six"}}, "pca.components must be float, got 'six'"),
-        ({"settings": {"tracker.flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
-    ]:
-        with pytest.raises(ValueError, match=message):
-            posefit.track(
-                "walk", **{**QUICK, **({"evaluations": None} if "iterations" in settings else {}), **settings}
-            )
-
-
 def test_a_filter_carries_its_particles_and_the_others_are_built_again(monkeypatch: Any) -> None:
     built: list[str] = []
     for name in ("particle", "sapso", "random"):
@@ -207,29 +182,6 @@ def test_a_tracker_is_reached_by_name(installed: Any) -> None:
     assert summary["prior_floor_degrees"] is None
     assert summary["skill"]["mean_pose"] is not None
     installed("optimiser", planted.Sound)
-
-
-class BadFrames(planted.Holds):
-    def frame(self, observation: Any) -> Any:
-        return replace(super().frame(observation), pose=np.zeros(60))
-
-
-class FailingTracker(planted.Holds):
-    def frame(self, observation: Any) -> Any:
-        raise OSError("no file")
-
-
-@each(
-    ("factory", "rule"),
-    [
-        (BadFrames, r"a pose must be 66 finite angles, got shape \(60,\)"),
-        (FailingTracker, "it must not fail, got OSError: no file"),
-    ],
-)
-def test_a_broken_tracker_is_named(factory: Any, rule: str, installed: Any) -> None:
-    installed("tracker", factory)
-    with pytest.raises(BrokenRuleError, match=f"tracker 'bad' of posefit-bad 1.0: {rule}"):
-        posefit.track("walk", method="bad", **QUICK)
 
 
 def test_a_given_first_pose_starts_the_first_frame_around_it(seed: int) -> None:

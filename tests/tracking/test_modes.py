@@ -93,13 +93,6 @@ def test_the_weight_of_a_flip_varies_little_between_seeds(temperature: float, of
     assert np.mean(deviations) < off, deviations
 
 
-def test_modes_are_those_of_the_random_generator() -> None:
-    search = modes_by("sapso", pose_problem(), searches=2, evaluations=400)
-    first, second, other = (search(rng=np.random.default_rng(seed)) for seed in (3, 3, 4))
-    np.testing.assert_array_equal(first.poses, second.poses)
-    assert not np.array_equal(first.poses, other.poses)
-
-
 def test_numbers_that_make_no_sense_are_refused() -> None:
     for options, message in [
         ({"searches": 0}, "searches must be at least 1, got 0"),

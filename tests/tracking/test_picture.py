@@ -3,7 +3,6 @@
 from dataclasses import replace
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 
@@ -12,7 +11,7 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses
-from posefit.tracking.drawing import BACKGROUND, BOTH, FAINTEST, MISSED, OTHER, RIGHT, draw_body, opacities, solid_map
+from posefit.tracking.drawing import BACKGROUND, FAINTEST, MISSED, OTHER, RIGHT, draw_body, opacities
 from posefit.tracking.picture import HEAD, LEFT_MARGIN, PANEL, RIGHT_MARGIN, Painter, certainty_chart
 from posefit.uncertainty.modes import Mode
 from tests.cases import each
@@ -55,23 +54,6 @@ def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
     return int((np.abs(image.astype(int) - np.array(colour)).max(axis=2) <= close).sum())
 
 
-@each(
-    ("usable", "expected"),
-    [
-        ([True] * 7, [0, 1, 2, 4, 5, 6]),
-        ([False, False, True, True, False, True, False], [2, 3, 5]),
-        ([False] * 7, [0, 1, 2, 4, 5, 6]),  # there is nothing better
-    ],
-)
-def test_stills_are_of_frames_that_show_the_person(scene: Scene, usable: list[bool], expected: list[int]) -> None:
-    painter, kept = Painter(scene, usable), []
-    for k, frame in enumerate(exact_frames(scene)):
-        before = len(painter._stills)
-        painter.add(frame, scene.observations[k], row())
-        kept += [k] * (len(painter._stills) - before)
-    assert kept == expected
-
-
 def test_a_bone_is_as_solid_as_the_less_sure_of_its_ends() -> None:
     radii = np.zeros(len(JOINTS))
     radii[JOINTS.index("lfoot")] = 0.175  # halfway from 5 to 30 cm
@@ -100,14 +82,6 @@ def test_what_lies_behind_shows_through_a_faint_body(scene: Scene, frame: Frame)
     assert (images[0.25] != drawn).any()
 
 
-def test_pixels_are_as_solid_as_the_limb_in_front(scene: Scene, frame: Frame) -> None:
-    share = solid_map(scene.body, scene.cameras[0], frame.pose, frame.translation, np.full(26, 0.6))
-    assert set(np.unique(share).round(6)) == {0.6, 1.0}
-    mask = scene.observations[0].silhouettes[0].mask
-    assert (share[mask] < 1.0).mean() > 0.95
-    assert (share[~mask] < 1.0).mean() < 0.05
-
-
 def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene, frame: Frame) -> None:
     plain, half = painted(scene, frame)
     np.testing.assert_array_equal(plain, painted(scene, frame, radii=np.full((3, 27), 0.02))[0])
@@ -130,28 +104,12 @@ def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(
         assert (pixels(part, OTHER, close=12) > 100) == drawn
 
 
-def test_a_mode_is_drawn_on_footage_too(scene: Scene, frame: Frame) -> None:
-    film = np.zeros((120, 160, 3), np.uint8)
-    plain, half = painted(scene, frame, filmed=film)
-    image, _ = painted(scene, with_modes(scene, frame, 0.5), filmed=film, radii=np.full((3, 27), 0.4))
-    assert pixels(image[:, :half], OTHER) > 100
-    assert pixels(plain[:, :half], OTHER) == 0
-    assert image[:, :half].mean() < plain[:, :half].mean()  # fainter
-    assert not film.any()
-
-
 @each(("lost", "marked"), [(np.nan, False), (0.49, False), (0.5, True), (1.0, True)])
 def test_a_lost_frame_has_a_border(scene: Scene, frame: Frame, lost: float, marked: bool) -> None:
     image, _ = painted(scene, frame, row(lost=lost))
     edges = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
     assert (edges == MISSED).all(axis=1).all() == marked
     assert pixels(image[-40:, -PANEL + 12 : -PANEL + 120], MISSED) == 0 or marked
-
-
-@each(("unknown", "written"), [(1.0, True), (0.0, False), (np.nan, False)])
-def test_unknown_sides_are_written(scene: Scene, frame: Frame, unknown: float, written: bool) -> None:
-    image, _ = painted(scene, frame, row(unknown_sides=unknown))
-    assert (pixels(image[-40:], OTHER, close=12) > 20) == written
 
 
 def test_the_summary_has_a_chart_of_certainty_where_it_is_reported(scene: Scene) -> None:
@@ -188,19 +146,3 @@ def test_bands_are_as_high_as_intervals_are_wide_and_have_gaps_where_they_are_un
         # 50, 50 and 100 of 210 mm, but for the lines across
         expected = np.zeros(3) if k == 4 else (HEIGHT - 50 - HEAD) * np.array([50, 50, 100]) / 210
         np.testing.assert_allclose(counts, expected, atol=0 if k == 4 else 5)
-
-
-def test_the_true_error_is_a_line_among_the_bands() -> None:
-    image = certainty_chart([row(mpjpe_mm=100.0)] * FRAMES, np.full((FRAMES, 3, 27), 0.2), "", WIDTH, HEIGHT)
-    line = np.flatnonzero(np.abs(image[HEAD:, WIDTH // 2].astype(int) - BOTH).max(axis=1) < 20)
-    assert line.mean() == pytest.approx((HEIGHT - 50 - HEAD) * (1 - 100 / 210), abs=2)
-
-
-@each("count", [1, 2])
-def test_a_single_frame_has_its_chart(count: int) -> None:
-    rows = [row(unknown_sides=1.0, lost=1.0, mpjpe_mm=40.0)] * count
-    image = certainty_chart(rows, np.full((count, 3, 27), 0.1), "", WIDTH, HEIGHT)
-    assert image.shape == (HEIGHT, WIDTH, 3)
-    assert pixels(image[-50:], OTHER) > 1000
-    assert pixels(image[-50:], MISSED) > 1000
-    assert cv2.imencode(".png", image)[0]

@@ -82,27 +82,6 @@ def test_without_relocalisation_the_person_is_tracked_backwards_with_a_warning(t
     assert warning.startswith("the person seems to walk backwards in 14 of 72 frames")
 
 
-def test_a_person_who_goes_on_after_a_gap_is_held_meanwhile(tmp_path: Path) -> None:
-    track, right = tracked(tmp_path, "on", smooth=False)
-    assert right[AFTER].all()
-    held = track.estimates[WALKS : WALKS + GAP]
-    assert all(frame.evaluations == 0 for frame in held)
-    np.testing.assert_array_equal([frame.pose for frame in held], [track.estimates[WALKS - 1].pose] * GAP)
-
-
-def test_a_known_motion_has_no_gap() -> None:
-    options: dict[str, Any] = {"frames": (0, 3), "size": (80, 60), "evaluations": 80}
-    plain, same = (posefit.track("walk", settings=each, **options) for each in ({}, {"tracker.relocalise_gap": 5}))
-    np.testing.assert_array_equal(plain.motion.poses, same.motion.poses)
-    assert plain.summary["relocalised"] == same.summary["relocalised"] == []
-    for wrong, message in [
-        (-1, "relocalise_gap must be 0 or more, got -1"),
-        (2.5, r"tracker.relocalise_gap must be int \| none, got 2.5"),
-    ]:
-        with pytest.raises(ValueError, match=message):
-            posefit.track("walk", frames=(0, 1), settings={"tracker.relocalise_gap": wrong})
-
-
 TASK = Task(Body.of(MOTION.skeleton), [SIDE], 10, 0.0, MIDDLE, fps=10.0)
 VISIBLE = Observation([Silhouette.of(footage("on")[0][0])])
 GONE = Observation([Silhouette.of(footage("on")[0][WALKS])], usable=False)

@@ -47,13 +47,6 @@ def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp
     np.testing.assert_array_equal(again.joints, track.joints)
 
 
-def test_two_arrays_are_two_cameras() -> None:
-    cameras = [posefit.Camera.around(MOTION.translations[0], azimuth, 3.6, (80, 60)) for azimuth in (0.0, 1.5)]
-    poses = list(zip(MOTION.poses, MOTION.translations, strict=True))
-    views = [np.array([project(BODY, camera, *pose) for pose in poses]) for camera in cameras]
-    assert posefit.track(views, camera=cameras, fps=25, **QUICK).summary["views"] == 2
-
-
 @each(
     "masks,words",
     [
@@ -66,12 +59,6 @@ def test_two_arrays_are_two_cameras() -> None:
 def test_arrays_that_are_no_masks_are_named(masks: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         posefit.track(masks, **QUICK)
-
-
-def test_an_npy_file_that_is_damaged_is_named(tmp_path: Path) -> None:
-    (tmp_path / "masks.npy").write_bytes(b"\x93NUMPY no array")
-    with pytest.raises(InputError, match=r"masks\.npy: expected an \.npy file"):
-        posefit.track(tmp_path / "masks.npy", **QUICK)
 
 
 def test_joints_angles_and_the_table_are_those_of_the_motion(track: posefit.Track) -> None:

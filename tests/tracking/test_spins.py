@@ -11,7 +11,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.restarts import in_reverse, retrack_spins
+from posefit.tracking.restarts import retrack_spins
 from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
@@ -148,8 +148,3 @@ def test_a_track_that_gets_no_better_is_kept(
     assert start is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
     assert {f.evaluations for f in kept} == {evaluations}
-
-
-def test_a_motion_in_reverse_ends_where_it_began() -> None:
-    np.testing.assert_array_equal(in_reverse(WALK).translations[0], WALK.translations[-1])
-    np.testing.assert_array_equal(in_reverse(in_reverse(WALK)).poses, WALK.poses)

@@ -129,22 +129,6 @@ def test_the_slider_moves_picture_body_and_curves_together(chromium: Any, doubtf
         assert page.locator("#turning").get_attribute("aria-label").endswith(reading(page))
 
 
-@pytest.mark.slow
-def test_it_plays_and_stops(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful, 390) as browser:
-        page, readings = browser.page, set()
-        page.locator("#speed").select_option("0.5")
-        page.locator("#play").click()
-        assert page.locator("#play").inner_text() == "Pause"
-        waited(browser, lambda: readings.add(reading(page)) or len(readings) > 3)
-        page.locator("#play").click()
-        assert page.locator("#play").inner_text() == "Play"
-        still = reading(page)
-        page.wait_for_timeout(300)
-        assert reading(page) == still
-        assert browser.complaints == []
-
-
 def test_keys_go_from_frame_to_frame_and_to_marked_frames(chromium: Any, doubtful: Path) -> None:
     with opened(chromium, doubtful) as browser:
         page = browser.page
@@ -223,17 +207,6 @@ def pixels(image: Any, colour: str) -> int:
     """Return how many pixels have a colour, or nearly."""
     expected = np.array([int(colour[k : k + 2], 16) for k in (5, 3, 1)])
     return int(((np.abs(image[..., :3].astype(int) - expected).max(axis=2) < 12) & (image[..., 3] > 200)).sum())
-
-
-@pytest.mark.slow
-def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(chromium: Any, doubtful: Path) -> None:
-    with opened(chromium, doubtful, color_scheme="light") as browser:
-        page = browser.page
-        for frame, weight in ((2, 30), (3, 40), (4, 0)):
-            page.locator("#frame").fill(str(frame))
-            assert (f"may be the thin bones: {weight} %" in reading(page)) == (weight > 20)
-            for canvas in ("picture", "turning"):
-                assert (pixels(picture(page, canvas), "#9a3f86") > 60) == (weight > 20), (frame, canvas)
 
 
 def test_doubtful_frames_are_marked(chromium: Any, doubtful: Path) -> None:

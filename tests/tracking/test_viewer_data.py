@@ -18,7 +18,6 @@ from posefit.measuring.angles import clinical_angles
 from posefit.page.document import embedded
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.page import stills
-from posefit.tracking.page.content import _beside, _marked
 from posefit.tracking.page.stills import Stills, Strip
 from tests.tracking.scenes import MAXWELL, SIZE, exact_frames, truth_of, uncertain_frames, viewed, walk
 
@@ -135,17 +134,6 @@ def test_joints_angles_and_intervals_are_those_of_the_track(tmp_path: Path) -> N
     assert data["others"]["weights"] == pytest.approx([0.3])
     assert data["marks"] == {"held": [], "lost": [], "unknown": [1]}
     assert data["verdict"] == "Not determined: left and right: unknown in 1 of 4 frames."
-
-
-def test_a_frame_of_the_page_has_the_marks_of_those_that_it_stands_for() -> None:
-    marks = [k in (3, 4, 9) for k in range(12)]
-    assert _marked(marks, 1) == [3, 4, 9]
-    assert _marked(marks, 4) == [0, 1, 2]
-
-
-def test_true_angles_stand_within_half_a_turn_of_the_estimated_ones() -> None:
-    true = _beside(np.array([[3.2], [9.5]]), np.array([[-3.1], [3.1]]))
-    np.testing.assert_allclose(true, [[-3.1 + 2 * np.pi], [3.1 + 2 * np.pi]])
 
 
 class Outside(html.parser.HTMLParser):
