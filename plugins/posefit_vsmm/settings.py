@@ -35,6 +35,7 @@ class Settings:
     joint_errors: JointErrors = "measured"
     process_noise: float = 1.0
     joint_noise: float = 1.0
+    initial_noise: float = 1.0
     hidden: Hidden = "dropped"
     assignment: Assignment = "optimal"
     gates: bool = True
@@ -60,8 +61,8 @@ class Settings:
         for name in ("smoothing", "most", "longest"):
             whole(name, getattr(self, name), 1)
         whole("dwell", self.dwell, 0)
-        positive("process_noise", self.process_noise)
-        positive("joint_noise", self.joint_noise)
+        for name in ("process_noise", "joint_noise", "initial_noise"):
+            positive(name, getattr(self, name))
         at_least("floor_degrees", self.floor_degrees, 0.0)
         for name in ("false_alarm", "miss"):
             between(name, getattr(self, name), 0.0, 0.5, ends=False)
@@ -95,5 +96,6 @@ OURS: Mapping[str, Any] = {
     "test": "sequential",  # Interpretation V12
     "process_noise": 2.0,  # Interpretation V7
     "joint_noise": 2.0,  # Interpretation V7
+    "initial_noise": 4.0,  # Interpretation V7
     "restart": True,  # Interpretation V14
 }

@@ -209,7 +209,7 @@ class TrackFilter:
         models = list(self._models.known.values())
         state = estimated_state(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
         self._models.restart()
-        self._belief = self._models.start(state, np.diag((UNSURE * self._free) ** 2))
+        self._belief = self._models.start(state, self._how.initial_noise * np.diag((UNSURE * self._free) ** 2))
         self._bad = 0
         self._missing = dict.fromkeys(_LIMBS, 0)
         return matcher.evaluations
@@ -318,6 +318,7 @@ def vsmm(task: Task, **given: Any) -> VSMM:
         joint_errors: of the joint rules, "measured", or "plain": unbiased, the torso's the root's. Interpretation V8.
         process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
         joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
+        initial_noise (P0): of the first state, as a multiple of 5 cm and 15 degrees squared, above 0. V7.
         hidden: joints that are not detected are "dropped", or "imputed", as in the patent. Interpretation V9.
         assignment: of end points to hands and feet, "optimal", or each the "nearest". Interpretation V15.
         gates: whether detections far from where they are expected are rejected. Interpretation V15; no in the patent.
