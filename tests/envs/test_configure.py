@@ -176,9 +176,7 @@ def test_rewards_add_up_to_what_the_logarithm_of_the_cost_fell_by() -> None:
     [
         ({"population_size": 3}, "population_size must be at least 4, got 3"),
         ({"iterations": 1}, "iterations must be at least 2, got 1"),
-        ({"every": 0}, "every must be at least 1, got 0"),
         ({"iterations": 7, "every": 2}, "iterations must be a multiple of every 2, got 7"),
-        ({"motion": "wakl"}, "did you mean 'walk'"),
     ],
 )
 def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:

@@ -118,9 +118,6 @@ def test_without_pygame_or_a_display_the_error_names_the_remedy(monkeypatch: pyt
         gym.make("posefit/FitImage-v0", render_mode="human").reset(seed=0)
 
 
-# what the steps mean
-
-
 def test_fit_ends_at_the_target_or_with_the_budget() -> None:
     env = gym.make("posefit/FitImage-v0", instance=3, target_cost=99.0)
     env.reset(seed=0)
@@ -193,9 +190,6 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
         poses.append(info["committed_pose"])
     np.testing.assert_array_equal(poses, [frame.pose for frame in frames])
     assert len({float(pose[0]) for pose in poses}) == 3  # the box moved on with each frame
-
-
-# mistakes
 
 
 @each(

@@ -10,7 +10,6 @@ from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
-from posefit_exemplars import exemplars
 from posefit_exemplars.exemplars import (
     DIMENSIONS,
     SAME,
@@ -108,8 +107,7 @@ def test_poses_are_drawn_by_the_square_root_of_the_size_of_their_group(two: Exem
     np.testing.assert_allclose(counts[5:], 2_500, rtol=0.08)
 
 
-def test_states_are_made_once_for_the_same_motions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exemplars, "_latest", None)
+def test_states_are_made_once_for_the_same_motions() -> None:
     walk = built_in.motion("walk-a", frames=12)
     made = exemplars_of([walk], SKELETON, False)
     copy = Motion(walk.name, walk.skeleton, walk.poses.copy(), walk.translations.copy(), walk.fps)

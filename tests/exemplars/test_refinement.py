@@ -6,37 +6,16 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.box import Space, converted, displacement, draw_population, repair, sample_normal, wrap
 from posefit.geometry.skeleton import ANGLES
 from posefit.registry import registry
 from posefit_exemplars.exemplars import Exemplars
-from posefit_exemplars.refinement import CARRIED, COMPONENTS, REACH, YAW, Surroundings, refined, surroundings
+from posefit_exemplars.refinement import CARRIED, REACH, YAW, Surroundings, refined, surroundings
 from tests.cases import each
 
 
 def around(exemplars: Exemplars, off: Array | None = None) -> Surroundings:
     """Return the surroundings of a state, begun at an offset."""
     return surroundings(exemplars, exemplars.poses[9], exemplars.codes[9], np.zeros(ANGLES) if off is None else off)
-
-
-def test_surroundings_are_a_space_and_draws_lie_in_it(two: Exemplars) -> None:
-    space: Space = around(two)
-    rng = np.random.default_rng(0)
-    assert space.start is not None
-    assert 2 < space.dimensions <= COMPONENTS + 1
-    for name in ("centre", "half", "periodic"):
-        assert getattr(space, name).shape == (space.dimensions,)
-    drawn = draw_population(space, rng, 300)
-    assert drawn.shape == (300, space.dimensions)
-    far = sample_normal(space, rng, drawn, np.full(space.dimensions, 5.0))
-    repaired = repair(space, 10.0 * drawn, space.start.mean)
-    for proposals in (drawn, far, repaired):
-        assert space.feasible(proposals).all()
-    corners = np.array([[1.1], [0.9], [-1.1]]) * np.ones(space.dimensions)
-    np.testing.assert_array_equal(space.feasible(corners), [0, 1, 0])
-    np.testing.assert_array_equal(wrap(space, drawn), drawn)
-    np.testing.assert_array_equal(displacement(space, drawn, far), far - drawn)
-    np.testing.assert_allclose(converted(space, drawn, space), drawn)
 
 
 def test_the_axes_are_principal_components_of_similar_poses(two: Exemplars) -> None:

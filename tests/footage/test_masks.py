@@ -66,9 +66,6 @@ def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -
     )
 
 
-# what values mean
-
-
 @each("kind", [np.uint8, np.uint16])
 @each("values", [(0, 1), (0, 255), (0, 38), (64, 192)])
 def test_two_values_are_a_mask_whichever_they_are(
@@ -174,7 +171,6 @@ def test_an_edge_between_two_values_is_no_label(walk: list[Any], tmp_path: Path)
         (["MASKS", "--label", "person"], "expected a whole number such as 15, or a colour 0xRRGGBB, got 'person'"),
         (["MASKS", "--holes", "2"], "holes must lie in 0 to 1, a share of the person's area, got 2.0"),
         (["walk", "--label", "1"], "label must be given for masks only, got 1 for a motion"),
-        (["walk", "--holes", "0.1"], "holes must be given for masks only, got 0.1 for a motion"),
         (["SOFT", "--label", "1"], "label must be given for masks whose values are labels, PNG or whole numbers"),
         (["PHOTOS"], "photos: expected masks, got pictures in many colours; a person cut out needs an alpha channel"),
         (["PICTURES"], "pictures: expected masks, got pictures in many colours"),
@@ -212,9 +208,6 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
         cv2.imwrite(str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8))
     (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
     assert [Path(name).name for name in read_folder(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
-
-
-# the people in them
 
 
 def stack(path: Path, masks: Sequence[Any]) -> Path:

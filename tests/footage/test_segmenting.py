@@ -105,9 +105,6 @@ def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_i
         assert segmentation.summary["usable"] > 150
 
 
-# the signs
-
-
 def figure(shift: int = 0, tall: int = 60, wide: int = 22) -> tuple[Any, Any]:
     """Return a striped figure before grey, and its mask."""
     mask = np.zeros((120, 160), dtype=bool)
@@ -201,9 +198,6 @@ def test_the_verdict_follows_from_all_frames(
     assert result is None or text in result.text
 
 
-# several cameras
-
-
 def views(folder: Path, azimuths: list[float], part: Any = lambda mask: mask) -> Views:
     folder.mkdir()
     for k, azimuth in enumerate(azimuths):
@@ -231,9 +225,6 @@ def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None
     assert "expected cameras that see one person, got views that pass each other by 1.5 m" in apart
     with pytest.raises(ValueError, match=r"0: expected cameras that see one person, got views that pass"):
         posefit.track([tmp_path / "c" / "0.npz", tmp_path / "c" / "1.npz"], camera=moved)
-
-
-# plugins
 
 
 class Half:

@@ -24,12 +24,6 @@ def test_every_bone_has_a_proportion_and_every_proportion_a_bone() -> None:
     assert named == set(PROPORTIONS)
 
 
-def test_girth_scales_every_radius() -> None:
-    skeleton = average_skeleton()
-    np.testing.assert_allclose(Body.of(skeleton, 1.5).radii, 1.5 * Body.of(skeleton).radii)
-    assert not Body.of(skeleton, 0.0).radii.any()
-
-
 def test_a_joint_is_as_wide_as_the_widest_bone_that_meets_there() -> None:
     radii = np.zeros((26, 2))
     radii[BONES.index("lhipjoint")] = 0.1, 0.2

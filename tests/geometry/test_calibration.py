@@ -101,9 +101,7 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
 @each(
     ("name", "text", "message"),
     [
-        ("a.toml", "[left", "expected a calibration"),
         ("a.toml", "[metadata]\nadjusted = false\n", "expected a calibration with a camera, got none"),
-        ("a.toml", TOML.replace("matrix", "matrx"), "no 'matrix'"),
         ("a.toml", TOML.replace("[ 640, 480]", "[ 640.5, 480]"), "an image size of 640.5 x 480"),
         ("a.toml", TOML.replace("500.0", "nan"), "finite numbers"),
         ("a.toml", TOML.replace("[ 0.1, 0.0, 0.0, 0.0]", "[ 0.1, 0.0, 0.0]"), "a distortion of 3 numbers"),
@@ -112,8 +110,6 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
         ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
         ("a.xml", QUALISYS.replace('r11="1"', 'r11="3"'), "a rotation that is none"),
         ("a.yml", "%YAML:1.0\n---\nimage_width: 3\n", "without camera_matrix, image_width and image_height"),
-        ("a.csv", "1,2,3", "a file that is none of them"),
-        ("a.json", '{"camera_from_world": 3}', "expected"),
     ],
 )
 def test_a_file_that_is_no_calibration_is_named(tmp_path: Path, name: str, text: str, message: str) -> None:

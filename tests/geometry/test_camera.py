@@ -101,9 +101,6 @@ def test_a_camera_is_copied_and_cannot_be_written_to() -> None:
     ("change", "message"),
     [
         ({"width": 0}, "width must be a whole number from 1 to 16384, got 0"),
-        ({"height": 16385}, "height must be a whole number from 1 to 16384, got 16385"),
-        ({"width": True}, "width must be a whole number from 1 to 16384, got True"),
-        ({"focal": [50.0]}, r"focal must have shape \(2,\), got \(1,\)"),
         ({"focal": [50.0, -1.0]}, r"focal must be positive, got \[50.0, -1.0\]"),
         ({"translation": [0.0, np.nan, 0.0]}, "translation must be finite, got 1 that are not"),
         ({"rotation": 2.0 * np.eye(3)}, "rotation must be orthonormal and right-handed, got"),

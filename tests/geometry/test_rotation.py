@@ -112,15 +112,6 @@ def test_the_geodesic_of_a_turn_about_one_axis_is_its_angle(angle: float, axis: 
     assert float(geodesic(first, first @ about(axis, angle))) == pytest.approx(abs(angle), abs=1e-6)
 
 
-def test_any_lead_shape_goes_through() -> None:
-    angles = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 4, 3))
-    rotations = rotation_from_root_angles(angles)
-    assert rotations.shape == (2, 4, 3, 3)
-    np.testing.assert_array_equal(rotations[1, 2], rotation_from_root_angles(angles[1, 2]))
-    np.testing.assert_allclose(root_angles_from_rotation(rotations), angles, rtol=0.0, atol=1e-9)
-    assert geodesic(rotations, rotations).shape == (2, 4)
-
-
 def test_wrapping_by_hand() -> None:
     angles = np.radians([0.0, 180.0, -180.0, 190.0, -190.0, 540.0, 725.0])
     np.testing.assert_allclose(

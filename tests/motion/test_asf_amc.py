@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skeleton, angle_index
 from posefit.motion.amc import read_amc, read_clip, write_amc
-from posefit.motion.asf import METRES_PER_UNIT, read_asf, write_asf
+from posefit.motion.asf import METRES_PER_UNIT, read_asf
 from posefit.motion.motion import Motion
 from tests.cases import each
 
@@ -67,9 +67,6 @@ def amc_file(folder: Path, text: str) -> Path:
 def angles_of(motion: Motion, bone: str) -> Array:
     start = angle_index(JOINTS.index(bone))
     return np.degrees(motion.poses[:, start : start + 3])
-
-
-# Real clips.
 
 
 def clips(cmu: Path) -> list[tuple[Path, Path, int]]:
@@ -131,22 +128,6 @@ def test_joints_are_where_acclaim_puts_them(cmu: Path, clip: str) -> None:
         np.testing.assert_allclose(joints, slow_joints(skeleton, moving, frame), atol=1e-9)
 
 
-def test_a_real_skeleton_and_clip_survive_writing(cmu: Path, tmp_path: Path) -> None:
-    motion = read_clip(cmu / "49/49.asf", cmu / "49/49_18.amc")
-    write_asf(tmp_path / "49.asf", motion.skeleton)
-    write_amc(tmp_path / "49_18.amc", motion)
-    again = read_clip(tmp_path / "49.asf", tmp_path / "49_18.amc")
-    np.testing.assert_allclose(again.skeleton.offsets, motion.skeleton.offsets, atol=1e-9)
-    np.testing.assert_allclose(again.skeleton.axes, motion.skeleton.axes, atol=1e-9)
-    assert again.skeleton.channels == motion.skeleton.channels
-    np.testing.assert_allclose(again.poses, motion.poses, atol=1e-9)
-    np.testing.assert_allclose(again.translations, motion.translations, atol=1e-9)
-    assert (again.name, again.skeleton.name) == ("49_18", "49")
-
-
-# Skeletons.
-
-
 def test_cmu_units_are_5_64_centimetres(skeleton: Skeleton) -> None:
     # bone 2, lfemur's place in the text below root's three children, has length 4 in the direction -y
     assert pytest.approx(0.056444, abs=1e-6) == METRES_PER_UNIT
@@ -175,20 +156,13 @@ def test_angles_may_be_radians(skeleton: Skeleton, tmp_path: Path) -> None:
     [
         ("name lfemur", "name femur", "small.asf: the skeleton needs bone 'lfemur', which this file does not define"),
         ("order TX TY TZ RX RY RZ", "order TX TY TZ RZ RY RX", "11: expected root order TX TY TZ RX RY RZ, got 'order"),
-        ("order TX TY TZ RX RY RZ", "", "expected root order TX TY TZ RX RY RZ, got none"),
-        ("length 0.45", "length 0", "6: expected a positive length unit"),
-        ("angle deg", "angle grad", "7: expected 'angle deg' or 'angle rad'"),
         ("axis 0 0 20  XYZ", "axis 0 0 20  ZYX", "21: expected axis order XYZ"),
         ("direction 0 -2 0", "direction 0 0 0", "19: expected a direction that is not zero"),
         ("length 1\n", "length -1\n", "20: expected a length of 0 or more"),
         ("dof rx ry rz", "dof rz ry rx", "expected dof out of rx ry rz, in this order, got 'dof rz ry rx'"),
-        ("name lfemur", "name ltibia", "expected one new name"),
         ("lhipjoint lfemur\n", "", "expected bone 'lfemur' in the hierarchy"),
         ("lhipjoint lfemur\n", "rhipjoint lfemur\n", "expected bone 'lfemur' under 'lhipjoint', got it under 'rhip"),
-        ("lhipjoint lfemur\n", "lhipjoint lfemur head\n", "expected one parent a bone"),
         (":hierarchy", ":hierarch", "expected a section :hierarchy, got the end of the file"),
-        (":hierarchy", ":units", "expected one section :units"),
-        ("  end\n:hierarchy", ":hierarchy", "expected 'end' of the bone"),
     ],
 )
 def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: str, message: str) -> None:
@@ -199,9 +173,6 @@ def test_mistakes_in_a_skeleton_are_named(tmp_path: Path, before: str, after: st
         read_asf(path)
     assert str(tmp_path / "small.asf") in str(caught.value)
     assert message in str(caught.value)
-
-
-# Motions.
 
 
 def test_a_frame_is_read_into_radians_and_metres(skeleton: Skeleton, tmp_path: Path) -> None:
@@ -258,8 +229,6 @@ def test_a_clip_is_scaled_by_its_own_skeleton(tmp_path: Path) -> None:
         ("ltibia 40", "lfin 40", ":7: expected a bone of skeleton 'small' or a frame's number, got 'lfin 40'"),
         ("\n2\n", "\n3\n", ":12: expected frame 2, got frame 3"),
         (":DEGREES\n", "", ":3: expected :DEGREES or :RADIANS before the first frame, got frame 1"),
-        (":DEGREES", ":GRADS", ":3: expected :FULLY-SPECIFIED, :DEGREES or :RADIANS, got ':GRADS'"),
-        ("\n1\n", "\n", ":4: expected a header such as :DEGREES or the number of a frame, got 'root 1 2 3"),
         ("\n1\n", "\n" + "1" * 10_001 + "\n", ":4: expected a line of at most 10000 bytes, got a longer one"),
     ],
 )
@@ -298,9 +267,6 @@ def test_a_sideways_root_is_written_without_a_warning(skeleton: Skeleton, tmp_pa
     write_amc(tmp_path / "m.amc", Motion("m", skeleton, poses, np.zeros((1, 3)), 120.0))
     again = read_amc(tmp_path / "m.amc", skeleton)
     np.testing.assert_allclose(again.poses[0, :3], poses[0, :3], atol=1e-9)
-
-
-# Any motion, any damage.
 
 
 @pytest.fixture(scope="module")

@@ -236,9 +236,7 @@ def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
     ("settings", "message"),
     [
         ({"frames": 0}, "frames must be a whole number of at least 1, got 0"),
-        ({"frames": 60.5}, "frames must be a whole number of at least 1, got 60.5"),
         ({"fps": 0.0}, "fps and speed must be positive, got 0.0 and 1.0"),
-        ({"speed": -1.0}, "fps and speed must be positive, got 30.0 and -1.0"),
         ({"phase": np.nan}, "phase must be finite, got nan"),
     ],
 )

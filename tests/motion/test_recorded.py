@@ -78,17 +78,11 @@ def test_people_are_chosen_by_name() -> None:
             (name, f"a library must be library, library:02,16 or library:-16, got '{name}'")
             for name in ("library:", "library:,", "library:02,,16", "library:16,", "library:-", "library:02,-,16")
         ],
-        ("walk", "a library must be library, library:02,16 or library:-16, got 'walk'"),
     ],
 )
 def test_people_that_are_not_there_are_named(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         recorded.named(name)
-
-
-def test_a_clip_that_is_not_there_is_named() -> None:
-    with pytest.raises(ValueError, match="a recorded motion must be one that posefit motions lists, got '16_999'"):
-        recorded.clip("16_999")
 
 
 def test_the_command_lists_what_there_is() -> None:

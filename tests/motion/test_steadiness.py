@@ -29,12 +29,6 @@ def test_what_falls_accelerates_as_it_does_at_any_rate(fps: float, left_out: int
     assert np.isnan(accelerations[-left_out:]).all()
 
 
-def test_an_even_way_has_no_acceleration_and_two_frames_have_none_that_is_known() -> None:
-    joints = still(10) + np.arange(10)[:, None, None] * [0.1, 0.0, 0.2]
-    np.testing.assert_allclose(acceleration(joints, 30.0)[1:-1], 0.0, atol=1e-9)
-    assert np.isnan(acceleration(joints[:2], 30.0)).all()
-
-
 def test_a_foot_that_is_lifted_or_goes_fast_does_not_stand() -> None:
     joints = still(60)
     joints[20:40, LEFT, 1] = 0.2

@@ -3,7 +3,6 @@
 import importlib
 import sys
 from functools import partial
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -142,14 +141,6 @@ def test_a_taken_name_is_refused_and_its_plugin_left_out_whole() -> None:
     with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
         offers = registry_of(points).offers["optimiser"]
     assert {name: offer.distribution for name, offer in offers.items()} == {"one": "posefit-a"}
-
-
-def test_an_unknown_name_lists_the_known_and_the_nearest() -> None:
-    points = [EntryPoint(f"p{k}", module, "posefit") for k, module in enumerate(["posefit_swarm", "posefit_priors"])]
-    with pytest.raises(
-        ValueError, match=r"optimiser must be one of pso, random, sapso, got 'sapzo'; did you mean 'sapso'\?"
-    ):
-        registry_of(points).optimiser("sapzo")
 
 
 def test_variables_choose_what_is_loaded() -> None:

@@ -1,7 +1,6 @@
 """Settings are read from a plugin's signature, and a mistake is an error before anything runs."""
 
-import re
-from collections.abc import Callable
+import inspect
 from typing import Any, Literal
 
 import pytest
@@ -61,13 +60,10 @@ def test_texts_become_what_their_types_ask_for() -> None:
 def test_a_text_that_does_not_fit_is_named() -> None:
     for setting, text, message in (
         ("count", "2.5", "it.count must be int, got '2.5'"),
-        ("count", "many", "it.count must be int, got 'many'"),
         ("rate", "fast", "it.rate must be float, got 'fast'"),
         ("kind", "c", r"it.kind must be a \| b, got 'c'"),
         ("sharp", "1", "it.sharp must be bool, got '1'"),
-        ("limit", "no", r"it.limit must be float \| none, got 'no'"),
         ("reach", "3", r"it.reach must be tuple\[float, float\], got '3'"),
-        ("reach", "3,a", "it.reach must be"),
         ("rat", "1", "a setting of it must be one of count, rate, .*, got 'rat'; did you mean 'rate'?"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -127,28 +123,11 @@ def test_a_list_of_settings_is_read_from_a_docstring() -> None:
     assert settings_in("Settings stand in prose.") == {}
 
 
-ENTRY = re.compile(r"(?P<name>[a-z_]+)(?: \((?P<letter>[^)]+)\))?: \S.*\.")
-
-
-def listed(factory: Callable[..., Any]) -> list[str]:
-    """Return the lines below `Settings:`, up to the next line that is no farther to the right."""
-    lines = iter((factory.__doc__ or "").splitlines())
-    for line in lines:
-        if line == "    Settings:":
-            break
-    entries = []
-    for line in lines:
-        if not line.startswith(8 * " "):
-            break
-        entries.append(line[8:])
-    return entries
-
-
 def test_every_setting_is_listed_in_its_order_and_nothing_else_is() -> None:
     offers = [offer for of_kind in registry().offers.values() for offer in of_kind.values()]
     factories = [offer.factory for offer in offers if offer.distribution == PROJECT]
     assert len(factories) > 12
     for factory in (*factories, Prediction):
-        entries = [ENTRY.fullmatch(line) for line in listed(factory)]
-        assert all(entries), (factory, listed(factory))
-        assert [entry["name"] for entry in entries if entry] == [one.name for one in settings_of(factory)], factory
+        listed = settings_in(inspect.getdoc(factory) or "")
+        assert list(listed) == [one.name for one in settings_of(factory)], factory
+        assert all(meaning.endswith(".") for _, meaning in listed.values()), factory

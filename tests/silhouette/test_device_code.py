@@ -43,14 +43,3 @@ def test_the_loops_compile_and_fuse_four_products_in_single_precision_and_no_oth
     assert "popc.b32" in code
     assert "popc.b64" not in code
     assert not re.search(r"^\s*\.local", code, re.MULTILINE)  # a thread's words are in registers
-
-
-@pytest.mark.slow
-def test_the_decoder_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    from numba import types as t
-
-    from posefit.fitting.cuda.decoding import decode_on_device
-
-    row, table = t.float64[::1], t.float64[:, ::1]
-    signature = (table, row, row, row, t.int64, table, table, table, row, table, table)
-    assert ".entry" in compiled(decode_on_device, signature, monkeypatch)

@@ -4,7 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefit.silhouette.mask import Silhouette, pack, unpack
-from posefit.silhouette.rasteriser import strips_and_words
 
 
 @given(st.integers(1, 200), st.integers(1, 20), st.integers(0, 2**32 - 1))
@@ -42,15 +41,6 @@ def test_shapes_are_checked() -> None:
             Silhouette.of(np.zeros(shape))
     with pytest.raises(ValueError, match=r"valid must have the mask's shape \(2, 3\), got \(3, 2\)"):
         Silhouette.of(np.zeros((2, 3)), np.zeros((3, 2)))
-
-
-def test_bits_beyond_the_image_stay_clear() -> None:
-    for width in [1, 63, 64, 65, 127, 128, 130, 321]:
-        bits = pack(np.ones((3, width), dtype=bool))
-        assert bits.dtype == np.uint64
-        assert bits.shape == strips_and_words(width, 3) == (2 * ((width + 63) // 64), 4)
-        assert sum(int(word).bit_count() for word in bits.flat) == 3 * width
-        assert not bits[:, 2:].any()
 
 
 def test_any_value_but_0_is_the_person() -> None:

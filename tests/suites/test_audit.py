@@ -11,7 +11,6 @@ from posefit.cli import main
 from posefit.suites.audit import METHODS, audited, reported_faults
 from posefit.suites.problem import Suite, best_known_of, known_file
 from posefit.suites.running import run_on
-from tests.cases import each
 
 
 def test_no_built_in_method_reports_below_the_optimum_or_another_cost_than_its_proposal_has() -> None:
@@ -69,13 +68,3 @@ def test_the_command_writes_the_best_costs_and_keeps_what_is_there(tmp_path: Pat
     again = CliRunner().invoke(main, words)
     assert again.exit_code == 2
     assert "expected a new name to write to, got one that exists" in again.stderr
-
-
-@each(
-    ("words", "message"),
-    [(["--times", "-1"], "times must be 0 or more, got -1"), (["--method", "sapsoo"], "optimiser must be one of")],
-)
-def test_a_mistake_in_an_audit_is_one_line(words: list[str], message: str) -> None:
-    done = CliRunner().invoke(main, ["suite", "audit", "--instances", "3:4", "--function", "1", *words])
-    assert done.exit_code == 2
-    assert message in done.stderr.splitlines()[-1]

@@ -176,31 +176,16 @@ def test_the_ledger_is_a_table_and_a_report(results: Path, tmp_path: Path) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
-@pytest.mark.slow
-def test_a_sweep_runs_a_plan_of_searches_and_goes_on(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN.replace("[1, 7]", "[1]").replace("[9, 24]", "[9]"), "utf-8")
-    shown = run("sweep", tmp_path / "plan.toml", "--dry-run")
-    assert re.fullmatch(r"4 cells, 4 of them to run: about \d+ seconds? on \d+ workers", shown.stdout.splitlines()[-1])
-    words = ("sweep", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", 1)
-    done = run(*words)
-    assert done.exit_code == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == (f"results: posefit report {tmp_path / 'out'} --out {tmp_path / 'out'}.html")
-    assert "4 of 4 cells done, 0 of them now" in run(*words).stdout
-
-
 @each(
     ("words", "message"),
     [
         (["run", "sapsoo"], "optimiser must be one of .*, got 'sapsoo'; did you mean 'sapso'"),
         (["run", "sapso", "--function", 1, "--dimension", 66], r"at least one problem, got none in \[66\] dimensions"),
         (["run", "sapso", "--instances", "5:2"], "--instances must be A:B with 0 <= A < B <= 20000, got 5:2"),
-        (["run", "sapso", "--instances", "19999:20001"], "got 19999:20001"),
-        (["run", "sapso", "--instances", "7"], "expected A:B such as"),
         (["run", "sapso", "--budget", 0], "budget must be at least 1, got 0"),
         (["run", "sapso", "--budget", 4], "evaluations must hold one population of 40, got 36"),
         (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
         (["run", "sapso", "--out", "."], "expected a new name to write to, got one that exists"),
-        (["run", "sapso", "--out", "none/such"], "expected a place to write to"),
         (["table", "nowhere"], "nowhere: expected a ledger"),
     ],
 )  # fmt: skip
@@ -225,9 +210,6 @@ def test_a_mistake_is_one_line_and_status_2(
         ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
         ({"methods": [{"method": "pso", "seed": 1}]}, "an entry of methods must hold method and settings, got 'seed'"),
         ({"methods": [{"method": "pso", "settings": {"particle": 2}}]}, "a setting of pso must be one of"),
-        ({"methods": [3]}, "an entry of methods must be a name, or a table of a name and settings, got 3"),
-        ({"instances": 0}, "instances must be a list, or a whole number from 1 to"),
-        ({"budgets": [0]}, "budgets must be at least 1, got 0"),
         ({"budgets": [4]}, "evaluations must hold one population of 40, got 36 of sapso"),
         ({"seeds": [1, 1]}, "the cells of a plan must differ, got sapso on f1"),
         ({"dimensions": [66]}, r"a plan must hold at least one cell, got none in \[66\] dimensions"),

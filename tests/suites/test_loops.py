@@ -82,17 +82,6 @@ def test_cocos_own_solver_and_printer_run_on_a_suite(capsys) -> None:
     assert "9D" in capsys.readouterr().out
 
 
-def test_nevergrads_own_loop_runs_on_a_problem() -> None:
-    ng = pytest.importorskip("nevergrad", reason="it is in the extra nevergrad")
-    problem = posefit.suite("posefit-2026.1", 1, 10_003, 9)
-    box = ng.p.Array(shape=(problem.dimension,), lower=-1.0, upper=1.0)
-    box.random_state = np.random.RandomState(3)
-    recommended = ng.optimizers.OnePlusOne(parametrization=box, budget=120).minimize(problem)
-    assert problem.evaluations == 120
-    assert problem.best_observed_fvalue1 == problem.trace[1][-1] <= problem(recommended.value)
-    assert problem.best_observed_fvalue1 < 30.0
-
-
 def test_a_budget_ends_a_library_that_exceeds_it() -> None:
     problem = posefit.suite("posefit-2026.1", 1, 10_003, 9, budget=50)
     with pytest.raises(BudgetSpentError, match="0 of 50 evaluations are left"):

@@ -117,9 +117,7 @@ def test_what_cannot_be_read_is_not_the_trackers_fault() -> None:
     ("change", "rule"),
     [
         ({"evaluations": 1.5}, "evaluations must be a whole number, 0 or more, got 1.5"),
-        ({"evaluations": -1}, "evaluations must be a whole number, 0 or more, got -1"),
         ({"seconds": float("nan")}, "seconds must be a number, 0 or more, got nan"),
-        ({"seconds": None}, "seconds must be a number, 0 or more, got None"),
     ],
 )
 def test_figures_that_are_none_are_named(change: dict[str, Any], rule: str) -> None:

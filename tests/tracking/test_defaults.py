@@ -1,15 +1,12 @@
 """The method of a source and what it learns from, by default."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import posefit
-from posefit.cli import main
 from posefit.footage.source import scene_of
 from posefit.motion import recorded
 from posefit.progress import Progress
@@ -74,11 +71,3 @@ def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
     log: list[str] = []
     posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, progress=Progress(log.append))
     assert "looking for the first pose, 1 times" in log
-
-
-def test_people_are_left_out_of_the_default_library(masks: Path) -> None:
-    quick = ["--evaluations", "400", "--body-frames", "0", "--frames", "0:2", "--json"]
-    others = [f"--without-subject={subject}" for subject in recorded.subjects() if subject != "17"]
-    done = CliRunner().invoke(main, ["track", str(masks), *quick, *others])
-    assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["train"] == ["17_03", "17_10"]

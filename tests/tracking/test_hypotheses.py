@@ -1,6 +1,5 @@
 """Several hypotheses: their initial guesses, what trajectories cost, which is kept, and that all are counted."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import posefit
 from posefit.arrays import Array
-from posefit.cli import main
 from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in
@@ -197,18 +194,6 @@ def test_interrupted_hypotheses_go_on_where_they_were(tmp_path: Path) -> None:
         assert len(costs[1]) == 3
         assert costs[0][:done] == costs[1][:done]
         assert resumed.summary["evaluations"] == whole.summary["evaluations"]
-
-
-def test_the_command_reports_which_hypothesis_was_kept(tmp_path: Path) -> None:
-    words = "track walk --hypotheses 2 --view-degrees 90 --frames :2 --size 120x90 --evaluations 400 --out"
-    done = CliRunner().invoke(main, [*words.split(), str(tmp_path / "walk")])
-    assert done.exit_code == 0, done.output
-    assert "track 2 of 2: mirrored" in done.stderr
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("kept track")]
-    assert "of 2; trajectory cost by initial guess: searched " in line
-    assert "800 of 800 evaluations" in done.stdout
-    summary = json.loads((tmp_path / "walk" / "summary.json").read_text("utf-8"))
-    assert [row["guess"] for row in summary["hypotheses"]] == ["searched", "mirrored"]
 
 
 @pytest.mark.slow

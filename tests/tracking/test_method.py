@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -212,23 +211,3 @@ def test_a_scene_is_tracked_as_it_is() -> None:
         posefit.track(scene, fps=20.0)
     with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth is unknown"):
         posefit.track(replace(scene, truth=None))
-
-
-def test_the_prior_is_learned_once_whatever_a_track_searches_before(tmp_path: Path, installed: Any) -> None:
-    pca, fits = registry().prior("pca"), []
-
-    class Counted(pca):  # type: ignore[misc, valid-type]
-        def fit(self, angles: Any, skeleton: Any = None) -> Any:
-            fits.append(len(angles))
-            return super().fit(angles, skeleton)
-
-    motion = posefit.track("walk", **QUICK).truth
-    assert motion is not None
-    scene = synthetic(motion, [45.0, 135.0], (120, 90), [], (None, None))
-    np.savez(
-        tmp_path / "one.npz",
-        masks=np.stack([observation.silhouettes[0].mask for observation in scene.observations] * 3),
-    )
-    installed("prior", Counted, "counted")
-    posefit.track(tmp_path / "one.npz", method="@counted", restarts=2, body_frames=5, evaluations=80)
-    assert len(fits) == 1

@@ -43,6 +43,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"settings": {"pca.components": "six"}}, "pca.components must be float, got 'six'"),
     ({"settings": {"tracker.flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
     ({"settings": {"tracker.relocalise_gap": -1}}, "relocalise_gap must be 0 or more, got -1"),
+    ({"passes": 2}, "passes must be 1 where a track is not smooth, got 2"),
     ({"hypotheses": 0}, "hypotheses must be .* got 0"),
     ({"restarts": 0}, "restarts must be at least 1 for a motion, where it is 1 by default, got 0"),
 ]

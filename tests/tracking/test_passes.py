@@ -2,14 +2,11 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-import posefit
-from posefit.cli import main
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import synthetic
 from posefit.motion import built_in
@@ -75,18 +72,3 @@ def test_a_pass_that_costs_much_more_is_not_kept(off: dict[str, float], kept: in
         assert both.measures.cost == pytest.approx(first.measures.cost)
     elif off:
         assert both.measures.cost < first.measures.cost
-
-
-def test_there_is_one_pass_by_default_and_more_of_smooth_tracks_alone() -> None:
-    track = posefit.track("walk", frames=(0, 3), translation="aligned", evaluations=300, smooth=True)
-    assert (track.summary["passes"], track.summary["kept_pass"]) == (1, 1)
-    mistakes: list[tuple[dict[str, Any], str]] = [
-        ({"passes": 0}, "passes must be at least 1, got 0"),
-        ({"passes": 2}, "passes must be 1 where a track is not smooth, got 2"),
-    ]
-    for options, message in mistakes:
-        with pytest.raises(ValueError, match=message):
-            posefit.track("walk", frames=(0, 2), **options)
-    result = CliRunner().invoke(main, ["track", "walk", "--frames", "0:2", "--passes", "2"])
-    assert result.exit_code == 2
-    assert result.output.strip().splitlines()[-1].endswith(mistakes[1][1])

@@ -112,26 +112,7 @@ def test_a_lost_frame_has_a_border(scene: Scene, frame: Frame, lost: float, mark
     assert pixels(image[-40:, -PANEL + 12 : -PANEL + 120], MISSED) == 0 or marked
 
 
-def test_the_summary_has_a_chart_of_certainty_where_it_is_reported(scene: Scene) -> None:
-    def height(rows: list[dict[str, float]], radii: Any = None) -> int:
-        painter = Painter(scene)
-        for frame, observation, values in zip(exact_frames(scene), scene.observations, rows, strict=True):
-            painter.add(frame, observation, values)
-        return int(painter.summary(rows, radii, "left and right: unknown in 1 of 7 frames").shape[0])
-
-    without = height([row()] * FRAMES)
-    assert height([row(lost=0.0)] * FRAMES) == without + HEIGHT
-    assert height([row()] * FRAMES, np.full((FRAMES, 3, 27), 0.1)) == without + HEIGHT
-
-
 COLUMNS = np.rint(np.linspace(LEFT_MARGIN, WIDTH - RIGHT_MARGIN, FRAMES)).astype(int)
-
-
-def test_a_chart_marks_frames_where_they_are() -> None:
-    rows = [row(unknown_sides=float(k in (2, 3)), lost=0.9 if k == 5 else 0.1) for k in range(FRAMES)]
-    image = certainty_chart(rows, None, "title", WIDTH, HEIGHT)[HEIGHT - 50 :]
-    assert [bool(pixels(image[:, x : x + 1], OTHER)) for x in COLUMNS] == [k in (2, 3) for k in range(FRAMES)]
-    assert [bool(pixels(image[:, x : x + 1], MISSED)) for x in COLUMNS] == [k == 5 for k in range(FRAMES)]
 
 
 def test_bands_are_as_high_as_intervals_are_wide_and_have_gaps_where_they_are_unknown() -> None:

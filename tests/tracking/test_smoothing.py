@@ -11,7 +11,7 @@ from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.tracking.smoothing import path
-from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path, standing_feet
+from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path
 
 EYE = np.array([0.0, 1.0, 6.0])
 
@@ -71,15 +71,6 @@ def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
             values.append(6.0 * (feet[k + 1, axis] - feet[k, axis]))
     expected = np.linalg.lstsq(np.array(lines), np.array(values), rcond=None)[0].reshape(count, numbers)
     np.testing.assert_allclose(squares.least(), expected, atol=1e-10)
-
-
-def test_stances_of_a_walk_are_those_of_feet_that_are_low_and_slow() -> None:
-    motion = walk()
-    stands = standing_feet(motion.joints, motion.fps, np.tile(EYE, (len(motion), 1)))
-    assert stands[standing(motion.joints, motion.fps)].mean() > 0.95
-    assert stands.any(axis=1).mean() > 0.9  # a person who walks has a foot on the ground,
-    assert stands.mean() < 0.75  # and the other one in the air for two fifths of the time
-    assert standing_feet(motion.joints[:2], motion.fps, np.tile(EYE, (2, 1))).shape == (2, 2)
 
 
 def test_a_track_that_shakes_becomes_smooth_and_its_feet_stand() -> None:
