@@ -78,7 +78,7 @@ class MotionModel:
 
 @dataclass(frozen=True, eq=False)
 class VectorModel:
-    """A model of states that are 43 plain numbers, covariances (43, 43) among them. Interpretation V4."""
+    """A model of states of 43 numbers, which it brings to unit length before a step. Interpretation V4."""
 
     model: MotionModel
 

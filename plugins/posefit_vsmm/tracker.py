@@ -311,10 +311,11 @@ def vsmm(task: Task, **given: Any) -> VSMM:
         variant: the preset, "default" or "patent".
         structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
         groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Interpretation V1.
-        quaternions: kept on their "manifold", or "vector": plain numbers, as in the patent. Interpretation V4.
+        quaternions: kept on their "manifold", or mixed and updated as a "vector" of numbers. Interpretation V4.
         shrink: what the models' F is drawn towards, "identity" in normalised units, or "zero". Interpretation V5.
         models: path of a file of models, with another lambda; "" is the package's own. Step 3, Interpretation V5.
-        clip_rate: F is a step of the "video", or of the "clip" at 120 a second, as in the patent. Interpretation V6.
+        clip_rate: a step goes as far as between frames of the "video", or of the "clip", a quarter of that at 30 a
+            second. Interpretation V6.
         joint_errors: of the joint rules, "measured", or "plain": unbiased, the torso's the root's. Interpretation V8.
         process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
         joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
