@@ -38,8 +38,9 @@ def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests
     sentence = f"{first['name']} {'has' if alone else 'leads with'} {score}{ahead} on {where}{others}."
     if searches:
         return sentence + _random_sentence(contest, first, baselines)
-    close = {board[0]["method"], board[min(1, len(board) - 1)]["method"], *not_worse(tests, first["method"])}
-    rows = [row for row in board if row["method"] in close]
+    compared = [row for row in board if row["method"] in contest.methods]
+    close = {*(row["method"] for row in compared[:2]), *not_worse(tests, first["method"])}
+    rows = [row for row in compared if row["method"] in close]
     return sentence + _lost_sentence(contest, rows[:NAMED]) + _baseline_sentence(first, baselines)
 
 

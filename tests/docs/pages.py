@@ -8,20 +8,22 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 RUN = ("python", "sh", "toml")  # languages whose blocks are tested
-SHOWN = ("text",)  # output, layouts of files, and what is no code
+SHOWN = ("text",)  # what the block before it prints, or what is no code
 _BLOCK = re.compile(r"^(?P<fence>`{3,})(?P<language>[^\n]*)\n(?P<text>.*?)^(?P=fence)[ ]*$", re.MULTILINE | re.DOTALL)
-_MARK = re.compile(r"<!-- (?P<mark>not run|not a plan): (?P<reason>(?:(?!-->).)*) -->\n\Z", re.DOTALL)
+_MARK = re.compile(
+    r"<!-- (?P<mark>nightly|not run|not a plan|not compared): (?P<reason>(?:(?!-->).)*) -->\n\Z", re.DOTALL
+)
 
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block, and why it is not run, where a comment right before it says so."""
+    """A fenced block, and why it is not run or compared, where a comment right before it says so."""
 
     page: str
     line: int
     language: str
     text: str = field(repr=False)
-    mark: str = ""  # "not run", or "not a plan" of TOML that is something else
+    mark: str = ""  # "nightly", "not run", "not compared", or "not a plan" of TOML that is something else
     reason: str = ""
 
     def __str__(self) -> str:

@@ -1,58 +1,102 @@
 """Every block of code in README and the handbook runs, or says why it does not and is right as far as can be checked."""
 
+import contextlib
+import io
 import os
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
 import pytest
+from _pytest.mark import ParameterSet
 
 from posefit.sweep.plan import Plan
-from tests.docs import shell
-from tests.docs.pages import RUN, SHOWN, Block, blocks, pages
+from tests.docs import printed, shell
+from tests.docs.pages import ROOT, RUN, SHOWN, Block, blocks, pages
 
 BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
 SLOW = tuple(
     f"docs/{page}.md" for page in ("ways/sweep", "howto/ambiguity", "howto/suite", "howto/masks", "howto/settings")
 )
+VIDEO = ROOT.parent / "shared/data/video/sports2d_walk"
 
 
-def _run() -> list[object]:
-    names = dict.fromkeys(block.page for block in BLOCKS if block.language in RUN and block.mark != "not run")
-    return [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else [], id=name) for name in names]
-
-
-@pytest.mark.parametrize("page", _run())
-def test_the_blocks_of_a_page_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": "page"}
+def _run() -> Iterator[ParameterSet]:
+    """Yield every page with a block that is run, and once more where some of its blocks are run in a slow run alone."""
+    marks: dict[str, set[str]] = {}
     for block in BLOCKS:
-        if block.page != page or block.mark == "not run":
-            continue
-        if block.language == "python":
-            exec(compile("\n" * block.line + block.text, page, "exec"), names)
+        if block.language in RUN and block.mark != "not run":
+            marks.setdefault(block.page, set()).add(block.mark)
+    for page, values in marks.items():
+        slow = page in SLOW
+        if not slow and values != {"nightly"}:
+            yield pytest.param(page, False, id=page)
+        if slow or "nightly" in values:
+            yield pytest.param(page, True, id=f"{page} nightly", marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("page", "whole"), list(_run()))
+def test_the_blocks_of_a_page_run_in_order_and_print_what_it_shows(
+    page: str, whole: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if whole:
+        _prepare(page, tmp_path, monkeypatch)
+    names: dict[str, object] = {"__name__": "page"}
+    output: str | None = None
+    wrong = []
+    for block in (block for block in BLOCKS if block.page == page):
+        if block.language == "text":
+            if block.mark != "not compared" and output is not None:
+                wrong += printed.differences(block, output)
+        elif block.mark == "not run" or (block.mark == "nightly" and not whole):
+            output = None
+        elif block.language == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as stream:
+                exec(compile("\n" * block.line + block.text, page, "exec"), names)
+            output = stream.getvalue()
         elif block.language == "sh":
-            _shell(block, tmp_path)
+            output = _shell(block, tmp_path)
         elif block.language == "toml":
             (tmp_path / "plan.toml").write_text(block.text, "utf-8")
-            assert block.mark == "not a plan" or len(Plan.of(tomllib.loads(block.text)))
+            assert block.mark or len(Plan.of(tomllib.loads(block.text)))
+    assert not wrong, "\n".join(wrong)
 
 
-def _shell(block: Block, folder: Path) -> None:
+def _prepare(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put in `folder` what the blocks of slow runs need: the video, and the page's own optimiser as installed."""
+    if VIDEO.is_dir():
+        (folder / "sports2d/Sports2D").mkdir(parents=True)
+        (folder / "sports2d/Sports2D/Demo").symlink_to(VIDEO)
+    if page == "docs/ways/optimiser.md":
+        site = folder / "site"
+        info = site / "posefit_spiral-0.1.0.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text("Name: posefit-spiral\nVersion: 0.1.0\n", "utf-8")
+        (info / "entry_points.txt").write_text("[posefit]\nspiral = posefit_spiral\n", "utf-8")
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(site), str(folder / "posefit-spiral"))))
+
+
+def _shell(block: Block, folder: Path) -> str:
+    """Return what a block prints; what installs a package is left out."""
     tools = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    text = re.sub(r"^python -m pip install .*?(&& |$)", "", block.text, flags=re.MULTILINE)
     result = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", block.text],
+        ["bash", "-euo", "pipefail", "-c", text],
         cwd=folder,
         env={**os.environ, "PATH": tools},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         timeout=600,
     )
-    assert result.returncode == 0, f"{block}: {result.stderr[-2000:]}"
+    assert result.returncode == 0, f"{block}: {result.stdout[-2000:]}"
+    return result.stdout
 
 
 def test_blocks_are_of_a_known_language_and_those_that_are_not_run_are_right() -> None:
@@ -60,12 +104,13 @@ def test_blocks_are_of_a_known_language_and_those_that_are_not_run_are_right() -
         assert block.language in (*RUN, *SHOWN), block
         if not block.mark:
             continue
+        assert (block.mark == "not compared") == (block.language == "text"), block
         assert len(block.reason) > 10, block
         if block.language == "python":
             compile(block.text, str(block), "exec")
         elif block.language == "toml":
             tomllib.loads(block.text)
-        else:
+        elif block.language == "sh":
             commands = list(shell.commands(block.text))
             assert commands, block
             for words in commands:
@@ -78,6 +123,15 @@ def test_the_check_of_commands_notices_wrong_ones() -> None:
         (words,) = shell.commands(line)
         with pytest.raises((AssertionError, click.UsageError)):
             shell.check(words)
+
+
+def test_what_a_page_shows_as_printed_is_compared_or_has_its_reason() -> None:
+    compared: set[str] = set()  # pages whose last block of code is run
+    for block in BLOCKS:
+        if block.language in ("python", "sh"):
+            (compared.discard if block.mark == "not run" else compared.add)(block.page)
+        elif block.language == "text" and block.mark != "not compared":
+            assert block.page in compared, f"{block} follows no block that is run"
 
 
 def test_pages_import_posefit_and_its_plugin_module_alone() -> None:

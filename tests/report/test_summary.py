@@ -88,6 +88,9 @@ def test_the_lead_is_in_degrees_and_lost_frames_of_the_first_two_are_counted(tmp
     text = sentence(contest_of_results(tmp_path, made))
     assert "a leads with an error of 1.05°, 0.50° ahead of b, on 2 instances" in text
     assert "Frames are lost by a in 0, b in 1 and c in 1 of 2 tracks." in text  # too few runs to tell them apart
+    alone = sentence(contest_of_results(tmp_path / "alone", [made[0], made[3]]))  # of two instances
+    assert alone.startswith("a has an error of 1.00°")
+    assert "Frames are lost" not in alone
 
 
 def test_the_best_the_median_and_the_worst_track_are_examples(tmp_path: Path) -> None:

@@ -1,0 +1,51 @@
+"""Does a block of text show what the block of code before it prints? Words exactly, numbers within a tenth."""
+
+import re
+from collections.abc import Iterator
+
+from tests.docs.pages import Block
+
+_NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?")
+_TIME = re.compile(r"\s*(ms|us|s|seconds?|poses a second)\b")
+TOLERANCE = 0.1  # relative
+
+
+def differences(block: Block, output: str) -> Iterator[str]:
+    """Yield each line of `block` that `output` does not hold after the lines before it; `...` stands for anything."""
+    lines = [_plain(line) for line in output.splitlines()]
+    at = 0
+    for line in map(_plain, block.text.splitlines()):
+        if line in ("", "...") or line.startswith("$ "):
+            continue
+        place = next((i for i in range(at, len(lines)) if same(line, lines[i])), None)
+        if place is None:
+            near = [other for other in lines[at:] if other.split()[:1] == line.split()[:1]]
+            yield f"{block}: {line!r} is not printed" + (f", but {near[0]!r}" if near else "")
+        else:
+            at = place + 1
+
+
+def same(shown: str, line: str) -> bool:
+    """Return whether two lines have the same words and close numbers; times may be any."""
+    if shown.endswith("..."):
+        shown = shown.removesuffix("...").rstrip()
+        line = _cut(line, shown)
+    if _NUMBER.sub("#", shown) != _NUMBER.sub("#", line):
+        return False
+    pairs = zip(_NUMBER.finditer(shown), _NUMBER.finditer(line), strict=True)
+    return all(_TIME.match(shown[a.end() :]) or _close(a[0], b[0]) for a, b in pairs)
+
+
+def _cut(line: str, shown: str) -> str:
+    """Return `line` up to as many words as `shown` has."""
+    return " ".join(line.split()[: len(shown.split())])
+
+
+def _plain(line: str) -> str:
+    return " ".join(re.sub(r"\x1b\[[0-9;]*m", "", line).split())
+
+
+def _close(a: str, b: str) -> bool:
+    decimals = max(len(number.partition(".")[2]) for number in (a, b))
+    x, y = (float(number.replace(",", "")) for number in (a, b))
+    return abs(x - y) <= max(TOLERANCE * max(abs(x), abs(y)), 2 * 10**-decimals if decimals else 0)
