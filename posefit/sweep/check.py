@@ -1,5 +1,6 @@
 """Checks a cell's spec before anything runs: options of a track by their one declaration, all other fields here."""
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import lru_cache
@@ -108,7 +109,7 @@ def _files(motion: str) -> tuple[tuple[str, str], ...]:
     """Return the files that a motion is read from, each with its digest; none for a built-in one."""
     if motion in built_in.names() or recorded.is_recorded(motion) or recorded.is_library(motion):
         return ()
-    if Path(motion).is_dir():
+    if os.path.isdir(motion):
         training_clips([motion])  # raises where one cannot be read
         return tuple((str(one), digest_of(one)) for one in sorted(Path(motion).iterdir()) if one.is_file())
     load_motion(motion, FPS)  # raises where it cannot be read
@@ -154,7 +155,7 @@ def _learned_from(field: str, value: Any) -> str:
     if recorded.is_library(value):
         recorded.named(value)  # raises where a person is unknown
         return str(value)
-    return value if isinstance(value, str) and value and Path(value).is_dir() else _motion(field, value)
+    return value if isinstance(value, str) and os.path.isdir(value) else _motion(field, value)
 
 
 def _views(field: str, value: Any) -> tuple[float, ...]:

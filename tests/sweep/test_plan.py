@@ -102,6 +102,7 @@ def test_the_shared_settings_go_to_the_methods_that_use_them() -> None:
         ({"defaults": {"frames": True}}, "frames must be a whole number of at least 1, got True"),
         ({"defaults": {"evaluations": 30}}, "evaluations must hold one population of 40, got 30"),
         ({"defaults": {"train": "walk-a"}}, "train must be a list of motions, got 'walk-a'"),
+        ({"defaults": {"train": ["a" * 300]}}, "train must be an .amc file"),
         ({"defaults": {"train": ["walk"]}}, "train must not contain the motion itself, got walk"),
         ({"defaults": {"settings": {"sapso.coling": 1}}}, "got 'coling'; did you mean 'cooling'"),
         ({"defaults": {"settings": {"sapso.cooling": "cold"}}}, "sapso.cooling must be float, got 'cold'"),
