@@ -33,7 +33,7 @@ EVENTS = (
     "flip a byte", "repeat a line", "delete a lease", "flip a byte of a lease", "start a second driver",
 )  # fmt: skip
 STOPPED = 1.0  # seconds that a process is stopped
-PAUSE = 0.1, 0.8  # seconds between two events, at least and at most
+PAUSE = 0.05, 0.3  # seconds between two events, at least and at most
 PATIENCE = 60.0  # seconds for a driver to begin cells, or to end
 STARTED = 200  # times that a driver is started, at most
 
