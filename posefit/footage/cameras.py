@@ -88,9 +88,18 @@ def combined(
         None,
         observations,
         "given" if known else "guessed",
-        [warning for view in views for warning in view.warnings],
+        [warning for view in views for warning in view.warnings] + _unequal(views),
         pictures,
     )
+
+
+def _unequal(views: Sequence[CameraView]) -> list[str]:
+    """Return the warning that videos differ in length."""
+    lengths = [len(view.masks) for view in views]
+    if len(set(lengths)) == 1:
+        return []
+    came = ", ".join(f"{view.name} {length}" for view, length in zip(views, lengths, strict=True))
+    return [f"the videos differ in length; the first {min(lengths)} frames are used of {came}"]
 
 
 def _rate(views: Sequence[CameraView], fps: float | None) -> float:

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from posefit.footage import images
+from posefit.footage.cameras import CameraView, combined
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_folder, read_masks
-from posefit.footage.source import scene_of
+from posefit.footage.source import body_of, scene_of
 from posefit.tracking.front import track
 from tests.cases import each
 from tests.footage.conftest import SIZE, camera, error_of, run, truth
@@ -315,6 +316,16 @@ def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[An
         scene_of([a, b], camera=cameras)
     with pytest.raises(ValueError, match=rf"views must have one frame rate.*, got 30 of {a} and 60 of {c}"):
         scene_of([a, c], camera=cameras)
+
+
+def test_views_of_videos_end_with_the_shortest(walk: list[Any], tmp_path: Path) -> None:
+    views = []
+    for name, count in (("a", 6), ("b", 4)):
+        np.savez(tmp_path / f"{name}.npz", masks=walk[:count])
+        views.append(CameraView(read(tmp_path / f"{name}.npz")[0], [], f"{name}.mp4", filmed=SIZE))
+    scene = combined(views, "a", body_of(None, None), [camera(np.pi / 2), camera(np.pi / 2)], None, None)
+    assert len(scene.observations) == 4
+    assert scene.warnings == ["the videos differ in length; the first 4 frames are used of a.mp4 6, b.mp4 4"]
 
 
 def test_masks_that_would_not_fit_in_memory_are_refused(
