@@ -212,7 +212,7 @@ def drawing() -> str:
 
 def main(arguments: list[str]) -> int:
     """Write the drawing and return the exit status."""
-    path = Path(arguments[0]) if arguments else HERE / "generated" / "architecture.svg"
+    path = Path(arguments[0]) if arguments else HERE / "pictures" / "architecture.svg"
     try:
         text = drawing()
     except ValueError as error:

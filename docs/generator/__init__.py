@@ -1,8 +1,11 @@
-"""Write the pages of the handbook that are made from the code: settings, figures, equations, commands, modules.
+"""What of the handbook is made from the code: settings, figures, equations, commands, environments.
 
-`write` is called by docs/conf.py before every build; what it writes stands in docs/generated, which git ignores.
+`python docs/generator` writes it into the pages, between `<!-- from the code: NAME -->` and `<!-- end -->`, and so does
+docs/conf.py before every build; tests/docs compares it with the code. The pages of the Python modules are not in the
+repository.
 """
 
+import re
 import shutil
 from pathlib import Path
 
@@ -11,24 +14,39 @@ import architecture
 from generator import angles, commands, environments, equations, figures, joints, python, settings
 
 DOCS = Path(__file__).parents[1]
-GENERATED = DOCS / "generated"
+MODULES = DOCS / "generated" / "python"
+PARTS = {
+    "background/equations.md": equations.page,
+    "howto/measuring.md": angles.page,
+    "reference/commands.md": commands.page,
+    "reference/figures.md": figures.page,
+    "reference/joints.md": joints.page,
+    "reference/settings.md": settings.page,
+}
+_PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def pages() -> dict[str, str]:
+    """Return the text of every file in the repository that is made from the code, wholly or in part.
+
+    Raises ValueError where packages import each other in a circle.
+    """
+    parts = {name: _with_part((DOCS / name).read_text("utf-8"), make()) for name, make in PARTS.items()}
+    manuals = {f"reference/environments/{name}.md": text for name, text in environments.pages().items()}
+    return {**parts, **manuals, "pictures/architecture.svg": architecture.drawing()}
 
 
 def write() -> None:
-    """Write every generated page. Raises ValueError where the packages import each other in a circle."""
-    shutil.rmtree(GENERATED, ignore_errors=True)
-    pages = {
-        "settings.md": settings.page(),
-        "figures.md": figures.page(),
-        "equations.md": equations.page(),
-        "commands.md": commands.page(),
-        "environments.md": environments.page(),
-        "joints.md": joints.page(),
-        "angles.md": angles.page(),
-        **{f"python/{name}.rst": text for name, text in python.pages().items()},
-        "architecture.svg": architecture.drawing(),
-    }
-    for name, text in pages.items():
-        path = GENERATED / name
+    """Write every generated page."""
+    shutil.rmtree(MODULES, ignore_errors=True)
+    for name, text in {
+        **pages(),
+        **{f"generated/python/{name}.rst": text for name, text in python.pages().items()},
+    }.items():
+        path = DOCS / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+
+
+def _with_part(page: str, part: str) -> str:
+    return _PART.sub(lambda match: f"{match[1]}\n{part}\n{match[2]}", page)

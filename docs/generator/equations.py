@@ -43,7 +43,6 @@ class Tag(NamedTuple):
     source: str
     step: str
     path: str
-    line: int
     code: str
 
 
@@ -56,7 +55,7 @@ def page() -> str:
         for tag in (tag for tag in ordered if tag.source == source):
             code = f"`{tag.code}`".replace("|", "\\|")
             named = "<br>".join(f"`{name}`" for name in tests_of(tag))
-            lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}:{tag.line}` | {named} |"
+            lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}` | {named} |"
         parts += lines
     return "\n\n".join(parts) + "\n"
 
@@ -71,7 +70,7 @@ def tags() -> Iterator[Tag]:
                 if match is None:
                     continue
                 code = line[: match.start()].strip() or lines[number].strip()  # a tag on its own is of the next line
-                yield Tag(match["source"], match["step"], str(path.relative_to(ROOT)), number, code)
+                yield Tag(match["source"], match["step"], str(path.relative_to(ROOT)), code)
 
 
 def tests_of(tag: Tag) -> list[str]:

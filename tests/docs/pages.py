@@ -10,6 +10,7 @@ DOCS = ROOT / "docs"
 RUN = ("python", "sh", "toml")  # languages whose blocks are tested
 SHOWN = ("text",)  # what the block before it prints, or what is no code
 _BLOCK = re.compile(r"^(?P<fence>`{3,})(?P<language>[^\n]*)\n(?P<text>.*?)^(?P=fence)[ ]*$", re.MULTILINE | re.DOTALL)
+_MADE = re.compile(r"<!-- from the code: .*?<!-- end -->", re.DOTALL)
 _MARK = re.compile(
     r"<!-- (?P<mark>nightly|not run|not a plan|not compared): (?P<reason>(?:(?!-->).)*) -->\n\Z", re.DOTALL
 )
@@ -38,7 +39,7 @@ def pages() -> list[Path]:
 
 def blocks(page: Path) -> Iterator[Block]:
     """Yield the blocks of a page, in order; not those that are instructions to the builder."""
-    text = page.read_text("utf-8")
+    text = _MADE.sub(lambda made: "\n" * made[0].count("\n"), page.read_text("utf-8"))
     for block in _BLOCK.finditer(text):
         language = block["language"].strip()
         if language.startswith("{"):

@@ -1,0 +1,10 @@
+"""`python docs/generator` writes the generated pages."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from generator import write
+
+write()
