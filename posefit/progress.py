@@ -2,7 +2,9 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any
 
 from posefit.errors import printable
@@ -17,6 +19,14 @@ class Progress:
 
     log: Callable[[str], None] = lambda _message: None
     steps: Callable[[Iterator[Any], int], Iterator[Any]] = lambda steps, _count: steps
+    phases: dict[str, float] = field(default_factory=dict, compare=False)  # the seconds that each took
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Time the body, as a phase of the work."""
+        began = perf_counter()
+        yield
+        self.phases[name] = self.phases.get(name, 0.0) + perf_counter() - began
 
     def warn(self, warning: str) -> None:
         """Log a warning."""

@@ -12,6 +12,8 @@ from posefit.cli.output import json_line, progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
 
+COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
+
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
@@ -19,7 +21,7 @@ from posefit.progress import Progress
 @click.option(
     "--live", metavar="DEVICE|URL|-", help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures."
 )
-def track(as_json: bool, live: str | None, **options: Any) -> None:
+def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options: Any) -> None:
     """Track a person through SOURCE.
 
     A video; masks as a folder, image files, .npz or .npy; a built-in or recorded motion, an .amc or .bvh file. Several
@@ -32,18 +34,21 @@ def track(as_json: bool, live: str | None, **options: Any) -> None:
     """  # noqa: D301
     from posefit.tracking.front import track as run
 
+    shown = Progress() if quiet else Progress(say, progress)
     if live is not None:
-        return _track_live(live, as_json, options)
+        return _track_live(live, as_json, options, shown)
 
     with results_alone() if as_json else nullcontext():
-        result = run(progress=Progress(say, progress), **_arguments(options))
-    _print(result.summary, as_json, {}, options["out"], "open track.html, watch overlay.mp4, look at summary.png")
+        result = run(progress=shown, **_arguments(options))
+    shown.log("took " + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()))
+    hint = "open track.html, watch overlay.mp4, look at summary.png"
+    _print(result.summary, as_json, {}, options["out"], verbose, hint)
 
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
 @click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
-def fit(as_json: bool, **options: Any) -> None:
+def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
 
     \b
@@ -53,12 +58,13 @@ def fit(as_json: bool, **options: Any) -> None:
     from posefit.tracking.front import fit as run
 
     with results_alone() if as_json else nullcontext():
-        result = run(progress=Progress(say), **_arguments(options))
+        result = run(progress=Progress() if quiet else Progress(say), **_arguments(options))
     degrees = [round(math.degrees(angle), 6) for angle in result.pose]
-    _print(result.summary, as_json, {"pose_degrees": degrees}, options["out"], "open track.html, look at summary.png")
+    more = {"pose_degrees": degrees}
+    _print(result.summary, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
 
 
-def _track_live(live: str, as_json: bool, options: dict[str, Any]) -> None:
+def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progress) -> None:
     from posefit.tracking.live import track_live, write_live
 
     if options["source"]:
@@ -69,19 +75,30 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any]) -> None:
     out = options["out"]
     for name in ("source", "out", "force", "resume", "rerun"):
         options.pop(name)
-    frames = track_live(live, progress=Progress(say), **options)
+    frames = track_live(live, progress=shown, **options)
     summary = write_live(frames, out, (lambda frame: click.echo(json_line(frame.row))) if as_json else None)
     latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
-    say(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
+    shown.log(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
 
 
-def _print(summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, hint: str) -> None:
-    """Print a track's summary, as JSON with something more, or as the table."""
-    from posefit.tracking.table import table
+def _print(
+    summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
+) -> None:
+    """Print a track's summary: as JSON with something more, in three lines, or whole."""
+    from posefit.tracking.table import brief, table
 
-    click.echo(json_line({**summary, **more}) if as_json else table(summary))
-    if out and not as_json:
-        click.echo(f"written to {out}: {hint}")
+    if as_json:
+        click.echo(json_line({**summary, **more}))
+        return
+    if verbose:
+        click.echo(table(summary))
+    else:
+        worth, work = brief(summary)
+        grade = "good" if summary["trust"] is None else summary["trust"]["grade"]
+        click.secho(worth, bold=True, fg=COLOURS[grade])
+        click.echo(work)
+    if out or not verbose:
+        click.echo(f"written to {out}: {hint}" if out else "--verbose prints all figures; --out DIR writes files")
 
 
 @click.command()

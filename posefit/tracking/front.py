@@ -79,7 +79,8 @@ def track(
     if out is not None:
         folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
     with folder as output:
-        scene = scene or scene_of(sources, progress, **chosen.view)
+        with progress.phase("masks"):
+            scene = scene or scene_of(sources, progress, **chosen.view)
         names = {
             "source": [each.name if isinstance(each, Motion) else name_of(each) for each in sources],
             "frames_chosen": list(chosen.frames),

@@ -1,6 +1,5 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -52,11 +51,8 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
 
 def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress) -> Guess:
     """Return the first pose, where it is searched by restarts, and the person's build, where it is fitted."""
-    began = time.perf_counter()
     with _compiling_announced(progress.log):
         looks_ahead = _warm_up(method, task, scene)
-    progress.log(f"ready in {time.perf_counter() - began:.1f} s; {scene.count} frames of {scene.name}")
-
     footage = scene.truth is None
     restarts = (RESTARTS if footage and not looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames

@@ -57,13 +57,16 @@ def track_scene(
         for warning in scene.warnings:
             progress.warn(warning)
         method = prepare(options, task)
-        guess = initialise(scene, method, task, options, progress)
+        with progress.phase("build"):
+            guess = initialise(scene, method, task, options, progress)
         method.audit.clear()  # what was tried before the first frame is in no row
-        hypotheses = follow(guess, method, options, output, progress)
-        tracked = retrack(guess, method, hypotheses, options, progress)
+        with progress.phase("follow"):
+            hypotheses = follow(guess, method, options, output, progress)
+            tracked = retrack(guess, method, hypotheses, options, progress)
         if tracked.start is not None:
             guess = replace(guess, task=replace(guess.task, fastest_turn=MAX_TURN_RATE))
         smoothed = Pass(guess.scene, tracked.frames, guess.shape, 1)
         if options.smooth:
-            smoothed = smooth(guess, method, tracked.frames, options, progress)
+            with progress.phase("smooth"):
+                smoothed = smooth(guess, method, tracked.frames, options, progress)
         return evaluate(smoothed, method, guess.task, tracked, options, output, progress, source or {})

@@ -98,7 +98,8 @@ def evaluate(
         "gait": gait_of(estimate, unseen(rows)).as_dict(),
         "warnings": warnings,
     }
-    output.finish(scene, frames, rows, summary)
+    with progress.phase("write"):
+        output.finish(scene, frames, rows, summary)
     return Track(estimate, scene.truth, measures, rows, summary, frames, scene, modes)
 
 

@@ -13,8 +13,20 @@ WIDTH = 30  # of the names
 MAX_NAMED = 8  # motions that were learned from, and are named
 
 
+def brief(summary: Mapping[str, Any]) -> list[str]:
+    """Return in two lines what a track is worth, and what it took."""
+    trust = summary["trust"]
+    if trust is None:
+        error = MEASURES["error_degrees"].shown(summary["error_degrees"]["mean"])
+        worth = f"{_shown(summary, 'mpjpe_mm')}, {error}, {_shown(summary, 'lost_rate')} of frames"
+    else:
+        worth = trust["sentence"]
+    work = f"{summary['motion']}: {counted(summary['frames'], 'frame')} by {summary['method']}, {_effort(summary)}"
+    return [printable(worth), printable(work)]
+
+
 def table(summary: Mapping[str, Any]) -> str:
-    """Return the lines that `posefit track` prints."""
+    """Return the lines that `posefit track --verbose` prints."""
     trust = summary["trust"]
     lines = [] if trust is None else [trust["sentence"], trust_line(trust)]
     names = summary["train"]
@@ -55,14 +67,9 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
-    used, tracks = summary["evaluations"] / summary["frames"], summary["hypotheses"]
-    lines += [_chosen(tracks)] if tracks else []
-    budget = summary["evaluations_per_frame"] * max(len(tracks), 1)
-    lines.append(
-        f"{_shown(summary, 'iou')}, {used:,.0f} of {budget:,} evaluations and "
-        f"{MEASURES['seconds_per_frame'].number(summary['seconds_per_frame'])} ms a frame, "
-        f"{MEASURES['evaluations_per_second'].number(summary['evaluations_per_second'])} poses a second"
-    )
+    lines += [_chosen(summary["hypotheses"])] if summary["hypotheses"] else []
+    speed = MEASURES["evaluations_per_second"].number(summary["evaluations_per_second"])
+    lines.append(f"{_effort(summary)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the names of files are among them
 
 
@@ -84,6 +91,13 @@ def gait_line(gait: Mapping[str, Any]) -> str:
         f"gait: {gait['cadence']:.0f} steps a minute, step {gait['step_length']:.2f} m, speed {gait['speed']:.2f} m/s, "
         f"{stance}over {gait['steps']} steps"
     )
+
+
+def _effort(summary: Mapping[str, Any]) -> str:
+    used = summary["evaluations"] / summary["frames"]
+    budget = summary["evaluations_per_frame"] * max(len(summary["hypotheses"]), 1)
+    seconds = MEASURES["seconds_per_frame"].number(summary["seconds_per_frame"])
+    return f"{_shown(summary, 'iou')}, {used:,.0f} of {budget:,} evaluations and {seconds} ms a frame"
 
 
 def _frames(count: int, of: str) -> str:

@@ -95,7 +95,7 @@ def test_track_prints_one_json_object_with_every_key() -> None:
 
 def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
     out = tmp_path / "deep" / "out"
-    result = run("track", "walk", "--frames", "0:5", "--out", out, *QUICK)
+    result = run("track", "walk", "--frames", "0:5", "--out", out, "--verbose", *QUICK)
     assert result.exit_code == 0, result.stderr
     assert {path.name for path in out.iterdir()} == FILES
     assert [path.name for path in out.parent.iterdir()] == ["out"]
@@ -154,8 +154,15 @@ def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: p
         assert summary_of(*words, *QUICK)["translation"] == "known"
 
 
+def test_a_result_has_three_lines_and_messages_only_where_they_are_wanted() -> None:
+    result = run("track", "walk", "--frames", "0:5", *QUICK)
+    assert len(result.stdout.splitlines()) == 3
+    assert all(f"{phase} " in result.stderr for phase in ("masks", "build", "follow", "write"))
+    assert run("track", "walk", "--frames", "0:5", "--quiet", *QUICK).stderr == ""
+
+
 def test_one_frame_has_a_table_too() -> None:  # the pose held from the first frame has no error to compare with
-    result = run("fit", "walk", "--frame", "3", *QUICK)
+    result = run("fit", "walk", "--frame", "3", "--verbose", *QUICK)
     assert result.exit_code == 0, result.output
     assert "first true pose, held               0.00       -" in result.stdout
 

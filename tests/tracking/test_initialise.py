@@ -44,7 +44,6 @@ def test_compiling_is_announced_where_something_is_compiled_and_only_there(tmp_p
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     logs = [subprocess.run(words, env=environment, capture_output=True, text=True).stderr for _ in range(2)]
     assert [log.count(COMPILING) for log in logs] == [1, 0]
-    assert "ready in" in logs[1]
 
 
 def test_a_tracker_that_needs_its_whole_budget_is_not_warmed_up() -> None:
