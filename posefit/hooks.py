@@ -11,8 +11,9 @@ imports the modules whose entry point ends in `-commands`, even for `posefit --h
 point ends in `-claims`. All others are imported when a method is needed.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 from pluggy import HookspecMarker
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
+Factory = TypeVar("Factory", contravariant=True)
 
 # The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").
 Needs = tuple[str, str]
@@ -63,39 +65,18 @@ class RegisterOptimiser(Protocol):
         """Register an optimiser."""
 
 
-class RegisterPrior(Protocol):
-    """Registers a prior: its name, its factory and what it needs."""
+class Register(Protocol[Factory]):
+    """Registers anything else that has a factory: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: "PriorFactory", *, needs: Needs | None = None) -> None:
-        """Register a prior."""
-
-
-class RegisterTracker(Protocol):
-    """Registers a tracker: its name, its factory and what it needs."""
-
-    def __call__(self, name: str, factory: "TrackerFactory", *, needs: Needs | None = None) -> None:
-        """Register a tracker."""
+    def __call__(self, name: str, factory: Factory, *, needs: Needs | None = None) -> None:
+        """Register a prior, a tracker or a segmenter."""
 
 
-class RegisterSegmenter(Protocol):
-    """Registers a segmenter: its name, its factory and what it needs."""
-
-    def __call__(self, name: str, factory: "SegmenterFactory", *, needs: Needs | None = None) -> None:
-        """Register a segmenter."""
-
-
-class RegisterCommand(Protocol):
-    """Registers a command of `posefit`."""
-
-    def __call__(self, command: "click.Command") -> None:
-        """Register a command, which has its name itself."""
-
-
-class RegisterClaim(Protocol):
-    """Registers a claim of a publication."""
-
-    def __call__(self, claim: ClaimedOrder) -> None:
-        """Register a claim."""
+RegisterPrior: TypeAlias = Register["PriorFactory"]
+RegisterTracker: TypeAlias = Register["TrackerFactory"]
+RegisterSegmenter: TypeAlias = Register["SegmenterFactory"]
+RegisterCommand: TypeAlias = Callable[["click.Command"], None]
+RegisterClaim: TypeAlias = Callable[[ClaimedOrder], None]
 
 
 @hookspec

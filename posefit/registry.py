@@ -10,6 +10,7 @@ into an error.
 import os
 import re
 import sys
+import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -41,7 +42,8 @@ T = TypeVar("T")
 
 Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-APART = ("commands", "claims")  # what is registered by modules of its own, see `posefit.hooks`
+Registered = Literal["methods", "commands", "claims"]
+APART: tuple[Registered, ...] = ("commands", "claims")  # registered by modules of their own, see `posefit.hooks`
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
 
@@ -167,13 +169,13 @@ def registry() -> Registry:
 @lru_cache(maxsize=1)
 def command_plugins(taken: tuple[str, ...] = ()) -> "tuple[Plugin[click.Command], ...]":
     """Return all installed plugins with commands; `taken` are the names of posefit's own commands."""
-    return commands_of(_installed("commands"), taken)
+    return load("commands", _installed("commands"), taken=taken)
 
 
 @lru_cache(maxsize=1)
 def claim_plugins() -> tuple[Plugin[ClaimedOrder], ...]:
     """Return all installed plugins with claims of publications."""
-    return claims_of(_installed("claims"))
+    return load("claims", _installed("claims"))
 
 
 def claimed_orders() -> tuple[ClaimedOrder, ...]:
@@ -193,92 +195,87 @@ def prior(name: str) -> "PriorFactory":
 
 def registry_of(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
     """Return what the plugins behind these entry points offer; see `load`."""
-    return Registry(load(points, _methods, lambda offer: f"{offer.kind} {offer.name!r}", variables))
-
-
-def commands_of(
-    points: Iterable[EntryPoint], taken: Iterable[str] = (), variables: Mapping[str, str] = os.environ
-) -> "tuple[Plugin[click.Command], ...]":
-    """Return the plugins with commands behind these entry points; see `load`."""
-    owners = {f"command {name!r}": PROJECT for name in taken}
-    return load(points, _commands, lambda command: f"command {command.name!r}", variables, owners)
-
-
-def claims_of(
-    points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ
-) -> tuple[Plugin[ClaimedOrder], ...]:
-    """Return the plugins with claims behind these entry points; see `load`."""
-    return load(points, _claims, lambda claim: f"claim {claim.name}", variables)
+    return Registry(load("methods", points, variables))
 
 
 def load(
-    points: Iterable[EntryPoint],
-    collect: Callable[[Any, str, str], Iterable[T]],
-    label: Callable[[T], str],
-    variables: Mapping[str, str] = os.environ,
-    taken: Mapping[str, str] | None = None,
-) -> tuple[Plugin[T], ...]:
-    """Return the plugins behind entry points, posefit's own first, loaded, broken or left out.
+    what: Registered, points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ, taken: Iterable[str] = ()
+) -> tuple[Plugin[Any], ...]:
+    """Return the plugins behind entry points that register `what`, posefit's own first: loaded, broken or left out.
 
-    `collect(hooks, distribution, version)` returns what a plugin offers, and `label` how an error names an offer. No
-    two offers of one name are loaded; `taken` are names that are not free, with their owners. Raises ValueError where
-    a plugin is broken and POSEFIT_STRICT_PLUGINS is set.
+    No two offers of one name are loaded; `taken` are the names of posefit's own commands. Raises ValueError where a
+    plugin is broken and POSEFIT_STRICT_PLUGINS is set.
     """
-    owners = dict(taken or {})
-    plugins: list[Plugin[T]] = []
-    points = list(points)
-    distributions = [(point.dist.name, point.dist.version) if point.dist else ("unknown", "") for point in points]
-    owned = zip(distributions, points, strict=True)
-    for distribution, point in sorted(owned, key=lambda pair: (pair[0][0] != PROJECT, pair[1].name)):
-        plugin = _loaded(point, distribution, collect, label, variables, owners)
+    owners = {f"command {name!r}": PROJECT for name in taken}
+    plugins: list[Plugin[Any]] = []
+    owned = [(*((point.dist.name, point.dist.version) if point.dist else ("unknown", "")), point) for point in points]
+    for owner, release, point in sorted(owned, key=lambda one: (one[0] != PROJECT, one[2].name)):
+        plugin: Plugin[Any] = Plugin(point.name, owner, release, "left out", _left_out(point.name, owner, variables))
+        if not plugin.cause:
+            try:
+                offers = _offers(what, point, owner, release, owners)
+                owners |= dict.fromkeys(offers, owner)
+                plugin = plugin._replace(state="loaded", offers=tuple(offers.values()))
+            except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
+                trace = "".join(traceback.format_exception(error))
+                plugin = plugin._replace(state="broken", cause=f"{type(error).__name__}: {error}", traceback=trace)
         plugins.append(plugin)
         if plugin.state == "broken":
-            message = f"plugin {plugin.name!r} of {plugin.distribution} {plugin.version} is left out: {plugin.cause}"
+            message = f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}"
             if variables.get(STRICT, "0") not in ("", "0"):
                 raise InputError(message)
             warnings.warn(message, stacklevel=2)
-        owners |= {label(offer): plugin.distribution for offer in plugin.offers}
     return tuple(plugins)
 
 
-def _loaded(
-    point: EntryPoint,
-    owner: tuple[str, str],
-    collect: Callable[[Any, str, str], Iterable[T]],
-    label: Callable[[T], str],
-    variables: Mapping[str, str],
-    owners: Mapping[str, str],
-) -> Plugin[T]:
-    distribution, version = owner
-    reason = _left_out(point.name, distribution, variables)
-    if reason:
-        return Plugin(point.name, distribution, version, "left out", reason)
-    offers: dict[str, T] = {}
-    try:
-        manager = pluggy.PluginManager(PROJECT)
-        manager.add_hookspecs(hooks)
-        with _unpatched():
-            module = point.load()
-        manager.register(module, point.name)
-        manager.check_pending()
-        for hook in manager.get_hookcallers(module) or ():
-            what = hook.name.removeprefix("posefit_register_")
-            if what in APART and _registers(point.name) != what:
-                raise InputError(f"the entry point of {hook.name} must end in -{what}, got {point.name!r}")
-            if what not in APART and _registers(point.name) != "methods":
-                raise InputError(f"{point.name!r} must register {_registers(point.name)} alone, got {hook.name}")
-        for offer in collect(manager.hook, distribution, version):
-            name = label(offer)
-            if name in owners or name in offers:
-                raise ValueError(f"{name} is already registered by {owners.get(name, distribution)}")
-            offers[name] = offer
-    except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
-        import traceback
+def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owners: Mapping[str, str]) -> dict[str, Any]:
+    """Return what a plugin offers, by how an error names it. Raises whatever goes wrong."""
+    manager = pluggy.PluginManager(PROJECT)
+    manager.add_hookspecs(hooks)
+    with _unpatched():
+        module = point.load()
+    manager.register(module, point.name)
+    manager.check_pending()
+    for hook in manager.get_hookcallers(module) or ():
+        kind = hook.name.removeprefix("posefit_register_")
+        if kind in APART and what != kind:
+            raise InputError(f"the entry point of {hook.name} must end in -{kind}, got {point.name!r}")
+        if kind not in APART and what != "methods":
+            raise InputError(f"{point.name!r} must register {what} alone, got {hook.name}")
+    offers: dict[str, Any] = {}
 
-        trace = "".join(traceback.format_exception(error))
-        cause = f"{type(error).__name__}: {error}"
-        return Plugin(point.name, distribution, version, "broken", cause, traceback=trace)
-    return Plugin(point.name, distribution, version, "loaded", offers=tuple(offers.values()))
+    def add(name: str, offer: Any) -> None:
+        if name in owners or name in offers:
+            raise ValueError(f"{name} is already registered by {owners.get(name, owner)}")
+        offers[name] = offer
+
+    def command(offer: Any) -> None:
+        import click
+
+        if not isinstance(offer, click.Command) or not offer.name:
+            raise TypeError(f"a command must be a click.Command with a name, got {offer!r}")
+        add(f"command {offer.name!r}", offer)
+
+    def claim(offer: Any) -> None:
+        if not isinstance(offer, ClaimedOrder):
+            raise TypeError(f"a claim must be a ClaimedOrder, got {offer!r}")
+        add(f"claim {offer.name}", offer)
+
+    def method(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
+        from posefit.fitting.optimiser import NextFrame
+
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
+            raise InputError(f"a name must be letters, digits, _, + and -, got {name!r}")
+        if not callable(factory):
+            raise TypeError(f"{kind} {name!r} must be a factory that can be called, got {factory!r}")
+        if more.get("next_frame", "start") not in get_args(NextFrame):
+            raise InputError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
+        add(f"{kind} {name!r}", Offer(kind, name, factory, owner, release, **more))
+
+    registers = {"commands": command, "claims": claim, **{f"{kind}s": partial(method, kind) for kind in KINDS}}
+    for kind in (what,) if what != "methods" else [f"{kind}s" for kind in KINDS]:
+        getattr(manager.hook, f"posefit_register_{kind}")(register=registers[kind])
+    return offers
 
 
 @contextmanager
@@ -304,14 +301,10 @@ def _unpatched() -> Iterator[None]:
         raise InputError(f"to load it must leave NumPy and Python as they are, got {cut(', '.join(changed))}")
 
 
-def _registers(name: str) -> str:
-    """Return what an entry point of this name registers: "commands", "claims" or "methods"."""
-    return next((what for what in APART if name.endswith(f"-{what}")), "methods")
-
-
-def _installed(what: str) -> list[EntryPoint]:
-    """Return the installed entry points that register `what`."""
-    return [point for point in entry_points(group=PROJECT) if _registers(point.name) == what]
+def _installed(what: Registered) -> list[EntryPoint]:
+    """Return the installed entry points that register `what`: methods, where their names end in nothing else."""
+    points = entry_points(group=PROJECT)
+    return [p for p in points if what == next((one for one in APART if p.name.endswith(f"-{one}")), "methods")]
 
 
 def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
@@ -326,45 +319,3 @@ def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str
     if LOAD in variables and distribution != PROJECT and not chosen(LOAD):
         return f"{LOAD} does not name it"
     return ""
-
-
-def _methods(relay: Any, distribution: str, version: str) -> list[Offer]:
-    """Return the methods that one plugin registers."""
-    from posefit.fitting.optimiser import NextFrame
-
-    offers: list[Offer] = []
-
-    def register(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
-        if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise InputError(f"a name must be letters, digits, _, + and -, got {name!r}")
-        if not callable(factory):
-            raise TypeError(f"{kind} {name!r} must be a factory that can be called, got {factory!r}")
-        if more.get("next_frame", "start") not in get_args(NextFrame):
-            raise InputError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
-        offers.append(Offer(kind, name, factory, distribution, version, **more))
-
-    for kind in KINDS:
-        getattr(relay, f"posefit_register_{kind}s")(register=partial(register, kind))
-    return offers
-
-
-def _commands(relay: Any, *_: str) -> "list[click.Command]":
-    """Return the commands that one plugin registers."""
-    import click
-
-    commands: list[Any] = []
-    relay.posefit_register_commands(register=commands.append)
-    for command in commands:
-        if not isinstance(command, click.Command) or not command.name:
-            raise TypeError(f"a command must be a click.Command with a name, got {command!r}")
-    return commands
-
-
-def _claims(relay: Any, *_: str) -> list[ClaimedOrder]:
-    """Return the claims that one plugin registers."""
-    claims: list[Any] = []
-    relay.posefit_register_claims(register=claims.append)
-    for claim in claims:
-        if not isinstance(claim, ClaimedOrder):
-            raise TypeError(f"a claim must be a ClaimedOrder, got {claim!r}")
-    return claims

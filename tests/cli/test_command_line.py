@@ -325,7 +325,7 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
     installed = registry.Registry((*registry.registry().plugins, broken))
     bad = point("bad-claims", ImportError("no module named 'lost',\n  nor 'here'"))
     monkeypatch.setattr(registry, "registry", lambda: installed)
-    monkeypatch.setattr(registry, "claim_plugins", lambda: registry.claims_of([bad], {}))
+    monkeypatch.setattr(registry, "claim_plugins", lambda: registry.load("claims", [bad], {}))
     result = run("plugins", "doctor")
     assert result.exit_code == 1
     assert f"broken    bad (posefit-bad 1.0): {cause}\n" in result.stdout

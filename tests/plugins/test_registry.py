@@ -13,7 +13,7 @@ import pytest
 
 from posefit import hookimpl
 from posefit.hooks import ClaimedOrder
-from posefit.registry import Offer, claimed_orders, claims_of, commands_of, registry, registry_of
+from posefit.registry import Offer, claimed_orders, load, registry, registry_of
 from posefit.version import source_digest
 from posefit_priors.pca import PCA
 from tests.cases import each
@@ -99,23 +99,18 @@ GOOD = {"methods": offering("good"), "commands": commands(click.Command("greet")
 
 
 @each("what", BROKEN)
-def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(what: str) -> None:
-    load: Any = {
-        "methods": lambda points, variables: registry_of(points, variables).plugins,
-        "commands": lambda points, variables: commands_of(points, ["track"], variables),
-        "claims": claims_of,
-    }[what]
+def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(what: Any) -> None:
     end = "" if what == "methods" else f"-{what}"
     for module, cause in BROKEN[what]:
         points = [point(f"bad{end}", module), point(f"good{end}", GOOD[what])]
         with pytest.warns(UserWarning, match=f"plugin 'bad{end}' of posefit-bad{end} 1.0 is left out: ") as caught:
-            bad, good = load(points, {"POSEFIT_STRICT_PLUGINS": "0"})
+            bad, good = load(what, points, {"POSEFIT_STRICT_PLUGINS": "0"}, ["track"])
         assert len(caught) == 1
         assert cause in str(caught[0].message)
         assert (bad.state, good.state) == ("broken", "loaded")
         assert bad.traceback
         with pytest.raises(ValueError, match=f"plugin 'bad{end}' of posefit-bad{end} 1.0 is left out: "):
-            load(points, {"POSEFIT_STRICT_PLUGINS": "1"})
+            load(what, points, {"POSEFIT_STRICT_PLUGINS": "1"}, ["track"])
 
 
 def test_what_a_plugin_changes_when_it_is_loaded_is_undone() -> None:
@@ -126,10 +121,10 @@ def test_what_a_plugin_changes_when_it_is_loaded_is_undone() -> None:
 
 
 def test_commands_and_claims_are_those_that_were_registered() -> None:
-    (plugin,) = commands_of([point("hello-commands", commands(click.Command("greet"), click.Group("part")))])
+    (plugin,) = load("commands", [point("hello-commands", commands(click.Command("greet"), click.Group("part")))])
     assert [command.name for command in plugin.offers] == ["greet", "part"]
     orders = [ClaimedOrder("a paper", "b beats a", ("a", "b")), ClaimedOrder("another", "a beats b", ("b", "a"))]
-    (plugin_with_claims,) = claims_of([point("mine-claims", claims(*orders))])
+    (plugin_with_claims,) = load("claims", [point("mine-claims", claims(*orders))])
     assert list(plugin_with_claims.offers) == orders
     for methods in (("a",), (), ("a", "a")):
         with pytest.raises(ValueError, match="methods must be at least two that differ, got"):
