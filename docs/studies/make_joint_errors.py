@@ -23,7 +23,7 @@ from posefit_vsmm.joints import BODY, detected
 from posefit_vsmm.measurement import NARROWEST, head_radius
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.state import POINTS, points_of
+from posefit_vsmm.state import ENDS, POINTS
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
 AZIMUTHS = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0])
@@ -45,16 +45,16 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
         scale = camera.focal[0] / DISTANCE
         for pose, place in zip(motion.poses[::2], motion.translations[::2] * [1.0, 1.0, 0.0], strict=True):
             lines = lines_of(project(body, camera, pose, place))
-            true, _ = camera.project(points_of(motion.skeleton.joints(pose[None], place[None])[0]))
+            true, _ = camera.project(motion.skeleton.joints(pose, place)[ENDS].mean(axis=1))
             expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
             assert lines is not None
             gates = np.full(len(POINTS), NARROWEST * leg * scale)
-            detection = detected(
+            points, confidence, _ = detected(
                 lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2))
             )
             for k, point in enumerate(POINTS):
-                if detection.confidence[k] > 0.0:
-                    errors_of[point].append((detection.points[k] - true[k]) / (leg * scale))
+                if confidence[k] > 0.0:
+                    errors_of[point].append((points[k] - true[k]) / (leg * scale))
     return errors_of
 
 

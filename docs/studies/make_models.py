@@ -27,7 +27,7 @@ from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit_vsmm import motion as models
 from posefit_vsmm.kernels import minus
-from posefit_vsmm.motion import FPS, LAMBDA, MotionModel, leg_of, normalised_ridge, ridge, without_heading
+from posefit_vsmm.motion import FPS, LAMBDA, MotionModel, leg_of, ridge, without_heading
 from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
 
 ORIGIN = (
@@ -107,8 +107,8 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
     step = round(clip.fps / FPS)  # Interpretation V6: all pairs of a recording so far apart
     before, after = [], []
     for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
-        back, here = without_heading(first)
-        turn = Rotation.from_quat(back, scalar_first=True).inv()
+        (w, y), here = without_heading(first)
+        turn = Rotation.from_quat([w, 0.0, y, 0.0], scalar_first=True).inv()
         there = second[3:].reshape(-1, 4).copy()
         there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)
         there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)  # Interpretation V4
@@ -185,6 +185,22 @@ def rounded(values: Array) -> Any:
     return [float(f"{v:.5g}") for v in values] if values.ndim == 1 else [rounded(row) for row in values]
 
 
+def normalised_ridge(before: Array, after: Array, target: Array, weight: float) -> tuple[Array, Array]:
+    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
+
+    The penalty is `weight` a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
+    """
+    inputs = before[:, 3:]
+    middle = inputs.mean(axis=0)
+    unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
+    scaled = (inputs - middle) / unit
+    wanted = after - before - inputs @ target.T
+    wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
+    mean = wanted.mean(axis=0)
+    matrix = ridge(scaled, wanted - mean, weight * len(scaled)) / unit
+    return matrix + target, mean - matrix @ middle
+
+
 @click.command()
 @click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
 @click.option("--ridge-lambda", type=float, default=LAMBDA, show_default=True, help="Weight of |F|^2, above 0.")
@@ -208,7 +224,7 @@ def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
         found: dict[str, Any] = {}
         report: dict[str, float] = {}
         captured = before[np.linspace(0, len(before) - 1, CAPTURED).astype(np.int64), 3:]
-        literal = ridge(before, after, ridge_lambda) - identity, np.zeros(STATE)
+        literal = ridge(before[:, 3:], after, ridge_lambda) - identity, np.zeros(STATE)
         ours = normalised_ridge(before, after, -FADING * identity, ridge_lambda)
         for shrink, (matrix, offset) in (("identity", ours), ("zero", literal)):
             model = MotionModel(name, matrix, offset, np.eye(ERROR), typicals, captured)

@@ -61,8 +61,7 @@ class Topology:
 
 def _most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array) -> str:
     known = dict(zip(models, probabilities, strict=True))
-    sums = {name: sum(known.get(model, 0.0) for model in members) for name, members in sets.items()}
-    return max(sums, key=lambda name: sums[name])
+    return max(sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name]))
 
 
 def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:

@@ -137,19 +137,11 @@ class IMM:
     def cycle(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
         """Return the belief one frame later; `measure` returns the measurement for a state."""
         mixed = self.mixed(belief)
-        repairs = mixed.repairs
-        states, covariances, likelihoods = [], [], []
-        for model, state, covariance in zip(self.models, mixed.states, mixed.covariances, strict=True):
-            predicted, spread = model.predict(state, covariance)  # VSMM 6.3a
-            updated, left, likelihood = update(predicted, spread, measure(predicted), self.manifold)
-            left, repaired = positive_definite(left)
-            states.append(updated)
-            covariances.append(left)
-            likelihoods.append(likelihood)
-            repairs += repaired
-        joint = np.array(likelihoods) + mixed.log_probabilities  # VSMM 6.4
-        log_probabilities = joint - np.logaddexp.reduce(joint)
-        return Belief(np.array(states), np.array(covariances), log_probabilities, np.array(likelihoods), repairs)
+        each = zip(self.models, mixed.states, mixed.covariances, strict=True)
+        predictions = [model.predict(state, covariance) for model, state, covariance in each]  # VSMM 6.3a
+        after = self._measured(mixed, predictions, measure)
+        joint = after.log_likelihoods + mixed.log_probabilities  # VSMM 6.4
+        return replace(after, log_probabilities=joint - np.logaddexp.reduce(joint))
 
     def mixed(self, belief: Belief) -> Belief:
         """Return what each model starts its cycle from, and the probabilities c_j that it is the one.
@@ -159,28 +151,27 @@ class IMM:
         with np.errstate(divide="ignore"):
             steps = np.log(np.asarray(self.transition, dtype=np.float64)) + belief.log_probabilities[:, None]
         after = np.logaddexp.reduce(steps, axis=0)  # log c_j
-        states, covariances, repairs = [], [], belief.repairs
+        states, covariances = np.empty_like(belief.states), np.empty_like(belief.covariances)
         for j, total in enumerate(after):
             weights = np.exp(steps[:, j] - total) if np.isfinite(total) else np.eye(len(after))[j]  # VSMM 6.2a
-            middle = self.manifold.mean(belief.states, weights)
-            spread, repaired = positive_definite(
-                self.manifold.spread(belief.states, belief.covariances, weights, middle)
-            )
-            states.append(middle)  # VSMM 6.2b
-            covariances.append(spread)
-            repairs += repaired
-        return Belief(np.array(states), np.array(covariances), after, belief.log_likelihoods, repairs)
+            states[j] = self.manifold.mean(belief.states, weights)
+            covariances[j] = self.manifold.spread(belief.states, belief.covariances, weights, states[j])  # VSMM 6.2b
+        covariances, repairs = positive_definite(covariances)
+        return Belief(states, covariances, after, belief.log_likelihoods, belief.repairs + repairs)
 
     def updated(self, belief: Belief, measure: Callable[[Array], Measurement]) -> Belief:
         """Return the belief after one more measurement of the same frame; the models' probabilities stay."""
-        states, covariances, repairs = [], [], belief.repairs
-        for state, covariance in zip(belief.states, belief.covariances, strict=True):
-            moved, left, _ = update(state, covariance, measure(state), self.manifold)
-            left, repaired = positive_definite(left)
-            states.append(moved)
-            covariances.append(left)
-            repairs += repaired
-        return replace(belief, states=np.array(states), covariances=np.array(covariances), repairs=repairs)
+        after = self._measured(belief, list(zip(belief.states, belief.covariances, strict=True)), measure)
+        return replace(after, log_likelihoods=belief.log_likelihoods)
+
+    def _measured(
+        self, before: Belief, predictions: Sequence[tuple[Array, Array]], measure: Callable[[Array], Measurement]
+    ) -> Belief:
+        """Return the belief after each model's prediction is measured, with the probabilities of before."""
+        parts = [update(state, covariance, measure(state), self.manifold) for state, covariance in predictions]
+        states, covariances, likelihoods = (np.array(part) for part in zip(*parts, strict=True))
+        covariances, repairs = positive_definite(covariances)
+        return Belief(states, covariances, before.log_probabilities, likelihoods, before.repairs + repairs)
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state and covariance that stand for all models. VSMM step 6."""
@@ -207,32 +198,20 @@ def update(state: Array, covariance: Array, measurement: Measurement, manifold: 
     return manifold.plus(state, gain @ measurement.residual), left, likelihood + measurement.log_likelihood
 
 
-def positive_definite(covariance: Array) -> tuple[Array, int]:
-    """Return a covariance, made symmetric and its eigenvalues positive, and whether they had to be: 1 or 0."""
-    symmetric = 0.5 * (covariance + covariance.T)
-    try:
-        np.linalg.cholesky(symmetric)  # an eighth of the time of the eigenvalues
-        return symmetric, 0
-    except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(symmetric)
-    raised = np.maximum(values, max(SMALLEST, SMALLEST * float(values[-1])))
-    return np.asarray((vectors * raised) @ vectors.T), 1
+def positive_definite(covariances: Array) -> tuple[Array, int]:
+    """Return covariances (r, e, e), symmetric and of eigenvalues above 0, and how many had to be repaired for that."""
+    symmetric, repairs = 0.5 * (covariances + covariances.transpose(0, 2, 1)), 0
+    for covariance in symmetric:
+        try:
+            np.linalg.cholesky(covariance)  # an eighth of the time of the eigenvalues
+        except np.linalg.LinAlgError:
+            values, vectors = np.linalg.eigh(covariance)
+            raised = np.maximum(values, max(SMALLEST, SMALLEST * float(values[-1])))
+            covariance[:] = (vectors * raised) @ vectors.T
+            repairs += 1
+    return symmetric, repairs
 
 
 # States (3 + 4 n,): a place, then n unit quaternions w, x, y, z. Errors (3 + 3 n,): a step, then n rotation vectors,
 # each applied on its quaternion's right. Such a plus and minus are also written boxplus and boxminus.
 PLACED = Manifold(plus, minus)
-
-
-def product(first: Array, second: Array) -> Array:
-    """Return the product (4,) of two quaternions (4,)."""
-    a, b, c, d = first.tolist()
-    e, f, g, h = second.tolist()
-    return np.array(
-        [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
-    )

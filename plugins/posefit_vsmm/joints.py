@@ -5,7 +5,6 @@ the person matters.
 """
 
 import json
-from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.resources import files
 
@@ -23,31 +22,17 @@ _TIPS = np.array([AT[name] for name in ("head", "left hand", "right hand", "left
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
 
 
-@dataclass(frozen=True, eq=False)
-class Detection:
-    """The points that one camera saw."""
-
-    points: Array  # (17, 2) pixels; where confidence is 0, what was expected
-    confidence: Array  # (17,) 0 to 1; 0 is not detected
-    unassigned: int = 0  # end points that belong to none of them
-
-
-@dataclass(frozen=True, eq=False)
-class Errors:
-    """How far off the rules are, measured by docs/studies/make_joint_errors.py. Interpretation V7."""
-
-    bias: Array = field(repr=False)  # (17, 2) legs, detected less true
-    deviation: Array = field(repr=False)  # (17, 2) legs, around the bias
-
-
 @lru_cache(maxsize=2)
-def rule_errors(kind: JointErrors = "measured") -> Errors:
-    """Return the errors that the package carries; "plain" are unbiased, and those of the torso are the root's."""
+def rule_errors(kind: JointErrors = "measured") -> tuple[Array, Array]:
+    """Return the bias (17, 2) of the rules, detected less true, and the deviation (17, 2) around it, both in legs.
+
+    docs/studies/make_joint_errors.py measured them. "plain" ones are unbiased, and those of the torso are the root's.
+    """
     stored = json.loads((files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
     if kind == "plain":  # Interpretation V8
         deviation[_TORSO], bias = deviation[AT["root"]], np.zeros_like(bias)
-    return Errors(bias, deviation)
+    return bias, deviation
 
 
 def detected(
@@ -58,9 +43,10 @@ def detected(
     head: float,
     bias: Array,
     assignment: Assignment = "optimal",
-) -> Detection:
-    """Return the points of a silhouette near where they are expected (17, 2).
+) -> tuple[Array, Array, int]:
+    """Return the points (17, 2) of a silhouette, the confidence (17,), 0 to 1, and how many end points are unassigned.
 
+    They are pixels near where they are expected (17, 2); one that is not detected is there, with a confidence of 0.
     What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
     and of the head's radius in pixels; `bias` (17, 2) in legs is taken out.
     """
@@ -89,7 +75,7 @@ def detected(
             place(f"{side} elbow", elbow - bias[AT[f"{side} elbow"]] * leg, near(f"{side} elbow", elbow))
     for side, knee in _knees(lines, points, confidence, expected, gates).items():
         place(f"{side} knee", knee - bias[AT[f"{side} knee"]] * leg, near(f"{side} knee", knee))
-    return Detection(points, confidence, unassigned)
+    return points, confidence, unassigned
 
 
 def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Array, float] | None:

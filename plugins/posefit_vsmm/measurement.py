@@ -112,24 +112,18 @@ class JointCameras:
         covariances = jacobian @ spread @ jacobian.transpose(0, 2, 1)
         gates = DEVIATIONS * np.sqrt(np.einsum("pii->pi", covariances).max(axis=1))
         gates = np.clip(gates, NARROWEST * leg, WIDEST * leg) if self.how.gates else np.full_like(gates, FAR * leg)
-        errors, radius = rule_errors(self.how.joint_errors), head_radius(self.body) * metre
-        detection = detected(lines, pixels, gates, leg, radius, errors.bias, self.how.assignment)
-        variances = self.how.joint_noise * (errors.deviation * leg) ** 2
+        (bias, deviation), radius = rule_errors(self.how.joint_errors), head_radius(self.body) * metre
+        points, sure, unassigned = detected(lines, pixels, gates, leg, radius, bias, self.how.assignment)
+        variances = self.how.joint_noise * (deviation * leg) ** 2
         if self.how.joint_errors == "measured":
-            variances = variances / np.maximum(detection.confidence, LEAST)[:, None]
-        off = detection.points - pixels
+            variances = variances / np.maximum(sure, LEAST)[:, None]
+        off = points - pixels
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
         accepted = (distance < SURPRISE) | (not self.how.gates)
-        confidence = np.where(accepted, detection.confidence, 0.0)
-        own = (detection.confidence > 0.0) & OWN
-        dropped = np.count_nonzero((confidence == 0.0) & (detection.confidence > 0.0))
-        return JointMeasurement(
-            detection.points,
-            confidence,
-            variances,
-            detection.unassigned + int(dropped),
-            float(distance[own].mean() / 2.0) if own.any() else 0.0,
-        )
+        confidence, own = np.where(accepted, sure, 0.0), (sure > 0.0) & OWN
+        dropped = np.count_nonzero((confidence == 0.0) & (sure > 0.0))
+        surprise = float(distance[own].mean() / 2.0) if own.any() else 0.0
+        return JointMeasurement(points, confidence, variances, unassigned + int(dropped), surprise)
 
     def measure(self, state: Array, measured: Sequence[JointMeasurement], known: Array | None) -> Measurement:
         """Return the residuals of detected joints for a state (43,). Hidden joints have no row. Interpretation V9."""

@@ -19,7 +19,6 @@ from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import parsed_json, read_text
 from posefit_vsmm import kernels
-from posefit_vsmm.imm import product
 from posefit_vsmm.settings import Poses, Shrink
 from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
 
@@ -59,11 +58,11 @@ class MotionModel:
 
     def nearest(self, state: Array, among: Poses = "typical") -> Array:
         """Return a state (43,) with its place and heading, in the pose nearest to it. Interpretation V16."""
-        back, quaternions = without_heading(state)
+        heading, quaternions = without_heading(state)
         poses = self.poses if among == "typical" else self.captured
         similarity = np.abs(np.einsum("nij,ij->ni", poses.reshape(len(poses), -1, 4), quaternions))
         pose = poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
-        pose[:4] = product(back, pose[:4])
+        pose[:4] = turned(pose[:4], *heading)
         same_sign = np.where((pose * state[3:]).reshape(-1, 4).sum(axis=1) < 0.0, -1.0, 1.0)
         return unit(np.concatenate([state[:3], pose * np.repeat(same_sign, 4)]))
 
@@ -162,28 +161,10 @@ def _library(stored: dict[str, Any], shrink: Shrink) -> Library:
     return Library(models, reliance, {name: one["report"] for name, one in stored["models"].items()})
 
 
-def ridge(before: Array, after: Array, weight: float = LAMBDA) -> Array:
-    """Return F (43, 40): the one of least |F X - X'|^2 + weight |F|^2 over states X (n, 43) at the origin, X' after."""
-    inputs = before[:, 3:]
+def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:
+    """Return F (m, k): the one of least |F x - y|^2 + weight |F|^2 over inputs x (n, k) and outputs y (n, m)."""
     normal = inputs.T @ inputs + weight * np.eye(inputs.shape[1])  # VSMM 3
-    return np.asarray(np.linalg.solve(normal, inputs.T @ after).T)
-
-
-def normalised_ridge(before: Array, after: Array, target: Array, weight: float = LAMBDA) -> tuple[Array, Array]:
-    """Return F less the identity (43, 40) and the offset (43,), drawn towards `target` (43, 40). Interpretation V5.
-
-    The penalty is `weight` a frame, in units of the quaternions' mean spread, so that it is not lost among many frames.
-    """
-    inputs = before[:, 3:]
-    middle = inputs.mean(axis=0)
-    unit = np.sqrt(inputs.var(axis=0).sum() / (len(inputs[0]) / 4))
-    scaled = (inputs - middle) / unit
-    wanted = after - before - inputs @ target.T
-    wanted[:, [0, 2]] = 0.0  # the way over the ground is not predicted: stepping on the spot is walking, too
-    mean = wanted.mean(axis=0)
-    normal = scaled.T @ scaled + weight * len(scaled) * np.eye(scaled.shape[1])
-    matrix = np.linalg.solve(normal, scaled.T @ (wanted - mean)).T / unit
-    return matrix + target, mean - matrix @ middle
+    return np.asarray(np.linalg.solve(normal, inputs.T @ outputs).T)
 
 
 def leg_of(skeleton: Skeleton) -> float:
@@ -191,11 +172,16 @@ def leg_of(skeleton: Skeleton) -> float:
     return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
 
 
-def without_heading(state: Array) -> tuple[Array, Array]:
-    """Return the heading (4,) of a state (43,), and its quaternions (10, 4) without it, with w positive.
+def without_heading(state: Array) -> tuple[tuple[float, float], Array]:
+    """Return the heading (w, y) of a state (43,), and its quaternions (10, 4) without it, with w positive.
 
     The heading is the part of the first one that turns about the vertical.
     """
     quaternions = np.empty((len(state) // 4, 4))
-    w, y = kernels.headed(state, quaternions.reshape(-1), np.empty(len(quaternions)))
-    return np.array([w, 0.0, y, 0.0]), quaternions
+    return kernels.headed(state, quaternions.reshape(-1), np.empty(len(quaternions))), quaternions
+
+
+def turned(quaternion: Array, w: float, y: float) -> Array:
+    """Return a quaternion (4,) turned about the vertical by another one, (w, 0, y, 0)."""
+    a, b, c, d = quaternion.tolist()
+    return np.array([w * a - y * c, w * b + y * d, w * c + y * a, w * d - y * b])

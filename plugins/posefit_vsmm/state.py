@@ -114,8 +114,3 @@ _BETWEEN = {
 POINTS = tuple(_BETWEEN)
 AT = {name: k for k, name in enumerate(POINTS)}
 ENDS = np.array([[JOINTS.index(joint) for joint in pair] for pair in _BETWEEN.values()])  # (17, 2) two joints a point
-
-
-def points_of(joints: Array) -> Array:
-    """Return the points (..., 17, 3) of joints (..., 27, 3)."""
-    return np.asarray(0.5 * (joints[..., ENDS[:, 0], :] + joints[..., ENDS[:, 1], :]))

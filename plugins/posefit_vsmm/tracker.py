@@ -15,11 +15,11 @@ from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import read_topology
-from posefit_vsmm.imm import Belief, Measurement, product
+from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
-from posefit_vsmm.motion import STIFF, MotionModel, library
+from posefit_vsmm.motion import STIFF, MotionModel, library, turned
 from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
@@ -73,7 +73,8 @@ def estimated_state(
     """
     yaws = ALL_AROUND if yaw is None else yaw + NEAR
     typical = np.concatenate([model.poses for model in models])
-    states = np.array([_placed(pose, float(one), anchor) for one in yaws for pose in typical])
+    turns = [(float(np.cos(0.5 * one)), float(np.sin(0.5 * one))) for one in yaws]
+    states = np.array([[*anchor, *turned(pose[:4], *turn), *pose[4:]] for turn in turns for pose in typical])
     room = max(1, min(len(states), int(SHARE * budget)) - (given is not None))
     states = states[np.linspace(0, len(states) - 1, room).astype(np.int64)]
     if given is not None:
@@ -87,23 +88,11 @@ def estimated_state(
         errors[:, :3] = 0.0
         errors *= matcher.free
         costs, states = matcher.costs(np.array([plus(best, error) for error in errors]))
-        costs = costs + np.array([_deviation_cost(state, home) for state in states])
+        costs += [((minus(state, home)[3:] / TYPICAL_DEVIATION) ** 2).sum() for state in states]
         if costs.min() < least:
             best, least = states[costs.argmin()], float(costs.min())
         left, turn = left - ROUND, turn + 1
     return np.asarray(best)
-
-
-def _deviation_cost(state: Array, home: Array) -> float:
-    """Return the cost of a state's deviation from the typical pose, beside that of its silhouette."""
-    return float(((minus(state, home)[3:] / TYPICAL_DEVIATION) ** 2).sum())
-
-
-def _placed(pose: Array, yaw: float, anchor: Array) -> Array:
-    """Return the state of a typical pose (40,) that faces a way and stands somewhere."""
-    turned = pose.copy()
-    turned[:4] = product(np.array([np.cos(0.5 * yaw), 0.0, np.sin(0.5 * yaw), 0.0]), pose[:4])
-    return np.concatenate([anchor, turned])
 
 
 MAX_BLIND_FRAMES = 15  # frames that the models go on alone without a visible person; then the track is lost

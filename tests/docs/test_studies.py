@@ -73,3 +73,22 @@ def test_an_interval_holds_the_median() -> None:
     low, high = table.interval(values, "abcde")
     assert 1.0 <= low <= 3.0 <= high <= 5.0
     assert table.interval(values, "aaaaa") == (3.0, 3.0)
+
+
+def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target() -> None:  # Interpretation V5
+    import numpy as np
+
+    rng, models = np.random.default_rng(1), importlib.import_module("make_models")
+    before = np.column_stack([np.zeros((90, 3)), rng.normal(0.0, 0.3, (90, 40))])
+    after = before + rng.normal(0.0, 0.05, before.shape)
+    inputs, target = before[:, 3:], 0.1 * rng.normal(size=(43, 40))
+    matrix, offset = models.normalised_ridge(before, after, target, 0.15)
+    unit = np.sqrt(inputs.var(axis=0).sum() / 10.0)
+    scaled = (inputs - inputs.mean(axis=0)) / unit
+    wanted = after - before - inputs @ target.T
+    wanted[:, [0, 2]] = 0.0  # the way over the ground
+    rows = np.vstack([scaled, np.sqrt(0.15 * len(scaled)) * np.eye(40)])
+    outputs = np.vstack([wanted - wanted.mean(axis=0), np.zeros((40, 43))])
+    flow = np.linalg.lstsq(rows, outputs, rcond=None)[0]
+    assert np.allclose(matrix, flow.T / unit + target)
+    assert np.allclose(inputs @ (matrix - target).T + offset, scaled @ flow + wanted.mean(axis=0))

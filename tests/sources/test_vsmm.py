@@ -232,10 +232,10 @@ def test_the_mean_of_turns_about_three_axes_is_where_their_errors_balance() -> N
 
 def test_a_covariance_that_is_none_is_repaired_and_counted() -> None:
     broken = np.diag([1.0, -0.5])
-    mended, repaired = positive_definite(broken)
-    assert repaired == 1
+    mended, repairs = positive_definite(np.array([broken, np.diag([1.0, 2.0])]))
+    assert repairs == 1
     assert np.linalg.eigvalsh(mended).min() > 0.0
-    np.testing.assert_allclose(positive_definite(np.diag([1.0, 2.0]))[0], np.diag([1.0, 2.0]))
+    np.testing.assert_allclose(mended[1], np.diag([1.0, 2.0]))
     imm = IMM(MODELS, TRANSITION)
     belief = start(np.zeros(4), np.diag([1.0, 1.0, -1e-3, 1.0]), 2)
     after = imm.cycle(belief, measuring(np.zeros(2)))
