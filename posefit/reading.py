@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from posefit.errors import InputError
+from posefit.errors import InputError, printable
 
 SHOWN = 80  # characters of a name or value in a message
 DOTS = 1_000  # in a line of TOML, those of decimal numbers aside
@@ -38,7 +38,8 @@ def quoted(value: object, most: int = SHOWN) -> str:
 
 
 def cut(text: str, most: int = SHOWN) -> str:
-    """Return a text, cut where it is long."""
+    """Return a text on one line, cut where it is long."""
+    text = printable(text[: most + 1])
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 

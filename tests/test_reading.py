@@ -5,7 +5,7 @@ import os
 import pytest
 
 from posefit.errors import InputError
-from posefit.reading import SHOWN, parsed_json, parsed_toml, quoted, read_text
+from posefit.reading import SHOWN, cut, parsed_json, parsed_toml, quoted, read_text
 from tests.cases import each
 
 
@@ -13,6 +13,7 @@ def test_what_a_message_quotes_is_cut_at_80_characters():
     assert quoted("walk") == "'walk'"
     assert len(quoted("n" * 10_000)) == SHOWN == 80
     assert quoted("n" * 10_000).endswith("...")
+    assert cut("\0" * 80) == r"\x00" * 19 + r"\..."
     assert quoted(16**5000) == "one int that is too long to write"  # Python writes 4,300 digits at most
 
 
