@@ -134,6 +134,18 @@ def test_what_a_page_shows_as_printed_is_compared_or_has_its_reason() -> None:
             assert block.page in compared, f"{block} follows no block that is run"
 
 
+def test_messages_that_are_explained_exist() -> None:
+    code = " ".join(
+        path.read_text("utf-8") for folder in ("posefit", "plugins") for path in (ROOT / folder).rglob("*.py")
+    )
+    code = re.sub(r'"\s*f?"', "", code)  # of a text over several lines
+    page = (ROOT / "docs/howto/troubleshooting.md").read_text("utf-8")
+    messages = re.findall(r"^\| `([^`]+)`", page, re.MULTILINE)
+    assert len(messages) > 15
+    parts = [(message, part.strip()) for message in messages for part in message.split("...")]
+    assert [message for message, part in parts if part not in code] == []
+
+
 def test_pages_import_posefit_and_its_plugin_module_alone() -> None:
     deep = [str(block) for block in BLOCKS if re.search(r"(from|import) posefit\.(?!plugin\b)", block.text)]
     assert deep == []
