@@ -1,5 +1,6 @@
 """The blocks of code in README and the handbook."""
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -33,12 +34,16 @@ class Block:
 
 def pages() -> list[Path]:
     """Return README and every page of the handbook that was written by hand."""
-    written = [path for path in DOCS.rglob("*.md") if not {"_build", "generated"} & set(path.parts)]
+    files = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
+    written = [path for path in files if not {"_build", "generated"} & set(path.parts)]
     return [ROOT / "README.md", *sorted(written)]
 
 
 def blocks(page: Path) -> Iterator[Block]:
     """Yield the blocks of a page, in order; not those that are instructions to the builder."""
+    if page.suffix == ".ipynb":
+        yield from _cells(page)
+        return
     text = _MADE.sub(lambda made: "\n" * made[0].count("\n"), page.read_text("utf-8"))
     for block in _BLOCK.finditer(text):
         language = block["language"].strip()
@@ -48,3 +53,15 @@ def blocks(page: Path) -> Iterator[Block]:
         marked = _MARK.search(before)
         why = ("", "") if marked is None else (marked["mark"], marked["reason"])
         yield Block(str(page.relative_to(ROOT)), before.count("\n") + 1, language, block["text"], *why)
+
+
+def _cells(page: Path) -> Iterator[Block]:
+    """Yield the cells of a notebook that hold code, each with what it prints."""
+    name = str(page.relative_to(ROOT))
+    for k, cell in enumerate(json.loads(page.read_text("utf-8"))["cells"]):
+        if cell["cell_type"] == "code":
+            yield Block(name, k, "python", "".join(cell["source"]))
+            printed = "".join(
+                "".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream"
+            )
+            yield Block(name, k, "text", printed)
