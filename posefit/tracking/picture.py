@@ -42,6 +42,7 @@ from posefit.uncertainty.modes import Mode, other_mode
 
 PANEL = 480  # pixels high
 SUMMARY_STILLS = 6  # frames on the summary
+SUMMARY_SCALE = 0.65  # of its words, which a page shows at three quarters of their size
 LABEL_HEIGHT = 38  # pixels that the label stands on
 SOLID = 0.65  # how much of the footage the body hides
 DRAWN_LEVEL = LEVELS.index(0.8)  # the interval that a limb fades by
@@ -82,6 +83,8 @@ class Painter:
         draw_body(side, body, from_side, pose, place, solid)
         self._draw_other(side, from_side, other)
         image = np.hstack([left, side])
+        if self._count in self._wanted:
+            self._stills.append(self._still(image, row))
         label = [f"frame {self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
         label += [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
         label += [] if observation.usable else ["pose held"]
@@ -89,8 +92,7 @@ class Painter:
         write(image, "   ".join(label), (12, 26))
         write(image, "from the camera's right", (width + 12, 26))
         if filmed is None:
-            for k, (name, colour) in enumerate((("both", BOTH), ("observed only", MISSED), ("body only", SPILLED))):
-                write(image, name, (12 + 130 * k, PANEL - 14), colour)
+            _write_legend(image, PANEL - 14)
         lost = row["lost"] >= LOST
         notes = [("lost", MISSED)] if lost else []
         notes += [("left and right unknown", OTHER)] if row["unknown_sides"] == 1.0 else []
@@ -98,12 +100,20 @@ class Painter:
         for k, (words, colour) in enumerate(reversed(notes)):
             write(image, words, (width + 12, PANEL - 14 - LINE_HEIGHT * k), colour)
         if lost:
-            cv2.rectangle(image, (0, 0), (image.shape[1] - 1, PANEL - 1), MISSED, 2 * BORDER - 1)
-        if self._count in self._wanted:
-            still = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-            self._stills.append(np.asarray(still, np.uint8))
+            _draw_border(image, BORDER)
         self._count += 1
         return image
+
+    def _still(self, image: Image, row: Mapping[str, float]) -> Image:
+        """Return a small picture whose words are large enough to be read in a page."""
+        still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+        worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
+        label = f"frame {self._count}, {worth}"
+        still[:LABEL_HEIGHT, : width_of(label, SUMMARY_SCALE) + 24] //= 4
+        write(still, label, (12, 26), scale=SUMMARY_SCALE)
+        if row["lost"] >= LOST:
+            _draw_border(still, BORDER // 2)
+        return still
 
     def overlay(
         self,
@@ -149,16 +159,31 @@ class Painter:
         Where a method says how sure it is, a chart of that stands below: of the radii (T, levels, 27) of the joints'
         intervals, and of `title`, which says in words what was not determined. `trust` is a sentence at the top.
         """
-        grid = _grid(self._stills, 3, BACKGROUND[0])
+        grid = _grid(self._stills, 2, BACKGROUND[0])
+        if self._scene.pictures is None:
+            grid = np.vstack([grid, np.full((LABEL_HEIGHT, *grid.shape[1:]), BACKGROUND, np.uint8)])
+            _write_legend(grid, grid.shape[0] - 12, SUMMARY_SCALE)
         name, width = "error_degrees" if "error_degrees" in rows[0] else "cost", grid.shape[1]
-        parts = [grid, curve([row[name] for row in rows], name.replace("_", " "), width, 160)]
+        parts = [grid, curve([row[name] for row in rows], name.replace("_", " "), width, 180)]
         if trust:
             head = np.full((LABEL_HEIGHT, width, 3), BACKGROUND, dtype=np.uint8)
-            write(head, trust, (12, 26), scale=min(0.6, 0.6 * (width - 24) / width_of(trust, 0.6)))
+            write(head, trust, (12, 26), scale=SUMMARY_SCALE * min(1.0, (width - 24) / width_of(trust, SUMMARY_SCALE)))
             parts.insert(0, head)
         if radii is not None or np.isfinite([[row["unknown_sides"], row["lost"]] for row in rows]).any():
             parts.append(certainty_chart(rows, radii, title, width, 240))
         return np.vstack(parts)
+
+
+def _draw_border(image: Image, width: int) -> None:
+    cv2.rectangle(image, (0, 0), (image.shape[1] - 1, image.shape[0] - 1), MISSED, 2 * width - 1)
+
+
+def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
+    """Write what the colours of an overlay on masks mean."""
+    at = 12
+    for name, colour in (("both", BOTH), ("observed only", MISSED), ("body only", SPILLED)):
+        write(image, name, (at, row), colour, scale)
+        at += width_of(name, scale) + 24
 
 
 def _panel(image: Image, height: int, sharp: bool = False) -> Image:
@@ -181,9 +206,9 @@ def _grid(panels: list[Image], columns: int, background: int) -> Image:
 
 
 # Charts below the stills: a figure over the frames, and how certain the track is, with marks of frames.
-LEFT_MARGIN, RIGHT_MARGIN = 56, 16  # pixels
-HEAD, FOOT = 46, 50  # pixels of what is written above, and of the two rows of marks below
-MARKS_HEIGHT = 12  # pixels of a row of marks
+LEFT_MARGIN, RIGHT_MARGIN = 66, 16  # pixels
+HEAD, FOOT = 60, 54  # pixels of what is written above, and of the two rows of marks below
+MARKS_HEIGHT = 14  # pixels of a row of marks
 GRID_STEPS = (5, 10, 20, 50, 100, 200, 500, 1000)  # millimetres between two lines
 BAND_STRENGTHS = (0.85, 0.5, 0.25)  # of the bands' colour, the narrowest first
 ROOT = JOINTS.index("root")  # which every interval is relative to
@@ -195,9 +220,9 @@ def curve(values: Sequence[float], name: str, width: int, height: int) -> Image:
     top = max(max(values), 1e-9) * 1.15
     x, _ = _columns(len(values), width)
     for level in (0.0, float(np.mean(values)), max(values)):
-        _grid_line(image, f"{level:.2f}", int(height - 24 - level / top * (height - 48)))
-    _polyline(image, x, height - 24 - np.array(values) / top * (height - 48))
-    write(image, f"{name}, frame by frame: 0, mean and maximum", (60, 16), scale=0.45)
+        _grid_line(image, f"{level:.2f}", int(height - 24 - level / top * (height - 56)))
+    _polyline(image, x, height - 24 - np.array(values) / top * (height - 56))
+    write(image, f"{name}, frame by frame: 0, mean and maximum", (LEFT_MARGIN, 20), scale=SUMMARY_SCALE)
     return image
 
 
@@ -244,16 +269,16 @@ def certainty_chart(
                 np.rint(np.clip([at - half, at + half], LEFT_MARGIN, width - RIGHT_MARGIN)).astype(int).tolist()
             )
             cv2.rectangle(image, (left, row), (right, row + MARKS_HEIGHT), colour, -1)
-        write(image, label, (8, row + MARKS_HEIGHT - 2), colour, 0.4)
-    write(image, title or "nothing is reported as unknown or lost", (60, 16), scale=0.45)
+        write(image, label, (8, row + MARKS_HEIGHT), colour, SUMMARY_SCALE - 0.1)
+    write(image, title or "nothing is reported as unknown or lost", (LEFT_MARGIN, 20), scale=SUMMARY_SCALE)
     levels = ", ".join(f"{100 * level:.0f}" for level in LEVELS)
     legend = [("mm, the mean over joints:", TEXT)] if radii is not None or error_known else []
     legend += [(f"intervals of {levels} %", RIGHT)] if radii is not None else []
     legend += [("true error", BOTH)] if error_known else []
-    at = 60
+    at = LEFT_MARGIN
     for word, colour in [*legend, ("left and right unknown", OTHER), ("lost", MISSED)]:
-        write(image, word, (at, 34), colour, 0.45)
-        at += width_of(word, 0.45) + 18
+        write(image, word, (at, 44), colour, SUMMARY_SCALE)
+        at += width_of(word, SUMMARY_SCALE) + 18
     return image
 
 
@@ -265,7 +290,7 @@ def _columns(count: int, width: int) -> tuple[Array, float]:
 
 def _grid_line(image: Image, label: str, row: int) -> None:
     cv2.line(image, (LEFT_MARGIN, row), (image.shape[1] - RIGHT_MARGIN, row), LINES, 1)
-    write(image, label, (8, row + 4), scale=0.4)
+    write(image, label, (8, row + 6), scale=SUMMARY_SCALE - 0.1)
 
 
 def _polyline(image: Image, x: Array, y: Array) -> None:
