@@ -13,8 +13,9 @@ from posefit.ambiguity.estimate import YAWS, Ambiguity, Floor
 from posefit.files import new_folder
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import JOINTS, kind
+from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import facing
+from posefit.measuring.centres import PLACES
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, draw_body, side_view, write
@@ -94,10 +95,10 @@ def ambiguity_table(result: Ambiguity) -> str:
 
 
 def by_kind(joints_mm: Any) -> dict[str, float]:
-    """Return the spreads (27,) by kind of joint: the root mean square of left and right."""
+    """Return the spreads (27,) by place on the body: the root mean square of left and right."""
     squares: dict[str, list[float]] = {}
-    for name, value in zip(JOINTS[1:], joints_mm[1:], strict=True):
-        squares.setdefault(kind(name), []).append(float(value) ** 2)
+    for name, value in zip(PLACES[1:], joints_mm[1:], strict=True):
+        squares.setdefault(name.removeprefix("left_").removeprefix("right_"), []).append(float(value) ** 2)
     return {name: float(np.sqrt(np.mean(values))) for name, values in squares.items()}
 
 
