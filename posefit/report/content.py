@@ -1,5 +1,6 @@
 """The data of a report's page: what was run, the leader, how certain that is, and every run."""
 
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
+from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.registry import claimed_orders
 from posefit.report import curves
@@ -35,7 +37,7 @@ from posefit.report.summary import (
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.tally import SHOWN
-from posefit.sweep.ledger import Ledger
+from posefit.sweep.ledger import ROWS, Ledger
 from posefit.tracking.measures import BASELINES
 
 REASONS = 5  # of failures, the most frequent ones, that the first screen names
@@ -94,13 +96,15 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
             "taking_part": contest.methods,
             **(_search_curves(contest) if runs.is_search else _track_curves(contest, board[0]["method"])),
         }
+    changed = (ledger.path / ROWS).stat().st_mtime
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
     data |= {
         "title": "Report of single searches" if runs.is_search else "Report of a sweep",
         "headline": answer,
+        "made": f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', time.localtime(changed))}",
         "header": _header(runs, contest),
         "methods": [{"name": name, **fields} for name, fields in zip(runs.methods, runs.variants, strict=True)],
-        "joints": JOINTS,
+        "joints": [place.replace("_", " ") for place in PLACES],
         "parents": PARENTS,
         "sides": SIDES,
         "colours": COLOURS,

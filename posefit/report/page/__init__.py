@@ -13,9 +13,8 @@
 
 The constant `D` is the data that `posefit.report.content` returns.
 
-Methods have the colours of Okabe and Ito, Color universal design, 2008, which colour-blind readers can distinguish,
-without their yellow: darker on white and lighter on black, so that each has a contrast of at least 4.5 to 1 with its
-background. Marks distinguish methods too.
+No method has orange or blue, the colours of left and right limbs. All colours are darker on white and lighter on black,
+so that each has a contrast of at least 4.5 to 1 with its background. Marks distinguish methods too.
 """
 
 from typing import Any
@@ -26,14 +25,14 @@ from posefit.tracking.page import BODY_DARK, BODY_LIGHT
 
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 SCRIPTS = ("methods", "curves", "first", "tables", "compare", "gallery", "main")  # in this order
-_LIGHT = ("#0063a6", "#b84500", "#00775a", "#a63d80", "#7a5c00", "#6b4cc0", "#111111")
-_DARK = ("#4aa8e0", "#f08a3c", "#2cc79a", "#e39cc6", "#f0b53c", "#b9a3ff", "#f2f2f2")
+_LIGHT = ("#00775a", "#a63d80", "#7a5c00", "#6b4cc0", "#111111", "#b0123b", "#3d6b7d")
+_DARK = ("#2cc79a", "#e39cc6", "#d9cf6a", "#b9a3ff", "#f2f2f2", "#ff8095", "#8fb8c9")
 COLOURS = len(_LIGHT)
 
 LIGHT = {f"c{k}": colour for k, colour in enumerate(_LIGHT)} | BODY_LIGHT
-LIGHT |= {"middle": "var(--ink)", "estimate": _LIGHT[1], "swapped": _LIGHT[3]}
+LIGHT |= {"middle": "var(--ink)", "estimate": "#b84500", "swapped": "#a63d80"}
 DARK = {f"c{k}": colour for k, colour in enumerate(_DARK)} | BODY_DARK
-DARK |= {"middle": "var(--ink)", "estimate": _DARK[1], "swapped": hexadecimal(OTHER)}
+DARK |= {"middle": "var(--ink)", "estimate": "#f08a3c", "swapped": hexadecimal(OTHER)}
 
 
 def document(data: dict[str, Any]) -> str:

@@ -117,11 +117,11 @@ function joints() {
     const shown = visible();
     const row = 20;
     const to = 1.05 * Math.max(1, ...shown.flatMap(([, place]) => [...D.joint_errors[place].values]));
-    const box = { width, height: row * D.joints.length + 44, left: 84, right: 14, top: 4, bottom: 40 };
+    const box = { width, height: row * D.joints.length + 44, left: 112, right: 14, top: 4, bottom: 40 };
     const x = { to, marks: steps(0, to, Math.max(3, width / 110)), show: whole, label: "mm", rules: true };
     const { svg, at } = axes({ ...box, name: "error of each joint" }, x);
     D.joints.forEach((joint, j) => {
-      svg.append(drawText(76, row * j + 18, joint, { "text-anchor": "end" }));
+      svg.append(drawText(104, row * j + 18, joint, { "text-anchor": "end" }));
       shown.forEach(([m, place], k) => {
         const { values, low, high } = D.joint_errors[place];
         const y = row * j + 7 + (shown.length > 1 ? (13 * k) / (shown.length - 1) : 6);

@@ -4,11 +4,28 @@ const MAX_MISSING = 20; // instances that a note names
 const MAX_WARNINGS = 5; // that it names
 
 function firstScreen() {
+  chips();
   $("standing-note").textContent = D.score.caption;
   drawn($("standing"), standing);
   const more = D.leaderboard.filter((row) => row.taking_part).length - MAX_METHODS;
   if (more > 0) $("standing-note").append(` The ${MAX_METHODS} best; ${whole(more)} more are in the table.`);
   examples();
+}
+
+// The leader, who may be as good, and the baseline, each in a few words.
+function chips() {
+  const { name: of, digits, better } = D.score;
+  const [first] = D.leaderboard;
+  const ends = given(first.low) ? ` (${number(first.low, digits)} to ${number(first.high, digits)})` : "";
+  const sign = better === "more" ? -1 : 1;
+  const [base] = D.baselines.filter((row) => given(row[of])).sort((a, b) => sign * (a[of] - b[of]));
+  const all = [
+    ["leader", `${first.name} ${scored(first[of])}${ends}`],
+    ["not shown to be worse", D.not_worse.map((m) => METHODS[m]).join(", ")],
+    ["best baseline", base ? `${D.baseline_names[base.baseline]} ${scored(base[of])}` : ""],
+  ];
+  for (const [about, text] of all)
+    if (text) $("chips").append(make("li", {}, make("small", {}, about), make("strong", {}, text)));
 }
 
 function standing(width) {
@@ -21,7 +38,8 @@ function standing(width) {
   const narrow = width < 480;
   const step = narrow ? 38 : 26;
   const left = narrow ? 14 : 24 + Math.max(...rows.map((row) => textWidth(shortened(row.name, 27), 700)));
-  const right = narrow ? 12 : 66;
+  const lost = (row) => (D.columns.lost && given(row.lost) ? ` ${shownAs("lost", row.lost)} % lost` : "");
+  const right = narrow ? 12 : 66 + Math.max(...rows.map((row) => textWidth(lost(row))));
   // a logarithmic scale where less is better and the worst is far from the best
   const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((one) => one > 0));
   const [least, most] = [Math.min(...values), Math.max(...values)];
@@ -51,11 +69,13 @@ function standing(width) {
     const y = top + step * (k + 0.5) + (narrow ? 8 : 0);
     const best = k === 0 || D.not_worse.includes(row.method) ? "best" : "";
     const short = shortened(row.name, narrow ? 34 : 27);
-    if (narrow) svg.append(drawText(left, y - 11, `${short}  ${scored(row[of])}`, { class: `over ${best}` }));
+    if (narrow)
+      svg.append(drawText(left, y - 11, `${short}  ${scored(row[of])}${lost(row)}`, { class: `over ${best}` }));
     else
       svg.append(
         drawText(left - 12, y + 4, short, { "text-anchor": "end", class: best }),
         drawText(width - right + 12, y + 4, scored(row[of]), { class: best }),
+        drawText(width - 4, y + 4, lost(row), { "text-anchor": "end", class: "soft" }),
       );
     if (given(row.low))
       svg.append(drawLine(at(row.low), y, at(row.high), y, { ...stroke(row.method, 3), "stroke-dasharray": null }));

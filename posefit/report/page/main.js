@@ -18,7 +18,11 @@ const SECTIONS = {
 
 document.title = `posefit: ${D.title}`;
 $("title").textContent = D.title;
-$("headline").textContent = D.headline;
+$("made").textContent = D.made;
+const [claim, ...because] = D.headline.split("; ");
+$("headline").textContent = because.length ? `${claim}.` : claim;
+$("whole").textContent = D.headline;
+if (!because.length) $("verdict-whole").remove();
 $("summary").textContent = D.header.summary;
 details(D.header);
 live();

@@ -1,5 +1,6 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
 const PAGE = 50; // rows
+const FIRST_FIGURES = ["lost", "mpjpe", "above"]; // of the leaderboard, before more columns are asked for
 
 // A column: its title, or one for screen readers alone, `of` to sort by, and what is shown of it. `of` is a name in a
 // row, or a function of the row.
@@ -39,10 +40,12 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
     [sorted, start] = [k, 0];
     show();
   };
-  const heads = columns.map(({ title, unseen, text, value, about }, k) => {
+  const kinds = ({ text, more }) => [text && "text", more && "more"].filter(Boolean).join(" ") || null;
+  const heads = columns.map((one, k) => {
+    const { title, unseen, value, about } = one;
     const content = title ?? make("span", { class: "unseen" }, unseen);
     const head = value ? button(title, () => sort(k), { title: about }) : content;
-    return make("th", { scope: "col", class: text ? "text" : null }, head);
+    return make("th", { scope: "col", class: kinds(one) }, head);
   });
   const pager = make("div", { class: "row pager" });
   const leaf = (text, count, disabled) =>
@@ -65,10 +68,10 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
       .map((pair) => pair[1]);
   }
 
-  function cell({ text, show: shown }, row) {
-    const content = shown(row);
-    const title = text && typeof content === "string" ? content : null;
-    return make("td", { class: text ? "text" : null, title }, ...[content].flat());
+  function cell(one, row) {
+    const content = one.show(row);
+    const title = one.text && typeof content === "string" ? content : null;
+    return make("td", { class: kinds(one), title }, ...[content].flat());
   }
 
   function show() {
@@ -108,19 +111,27 @@ function leaderboard() {
   const tested = `Wilcoxon's signed ranks over ${paired}, Holm over ${pairs}, 5 %`;
   const about = `Methods that share a letter do not differ significantly: ${tested}`;
   const letters = (row) => row.letters ?? "";
+  const more = (one) => ({ ...one, more: true });
   const columns = [
     textColumn("method", name, method),
     figure(score),
     intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : alone)),
     textColumn("group", letters, letters, { about }),
-    ...figures.map((one) => figure(one)),
-    { title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) },
+    ...figures.filter((one) => FIRST_FIGURES.includes(one)).map((one) => figure(one)),
     badColumn("failed", (row) => row.failed),
     ...(D.warnings.length ? [badColumn("warned", (row) => warned[row.method], "Runs with a warning")] : []),
+    ...figures.filter((one) => !FIRST_FIGURES.includes(one)).map((one) => more(figure(one))),
+    more({ title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) }),
   ];
+  const box = $("leaders");
+  box.classList.add("few");
+  const toggle = button("more columns", () => {
+    toggle.textContent = box.classList.toggle("few") ? "more columns" : "fewer columns";
+  });
+  box.before(toggle);
   const order = { by: 1, down: D.score.better === "more" };
   const kind = (row) => (row.base ? "base" : null);
-  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", ...order, kind });
+  table(box, columns, [...D.leaderboard, ...bases], { name: "Leaderboard", ...order, kind });
 }
 
 // Buttons to watch a run, if it has an animation, and for the command that runs it again.
