@@ -139,9 +139,9 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
-            raise InputError(f"--set must be SETTING=VALUE such as population_size=20, got {quoted(text)}")
+            raise InputError(f"a setting must be SETTING=VALUE such as population_size=20, got {quoted(text)}")
         if (name := setting.rpartition(".")[2]) in given:
-            raise InputError(f"--set must give a setting once, got {quoted(name)} twice")
+            raise InputError(f"a setting must be given once, got {quoted(name)} twice")
         given[name] = value
     return parse(plugin, factory, given)
 

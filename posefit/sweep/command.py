@@ -18,6 +18,7 @@ from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
 
 DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
+LISTED = 20  # cells of a preview
 
 Say = Callable[[str], None]
 
@@ -99,8 +100,10 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
         if as_json:
             line = json.dumps({"key": cell.key, "done": done, **cell.spec})
             yield line if k == len(cells) - 1 else f"{line},"
-        else:
+        elif k < LISTED:
             yield f"{cell.key[:8]}  {cell.summary}{'  done' if done else ''}"
+    if len(cells) > LISTED and not as_json:
+        yield f"and {len(cells) - LISTED:,} more; --json lists all of them"
     estimate = Estimate(0.0, {})
     if left:
         with closing(start()) as running:

@@ -174,11 +174,13 @@ def parsed_settings(
         left, equals, value = item.partition("=") if texts else (item, "=", None)
         name, dot, setting = left.partition(".")
         if not (equals and dot):
-            raise InputError(f"--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
+            raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
-            raise InputError(f"--set must name one of {', '.join(places)}, which are in use here, got {quoted(item)}")
+            raise InputError(
+                f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(item)}"
+            )
         if setting in each[name]:
-            raise InputError(f"--set must give a setting once, got {quoted(left)} twice")
+            raise InputError(f"a setting must be given once, got {quoted(left)} twice")
         each[name][setting] = given[item] if isinstance(given, Mapping) else value
     parsed: dict[str, dict[str, Any]] = {}
     for name, (kind, factory) in places.items():

@@ -345,7 +345,7 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     assert passed in report["results"]
     assert "optimiser must be one of" in fails("check", "optimiser", "nothing")
     assert "a setting of pca must be one of" in fails("check", "prior", "pca", "--set", "colour=red")
-    assert "--set must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
+    assert "a setting must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
 
 
 def installed(kind: str, name: str, folder: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
@@ -432,9 +432,12 @@ def test_settings_are_given_by_plugin_and_name() -> None:
 
 def test_a_setting_that_makes_no_sense_is_one_line() -> None:
     for text, message in [
-        ("sapso", "--set must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
-        ("sapso=3", "--set must be NAME.SETTING=VALUE"),
-        ("lens.phi=4.2", "--set must name one of annealed, pca, tracker, which are in use here, got 'lens.phi=4.2'"),
+        ("sapso", "a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
+        ("sapso=3", "a setting must be NAME.SETTING=VALUE"),
+        (
+            "lens.phi=4.2",
+            "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi=4.2'",
+        ),
         ("sapso.coling=1", "did you mean 'cooling'"),
         ("sapso.cooling=cold", "sapso.cooling must be float, got 'cold'"),
         ("sapso.cooling=2", "cooling must lie in 0 to 1, got 2"),
