@@ -18,7 +18,7 @@ from posefit.arrays import Array
 from posefit.footage.masks import Views
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image, Person
-from posefit.silhouette.mask import Mask, Silhouette
+from posefit.silhouette.mask import Mask, Silhouette, box_of
 
 # of a frame
 AREA_FRAMES = 15  # latest frames that a frame's area is compared with
@@ -64,7 +64,7 @@ class FrameQuality:
 
         Its area must not be far from that of the frames before either, where they are like a person's.
         """
-        left, top, right, bottom = _box(person.mask) if person.area else (0, 0, 0, 0)
+        left, top, right, bottom = box_of(person.mask) if person.area else (0, 0, 0, 0)
         side = max(right - left, bottom - top)
         outside = self._outside(image, person, side)
         ghost = self._is_ghost(image, person.mask)
@@ -103,7 +103,7 @@ class FrameQuality:
         earlier, mask = self._before[0]
         covered = person.mask | mask
         reach = max(side, *self._sides) if self._sides else side
-        (left, top, right, bottom), far = _box(covered), round(AROUND * reach)
+        (left, top, right, bottom), far = box_of(covered), round(AROUND * reach)
         window = np.s_[max(0, top - far) : bottom + far, max(0, left - far) : right + far]
         changed = changed_pixels(image, earlier)[window] & person.valid[window]
         width = 2 * max(1, round(SLACK * reach)) + 1
@@ -135,12 +135,6 @@ def _edges(image: Image) -> NDArray[np.float32]:
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
     across, down = (cv2.Sobel(grey, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1)))
     return np.asarray(cv2.dilate(cv2.magnitude(across, down), np.ones((3, 3), dtype=np.uint8)), dtype=np.float32)
-
-
-def _box(mask: Mask) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom of a mask with pixels; the last two are the first outside."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
 @dataclass(frozen=True)
@@ -207,7 +201,7 @@ def _change(pairs: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]], name: 
 
 def extent_of(silhouette: Silhouette) -> tuple[Array, float]:
     """Return the middle (2,) and the height in pixels of a silhouette's bounding box."""
-    left, top, right, bottom = _box(silhouette.mask)
+    left, top, right, bottom = box_of(silhouette.mask)
     return 0.5 * np.array([left + right, top + bottom]), float(bottom - top)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera
-from posefit.geometry.storage import Matrix, number_of, numbers_of, stored_values, xml_of
+from posefit.geometry.storage import matrix_of, number_of, stored_values, xml_of
 from posefit.reading import cut, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
@@ -220,7 +220,7 @@ def _named(values: Mapping[str, Any], *names: str) -> Any:
 
 def _matrix(values: Mapping[str, Any], *names: str) -> Array | None:
     value = _named(values, *names)
-    return None if value is None else value.array() if isinstance(value, Matrix) else numbers_of(value)
+    return None if value is None else matrix_of(value)
 
 
 def _turned(vector: Any) -> Array:

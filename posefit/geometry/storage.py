@@ -1,12 +1,11 @@
 """What OpenCV's FileStorage writes, as YAML, JSON or XML, read without OpenCV: its reader trusts the file.
 
-A file's values become numbers, texts, lists and `Matrix`, whatever the format. Nothing is expanded, no tag makes an
-object, and a matrix is as large as the numbers that are there.
+A file's values become numbers, texts, lists and dictionaries, whatever the format. Nothing is expanded, no tag makes
+an object, and a matrix is as large as the numbers that are there.
 """
 
 import math
 import re
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,37 +21,33 @@ _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
 
 
-@dataclass(frozen=True)
-class Matrix:
-    """A matrix as a file states it; nothing of it is checked yet."""
-
-    sides: Any
-    type: Any
-    numbers: Any
-
-    def array(self) -> Array:
-        """Return the array, its channels last where it has several. Raises ValueError where sizes contradict."""
-        shape = tuple(_count(side) for side in (self.sides if isinstance(self.sides, list) else [self.sides])[:4])
-        match = _TYPE.fullmatch(str(self.type))
-        if match is None:
-            raise InputError(f"a matrix of the type {quoted(self.type)}")
-        channels = int(match[1] or 1)
-        numbers = numbers_of(self.numbers)
-        shape = shape if channels == 1 else (*shape, channels)
-        if numbers.size != math.prod(shape):
-            raise InputError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
-        if match[2] in _ROUNDED:
-            numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
-        return numbers.reshape(shape)
-
-
 def stored_values(text: str) -> dict[str, Any]:
     """Return the values of a file by name. Raises ValueError where it is none of the three formats."""
     start = text.lstrip()[:1]
     values = _xml(text) if start == "<" else parsed_json(text) if start == "{" else _yaml(text)
     if not isinstance(values, dict):
         raise InputError(f"a file without names, {quoted(values)}")
-    return {str(name): _value(value) for name, value in values.items()}
+    return {str(name): value for name, value in values.items()}
+
+
+def matrix_of(value: Any) -> Array:
+    """Return a matrix, its channels last where it has several. Raises ValueError where it is none, or contradictory."""
+    stated = value if isinstance(value, dict) and "data" in value else {}
+    sides = [stated["rows"], stated["cols"]] if {"rows", "cols"} <= stated.keys() else stated.get("sizes")
+    if sides is None:
+        return numbers_of(value)
+    shape = tuple(_count(side) for side in (sides if isinstance(sides, list) else [sides])[:4])
+    match = _TYPE.fullmatch(str(stated.get("dt", "d")))
+    if match is None:
+        raise InputError(f"a matrix of the type {quoted(stated['dt'])}")
+    channels = int(match[1] or 1)
+    numbers = numbers_of(stated["data"])
+    shape = shape if channels == 1 else (*shape, channels)
+    if numbers.size != math.prod(shape):
+        raise InputError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
+    if match[2] in _ROUNDED:
+        numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
+    return numbers.reshape(shape)
 
 
 def numbers_of(value: Any) -> Array:
@@ -87,13 +82,6 @@ def _count(value: Any) -> int:
     if not 1.0 <= number <= NUMBERS or number != int(number):
         raise InputError(f"a matrix with {quoted(value)} rows or columns")
     return int(number)
-
-
-def _value(value: Any) -> Any:
-    if not isinstance(value, dict) or "data" not in value:
-        return value
-    sides = [value["rows"], value["cols"]] if {"rows", "cols"} <= value.keys() else value.get("sizes")
-    return value if sides is None else Matrix(sides, value.get("dt", "d"), value["data"])
 
 
 def _yaml(text: str) -> Any:

@@ -5,8 +5,9 @@ here as little-endian real numbers, in millimetres. An unobserved point has the 
 """
 
 import struct
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +25,6 @@ MAX_FRAMES = 0xFFFF  # frames that the header can count; more are in TRIAL
 MAX_EVENTS = 255  # that a parameter can hold
 MILLIMETRES = 1e3  # in a metre
 _ICONS = {"Foot Strike": 1, "Foot Off": 2}
-
-Value = str | int | float | Sequence[str] | Sequence[int] | Sequence[float] | Array
 
 
 def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gait: Gait | None = None) -> None:
@@ -46,10 +45,10 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
     Path(path).write_bytes(header.ljust(BLOCK, b"\0") + parameters + data + bytes(-len(data) % BLOCK))
 
 
-def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict[str, Value]]:
+def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict[str, Any]]:
     """Return the parameters by group and name."""
     frames = len(motion)
-    groups: dict[str, dict[str, Value]] = {
+    groups: dict[str, dict[str, Any]] = {
         "POINT": {
             "USED": len(PLACES),
             "FRAMES": min(frames, MAX_FRAMES),
@@ -90,7 +89,7 @@ def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
             yield step.toe_off_seconds, step.foot, "Foot Off"
 
 
-def _section(groups: dict[str, dict[str, Value]]) -> bytes:
+def _section(groups: dict[str, dict[str, Any]]) -> bytes:
     """Return the parameters as whole blocks."""
     records = b""
     for number, (group, parameters) in enumerate(groups.items(), 1):
@@ -102,20 +101,13 @@ def _section(groups: dict[str, dict[str, Value]]) -> bytes:
     return (struct.pack("<BBBB", 1, MAGIC, size, INTEL) + records).ljust(size * BLOCK, b"\0")
 
 
-def _encoded(value: Value) -> bytes:
+def _encoded(value: Any) -> bytes:
     """Return a parameter's type, its sizes, the one that runs fastest first, and its content."""
-    if isinstance(value, str):
-        return struct.pack("<bBB", -1, 1, len(value)) + value.encode("ascii")
-    if isinstance(value, int):
-        return struct.pack("<bBH", 2, 0, value)
-    if isinstance(value, float):
-        return struct.pack("<bBf", 4, 0, value)
-    if isinstance(value[0], str):
-        width = max(len(str(word)) for word in value)
-        return struct.pack("<bBBB", -1, 2, width, len(value)) + b"".join(
-            str(word).encode("ascii").ljust(width) for word in value
-        )
     array = np.asarray(value)
+    if array.dtype.kind == "U":
+        words = array.astype("S").reshape(-1)
+        sizes = bytes((words.itemsize, *array.shape))
+        return struct.pack("<bB", -1, len(sizes)) + sizes + b"".join(word.ljust(words.itemsize) for word in words)
     kind, stored = (2, "<u2") if array.dtype.kind == "i" else (4, "<f4")
     return struct.pack("<bB", kind, array.ndim) + bytes(array.shape[::-1]) + array.astype(stored).tobytes()
 

@@ -8,7 +8,6 @@ silhouette has put a few centimetres too high. Here the ankle stands for the hee
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -19,9 +18,7 @@ from posefit.motion.motion import Motion
 
 CUTOFF_HZ = 6.0  # of a walk nothing to speak of is faster. Winter, Biomechanics and motor control, 2009
 MIN_FPS = 2.0 * CUTOFF_HZ  # frames a second, the fewest that show it
-SWAY_HZ = (
-    0.3  # hertz: the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
-)
+SWAY_HZ = 0.3  # the pelvis turns to and fro once a stride, 0.8 to 1.1 a second, and slower where the person turns
 MIN_FOOT_SWING = 0.1  # metres that a foot moves to and fro at least, against the pelvis, for an event
 MIN_SWING_SHARE = 0.2  # of the whole range of that, which it moves at least
 
@@ -104,12 +101,3 @@ def _between(series: Array, k: int) -> float:
     before, here, after = series[k - 1 : k + 2]
     bend = before - 2.0 * here + after
     return k + 0.5 * float((before - after) / bend) if bend < 0.0 else float(k)
-
-
-def at_frames(series: Array, times: Array | float) -> Array:
-    """Return a series (T, ...) at times in frames, between which it is a straight line."""
-    times = np.asarray(times, dtype=np.float64)
-    before: NDArray[np.int64] = np.clip(times.astype(np.int64), 0, max(len(series) - 2, 0))
-    after = np.minimum(before + 1, len(series) - 1)
-    share = (times - before).reshape(times.shape + (1,) * (series.ndim - 1))
-    return np.asarray((1.0 - share) * series[before] + share * series[after])

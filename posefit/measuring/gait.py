@@ -12,9 +12,9 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES, both
-from posefit.measuring.events import MIN_FPS, GaitEvents, at_frames, gait_events
+from posefit.measuring.events import MIN_FPS, GaitEvents, gait_events
 from posefit.measuring.segments import SIDES
-from posefit.motion.motion import Motion
+from posefit.motion.motion import Motion, at_frames
 
 STEP_SECONDS = (0.33, 1.3)  # of a walk: 46 to 180 steps a minute
 MIN_SPEED = 0.2  # metres a second

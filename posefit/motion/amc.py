@@ -1,7 +1,6 @@
 """Acclaim motions (.amc): read into a `Motion`, and written from one."""
 
 from array import array
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
-from posefit.motion.asf import LARGEST, METRES_PER_UNIT, checked_unit, mistake, parse_asf
+from posefit.motion.asf import LARGEST, METRES_PER_UNIT, checked_unit, lines_of, mistake, parse_asf
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import SHOWN, check_size, cut
 
@@ -78,43 +77,40 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
     data, row = array("d"), [0.0] * width
     bones_read: set[bytes] = set()
     frame, radians, number = -1, None, 0
-    with path.open("rb") as file:
-        for number, raw in enumerate(iter(partial(file.readline, LONGEST_LINE + 1), b""), 1):
-            if len(raw) > LONGEST_LINE:
-                raise mistake(path, number, f"a line of at most {LONGEST_LINE} bytes", "a longer one")
-            words = raw.split()
-            if not words or words[0].startswith(b"#"):
-                continue
-            word = words[0]
-            span = spans.get(word)
-            if span is not None and frame >= 0:
-                if word in bones_read:
-                    raise mistake(path, number, f"each bone once in frame {frame}", f"{_quoted(word)} again")
-                bones_read.add(word)
-                row[span[0] : span[1]] = _numbers(path, number, words, span[1] - span[0])
-            elif len(words) == 1 and word.isdigit() and len(word) < 10:
-                if radians is None:
-                    raise mistake(path, number, ":DEGREES or :RADIANS before the first frame", f"frame {int(word)}")
-                if frame >= 0:
-                    _check_whole(path, number, spans, bones_read, frame, f"frame {int(word)}")
-                    data.extend(row)
-                    if len(data) >= min(LONGEST * width, VALUES):
-                        most = min(LONGEST, VALUES // width)
-                        raise mistake(path, number, f"at most {most} frames of {width} numbers", "more")
-                    if int(word) != frame + 1:
-                        raise mistake(path, number, f"frame {frame + 1}", f"frame {int(word)}")
-                frame = int(word)
-                bones_read.clear()
-            elif frame < 0 and word.startswith(b":"):
-                keyword = word.upper()
-                if keyword not in (b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"):
-                    raise mistake(path, number, ":FULLY-SPECIFIED, :DEGREES or :RADIANS", _quoted(raw))
-                if keyword != b":FULLY-SPECIFIED":
-                    radians = keyword == b":RADIANS"
-            elif frame < 0:
-                raise mistake(path, number, "a header such as :DEGREES or the number of a frame", _quoted(raw))
-            else:
-                raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", _quoted(raw))
+    for number, raw in lines_of(path, LONGEST_LINE):
+        words = raw.split()
+        if not words or words[0].startswith(b"#"):
+            continue
+        word = words[0]
+        span = spans.get(word)
+        if span is not None and frame >= 0:
+            if word in bones_read:
+                raise mistake(path, number, f"each bone once in frame {frame}", f"{_quoted(word)} again")
+            bones_read.add(word)
+            row[span[0] : span[1]] = _numbers(path, number, words, span[1] - span[0])
+        elif len(words) == 1 and word.isdigit() and len(word) < 10:
+            if radians is None:
+                raise mistake(path, number, ":DEGREES or :RADIANS before the first frame", f"frame {int(word)}")
+            if frame >= 0:
+                _check_whole(path, number, spans, bones_read, frame, f"frame {int(word)}")
+                data.extend(row)
+                if len(data) >= min(LONGEST * width, VALUES):
+                    most = min(LONGEST, VALUES // width)
+                    raise mistake(path, number, f"at most {most} frames of {width} numbers", "more")
+                if int(word) != frame + 1:
+                    raise mistake(path, number, f"frame {frame + 1}", f"frame {int(word)}")
+            frame = int(word)
+            bones_read.clear()
+        elif frame < 0 and word.startswith(b":"):
+            keyword = word.upper()
+            if keyword not in (b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"):
+                raise mistake(path, number, ":FULLY-SPECIFIED, :DEGREES or :RADIANS", _quoted(raw))
+            if keyword != b":FULLY-SPECIFIED":
+                radians = keyword == b":RADIANS"
+        elif frame < 0:
+            raise mistake(path, number, "a header such as :DEGREES or the number of a frame", _quoted(raw))
+        else:
+            raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", _quoted(raw))
     if frame < 0:
         raise mistake(path, max(number, 1), "at least one frame", "the end of the file")
     _check_whole(path, number, spans, bones_read, frame, "the end of the file")

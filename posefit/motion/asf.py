@@ -1,7 +1,8 @@
 """Acclaim skeletons (.asf): read into a `Skeleton`, and written from one."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,15 @@ _FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthum
 def mistake(path: Path, line: int, expected: str, got: str) -> InputError:
     """Return the error of a file's line; what came is quoted, and cut where it is long."""
     return InputError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
+
+
+def lines_of(path: Path, longest: int) -> Iterator[tuple[int, bytes]]:
+    """Yield the lines of a file with their numbers from 1. Raises ValueError for one of more than `longest` bytes."""
+    with path.open("rb") as file:
+        for number, line in enumerate(iter(partial(file.readline, longest + 1), b""), 1):
+            if len(line) > longest:
+                raise mistake(path, number, f"a line of at most {longest} bytes", "a longer one")
+            yield number, line
 
 
 def checked_unit(metres_per_unit: float) -> float:

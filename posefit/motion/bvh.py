@@ -8,7 +8,6 @@ vector. Where bones fork, as the thorax does into neck and shoulders, all BVH ch
 
 import importlib
 import warnings
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from posefit.geometry.rotation import (
 )
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
 from posefit.motion.amc import SIZE_LIMIT, VALUES
-from posefit.motion.asf import LARGEST, checked_unit, mistake
+from posefit.motion.asf import LARGEST, checked_unit, lines_of, mistake
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size, cut, quoted
 
@@ -128,20 +127,17 @@ def _check_lengths(path: Path) -> None:
     Everything else that may be wrong is left to the library, which makes arrays as large as a file asks for.
     """
     nodes, rows, width, moving = 0, 0, 0, False
-    with path.open("rb") as file:
-        for number, line in enumerate(iter(partial(file.readline, LONGEST_LINE + 1), b""), 1):
-            if len(line) > LONGEST_LINE:
-                raise mistake(path, number, f"a line of at most {LONGEST_LINE} bytes", "a longer one")
-            words = line.split()
-            if moving and words:
-                rows, width = rows + 1, max(width, len(words))
-                if rows > LONGEST or rows * width > VALUES:
-                    raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
-            elif words:
-                nodes += words[0] in (b"ROOT", b"JOINT", b"End")
-                if nodes > NODES:
-                    raise mistake(path, number, f"at most {NODES} joints and ends", "more")
-                moving = words[:2] == [b"Frame", b"Time:"]
+    for number, line in lines_of(path, LONGEST_LINE):
+        words = line.split()
+        if moving and words:
+            rows, width = rows + 1, max(width, len(words))
+            if rows > LONGEST or rows * width > VALUES:
+                raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
+        elif words:
+            nodes += words[0] in (b"ROOT", b"JOINT", b"End")
+            if nodes > NODES:
+                raise mistake(path, number, f"at most {NODES} joints and ends", "more")
+            moving = words[:2] == [b"Frame", b"Time:"]
 
 
 def _offsets(path: Path, nodes: list[Any]) -> Array:

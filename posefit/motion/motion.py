@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
@@ -68,11 +69,7 @@ class Motion:
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
         if last == 0:
             return Motion(self.name, self.skeleton, self.poses, self.translations, fps)
-        before = np.minimum(times.astype(np.int64), last - 1)
-        share = (times - before)[:, None]
-        poses, translations = (
-            (1.0 - share) * series[before] + share * series[before + 1] for series in (self.poses, self.translations)
-        )
+        poses, translations = at_frames(self.poses, times), at_frames(self.translations, times)
         from scipy.spatial.transform import Rotation, Slerp  # a quarter of a second to import
 
         rotations = Rotation.from_matrix(rotation_from_root_angles(self.poses[:, :3]))
@@ -81,6 +78,15 @@ class Motion:
         turns = np.round((self.poses[0, :3] - angles[0]) / (2.0 * np.pi))
         poses[:, :3] = angles + 2.0 * np.pi * turns
         return Motion(self.name, self.skeleton, poses, translations, fps)
+
+
+def at_frames(series: Array, times: Array | float) -> Array:
+    """Return a series (T, ...) at times in frames, between which it is a straight line."""
+    times = np.asarray(times, dtype=np.float64)
+    before: NDArray[np.int64] = np.clip(times.astype(np.int64), 0, max(len(series) - 2, 0))
+    after = np.minimum(before + 1, len(series) - 1)
+    share = (times - before).reshape(times.shape + (1,) * (series.ndim - 1))
+    return np.asarray((1.0 - share) * series[before] + share * series[after])
 
 
 def _rate(fps: float) -> float:

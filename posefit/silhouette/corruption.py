@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import cv2
 import numpy as np
 
-from posefit.silhouette.mask import Mask
+from posefit.silhouette.mask import Mask, box_of
 
 HOLES, BLOBS = 12, 8  # how many at strength 1
 SHADOW = 0.25  # how tall a shadow is at strength 1, as a share of the person
@@ -25,13 +25,8 @@ def corrupted(mask: Mask, noise: Mapping[str, float], rng: np.random.Generator) 
     return spoilt if spoilt.any() else mask
 
 
-def _extent(mask: Mask) -> tuple[int, int, int, int]:
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-
-
 def _discs(mask: Mask, count: int, radius: float, rng: np.random.Generator, inside: bool) -> Mask:
-    left, top, right, bottom = _extent(mask)
+    left, top, right, bottom = box_of(mask)
     drawn = np.zeros(mask.shape, dtype=np.uint8)
     where = np.argwhere(mask)
     for _ in range(count):
@@ -46,19 +41,19 @@ def _discs(mask: Mask, count: int, radius: float, rng: np.random.Generator, insi
 
 def holes(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round holes, as where clothes look like the background."""
-    tall = _extent(mask)[3] - _extent(mask)[1]
+    tall = box_of(mask)[3] - box_of(mask)[1]
     return np.asarray(mask & ~_discs(mask, round(HOLES * strength), 0.03 * tall, rng, inside=True))
 
 
 def blobs(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round blobs around the person, as where something else moves."""
-    tall = _extent(mask)[3] - _extent(mask)[1]
+    tall = box_of(mask)[3] - box_of(mask)[1]
     return np.asarray(mask | _discs(mask, round(BLOBS * strength), 0.04 * tall, rng, inside=False))
 
 
 def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with the person's shadow on the ground, as long as `strength` times the person."""
-    bottom = _extent(mask)[3]
+    bottom = box_of(mask)[3]
     lean = rng.choice([-1.0, 1.0]) * rng.uniform(0.8, 1.2) * strength
     flat = SHADOW * strength
     matrix = np.array([[1.0, -lean, lean * bottom], [0.0, flat, (1.0 - flat) * bottom]])
@@ -69,7 +64,7 @@ def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
 
 def occluder(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask behind an upright bar, as wide as `strength` times half the person."""
-    left, _, right, _ = _extent(mask)
+    left, _, right, _ = box_of(mask)
     wide = max(1, round(0.5 * strength * (right - left)))
     start = int(rng.integers(left, max(left + 1, right - wide + 1)))
     hidden = mask.copy()
@@ -79,7 +74,7 @@ def occluder(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
 
 def jitter(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with an edge that wanders in and out."""
-    _, top, _, bottom = _extent(mask)
+    _, top, _, bottom = box_of(mask)
     reach = EDGE * strength * (bottom - top)
     return wandering(mask, 0.0, 2.0 * reach, max(1.0, reach), rng)
 

@@ -33,6 +33,12 @@ def unpack(bits: Bits, width: int, height: int) -> Mask:
     return np.unpackbits(octets, axis=1, count=width, bitorder="little").astype(bool)
 
 
+def box_of(mask: Mask) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of a mask with pixels; the last two are the first outside."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
 @dataclass(frozen=True, eq=False)
 class Silhouette:
     """The person's pixels in one camera's image, and which pixels are known at all."""
