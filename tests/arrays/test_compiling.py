@@ -146,28 +146,6 @@ assert not _held
     assert compiled(start(script)) == ["impossible array(float64, 1d, C)"] * 2
 
 
-def test_garbage_is_collected_after_compiling_and_not_within(start, tmp_path):
-    (tmp_path / "go").touch()
-    script = f"""
-import gc
-within = []
-class Asking(Listener):
-    def on_start(self, one):
-        within.append(gc.isenabled())
-event.register("numba:compile", Asking())
-{ALL}
-from numba.core.errors import TypingError
-try:
-    loops.impossible(np.arange(4.0))
-    raise AssertionError
-except TypingError:
-    pass
-assert within and not any(within)
-assert gc.isenabled()
-"""
-    assert Counter(compiled(start(script))) == {**ONCE, "impossible array(float64, 1d, C)": 1}
-
-
 def test_without_a_folder_for_the_cache_every_process_compiles(start, tmp_path):
     (tmp_path / "go").touch()
     (tmp_path / "cache").write_text("a file where the folder should be", encoding="utf-8")

@@ -191,8 +191,6 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     )
     carried = posefit.track(path, method="annealed", view_degrees=90, evaluations=400).summary
     assert carried["evaluations"] == 9 * 400
-    text = run("track", path, "--method", "@loose", "--view-degrees", "90", "--evaluations", "400").stdout
-    assert "3 frames show too little of the person: the pose is held or carried on, not searched" in text
 
 
 @each(

@@ -191,15 +191,6 @@ def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
     assert "going on from frame 4 of 20" in messages
 
 
-def test_a_track_leaves_other_hidden_folders_alone(tmp_path: Path) -> None:
-    theirs = tmp_path / ".out.partial"
-    theirs.mkdir()
-    (theirs / "frames.jsonl").write_text("theirs")
-    posefit.track("walk", frames=(0, 2), evaluations=80, out=tmp_path / "out")
-    assert (theirs / "frames.jsonl").read_text() == "theirs"
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".out.partial", "out"]
-
-
 @pytest.mark.slow
 def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:30]).astype(np.uint8))

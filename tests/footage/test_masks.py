@@ -1,8 +1,6 @@
 """Masks from elsewhere, as programs write them: what their values mean and which person is followed."""
 
 import json
-import struct
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -50,21 +48,11 @@ def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> tuple[
     return masks, warnings
 
 
-def chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
 def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -> None:
     """Write a PNG with a palette, as tools for annotation do; OpenCV writes none."""
-    height, width = numbers.shape
-    rows = b"".join(b"\0" + row.astype(np.uint8).tobytes() for row in numbers)
-    path.write_bytes(
-        b"\x89PNG\r\n\x1a\n"
-        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0))
-        + chunk(b"PLTE", bytes(value for colour in colours for value in colour))
-        + chunk(b"IDAT", zlib.compress(rows))
-        + chunk(b"IEND", b"")
-    )
+    image = images.Image.fromarray(numbers.astype(np.uint8), "P")
+    image.putpalette([value for colour in colours for value in colour])
+    image.save(path)
 
 
 @each("kind", [np.uint8, np.uint16])
@@ -238,7 +226,6 @@ def test_empty_and_full_masks_are_held_and_counted(walk: list[Any], tmp_path: Pa
     assert packed.usable.tolist() == [False, True, True, False, False, True]
     result = run("track", path, "--out", tmp_path / "out", *QUICK)
     assert result.exit_code == 0, result.stderr
-    assert "3 frames show too little of the person: the pose is held" in result.stdout
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["held_frames"] == 3
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefit.geometry.body import PROPORTIONS, Body
+from posefit.geometry.body import Body
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.built_in import average_skeleton
 
@@ -17,11 +17,6 @@ def test_radii_are_shares_of_the_bones_length() -> None:
         np.testing.assert_allclose(radii[bone], skeleton.lengths[bone] * np.array([0.205, 0.130]))
     head = BONES.index("head")
     np.testing.assert_allclose(radii[head], skeleton.lengths[head] * np.array([0.88, 0.86]))
-
-
-def test_every_bone_has_a_proportion_and_every_proportion_a_bone() -> None:
-    named = {bone if bone in PROPORTIONS else bone[1:] for bone in BONES}
-    assert named == set(PROPORTIONS)
 
 
 def test_a_joint_is_as_wide_as_the_widest_bone_that_meets_there() -> None:

@@ -17,23 +17,12 @@ from posefit.geometry.rotation import (
     wrapped,
 )
 from tests.cases import each
+from tests.geometry.turns import about
 
 QUARTER = np.pi / 2.0
 turns = st.floats(-np.pi, np.pi)
 tilts = st.floats(-1.5, 1.5)  # the middle angle, away from its singularity at a quarter turn
 triples = st.tuples(turns, turns, turns).map(np.array)
-
-
-def about(axis: int, angle: float) -> Array:
-    """Return the rotation about one axis, written out."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array(
-        [
-            [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]],
-            [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
-            [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]],
-        ][axis]
-    )
 
 
 def papers_root(angles: Array) -> Array:
@@ -66,12 +55,6 @@ def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) ->
     assert least_singular_value(jacobian(papers_root, np.array([pitch, yaw, roll]))) < 1e-6
     same = papers_root(np.array([pitch + 0.3, yaw, roll - np.sign(yaw) * 0.3]))
     np.testing.assert_allclose(same, papers_root(np.array([pitch, yaw, roll])), rtol=0.0, atol=1e-12)
-
-
-@given(turns, tilts, turns)
-def test_how_far_the_root_is_from_degenerate_depends_on_the_pitch_alone(yaw: float, pitch: float, roll: float) -> None:
-    smallest = least_singular_value(jacobian(rotation_from_root_angles, np.array([yaw, pitch, roll])))
-    assert smallest == pytest.approx(np.sqrt(2.0 * (1.0 - abs(np.sin(pitch)))), abs=1e-6)
 
 
 @given(turns, tilts, turns)

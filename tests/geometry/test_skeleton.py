@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from posefit.arrays import Array
 from posefit.geometry.kernels import sines_cosines
-from posefit.geometry.rotation import rotation_from_joint_angles, rotation_from_root_angles
+from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import (
     ANGLES,
     BONES,
@@ -22,26 +20,7 @@ from posefit.geometry.skeleton import (
     side,
 )
 from posefit.motion.built_in import average_skeleton
-
-angles = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
-
-
-def turn(axis: int, angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
-    return matrix
-
-
-@given(angles)
-def test_root_angles_are_yaw_then_pitch_then_roll(a: Array) -> None:
-    np.testing.assert_allclose(rotation_from_root_angles(a), turn(1, a[0]) @ turn(0, a[1]) @ turn(2, a[2]), atol=1e-12)
-
-
-@given(angles)
-def test_joint_angles_turn_about_x_first(a: Array) -> None:
-    np.testing.assert_allclose(rotation_from_joint_angles(a), turn(2, a[2]) @ turn(1, a[1]) @ turn(0, a[0]), atol=1e-12)
+from tests.geometry.turns import about
 
 
 def test_polynomial_sines_are_numpys_over_many_turns() -> None:
@@ -54,13 +33,13 @@ def test_polynomial_sines_are_numpys_over_many_turns() -> None:
 
 def slow_joints(skeleton: Skeleton, pose: Array, translation: Array) -> Array:
     """Return joints (27, 3) straight from Acclaim's definition."""
-    frames, joints = [turn(1, pose[0]) @ turn(0, pose[1]) @ turn(2, pose[2])], [translation]
+    frames, joints = [about(1, pose[0]) @ about(0, pose[1]) @ about(2, pose[2])], [translation]
     for bone, parent in enumerate(PARENTS[1:]):
         start, c = angle_index(bone + 1), skeleton.axes[bone]
         own = np.eye(3)
         if start >= 0:
             x, y, z = pose[start : start + 3]
-            own = turn(2, z) @ turn(1, y) @ turn(0, x)
+            own = about(2, z) @ about(1, y) @ about(0, x)
         frames.append(frames[parent] @ c @ own @ c.T)
         joints.append(joints[parent] + frames[-1] @ skeleton.offsets[bone])
     return np.array(joints)

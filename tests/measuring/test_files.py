@@ -16,8 +16,6 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait, Step, gait_of
 from posefit.measuring.tables import STEP_COLUMNS, write_angles, write_gait, write_trc
 from posefit.motion import recorded
-from posefit.motion.amc import read_clip, write_amc
-from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
 from posefit.motion.motion import Motion
 
@@ -129,14 +127,6 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
         points[:, joint] = nodes[:, read.node_index[node.children[0].name]]
     np.testing.assert_allclose(points, walk.joints, atol=TENTH)
     assert rigid(points)
-
-
-def test_an_amc_has_bones_of_one_length(walk: Motion, tmp_path: Path) -> None:
-    write_asf(tmp_path / "walk.asf", walk.skeleton)
-    write_amc(tmp_path / "walk.amc", walk)
-    clip = read_clip(tmp_path / "walk.asf", tmp_path / "walk.amc", fps=30.0)
-    np.testing.assert_allclose(clip.joints, walk.joints, atol=TENTH)
-    assert rigid(clip.joints)
 
 
 def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion, tmp_path: Path) -> None:

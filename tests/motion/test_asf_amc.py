@@ -15,6 +15,7 @@ from posefit.motion.amc import read_amc, read_clip, write_amc
 from posefit.motion.asf import METRES_PER_UNIT, read_asf
 from posefit.motion.motion import Motion
 from tests.cases import each
+from tests.geometry.turns import about
 
 CHILDREN = "".join(
     " ".join([name, *(child for child, above in zip(JOINTS, PARENTS, strict=True) if above == joint)]) + "\n"
@@ -77,11 +78,7 @@ def clips(cmu: Path) -> list[tuple[Path, Path, int]]:
 
 def turn(x: float, y: float, z: float) -> Array:
     """Return Rz @ Ry @ Rx of angles in degrees."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians([x, y, z])), np.sin(np.radians([x, y, z]))
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return np.asarray(about_z @ about_y @ about_x)
+    return np.asarray(about(2, np.radians(z)) @ about(1, np.radians(y)) @ about(0, np.radians(x)))
 
 
 def slow_joints(skeleton: Path, clip: Path, frame: int) -> Array:
@@ -128,27 +125,17 @@ def test_joints_are_where_acclaim_puts_them(cmu: Path, clip: str) -> None:
         np.testing.assert_allclose(joints, slow_joints(skeleton, moving, frame), atol=1e-9)
 
 
-def test_cmu_units_are_5_64_centimetres(skeleton: Skeleton) -> None:
+def test_a_skeleton_by_hand(skeleton: Skeleton, tmp_path: Path) -> None:
     # bone 2, lfemur's place in the text below root's three children, has length 4 in the direction -y
     assert pytest.approx(0.056444, abs=1e-6) == METRES_PER_UNIT
     np.testing.assert_allclose(skeleton.offsets[BONES.index("lfemur")], [0.0, -4 * 0.0254 / 0.45, 0.0], atol=1e-12)
-
-
-def test_axes_are_turned_about_z_by_20_degrees(skeleton: Skeleton) -> None:
-    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
-    np.testing.assert_allclose(skeleton.axes[7], [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-12)
-
-
-def test_channels_follow_the_file_and_keep_bones_outside_the_tree(skeleton: Skeleton) -> None:
-    names = [bone for bone, _ in skeleton.channels]
+    np.testing.assert_allclose(skeleton.axes[7], turn(0.0, 0.0, 20.0), atol=1e-12)
+    (tmp_path / "rad.asf").write_text(asf_text(angle="rad", turn=repr(np.pi / 9)))
+    np.testing.assert_allclose(read_asf(tmp_path / "rad.asf").axes, skeleton.axes, atol=1e-12)
+    names = [bone for bone, _ in skeleton.channels]  # in the file's order, those of bones outside the tree, too
     assert set(names) == set(DOF)
     assert names.index("lfemur") < names.index("ltibia") < names.index("ltoes")
     assert dict(skeleton.channels)["lthumb"] == ("rx", "rz")
-
-
-def test_angles_may_be_radians(skeleton: Skeleton, tmp_path: Path) -> None:
-    (tmp_path / "rad.asf").write_text(asf_text(angle="rad", turn=repr(np.pi / 9)))
-    np.testing.assert_allclose(read_asf(tmp_path / "rad.asf").axes, skeleton.axes, atol=1e-12)
 
 
 @each(
@@ -184,6 +171,10 @@ def test_a_frame_is_read_into_radians_and_metres(skeleton: Skeleton, tmp_path: P
     np.testing.assert_allclose(angles_of(motion, "rwrist")[1], [0, 50, 0])
     np.testing.assert_allclose(angles_of(motion, "rfoot")[1], [-10, 0, -20])
     assert np.count_nonzero(np.abs(motion.poses[1]) > 1e-12) == 1 + 3 + 1 + 1 + 2  # no toes, no thumb
+    text = amc_text().replace(":DEGREES", ":radians").replace("0 90 0", "0 1 0").replace("ltibia 40", "ltibia 0.5")
+    motion = read_amc(amc_file(tmp_path, text.replace("10 20 30", "0 0 0")), skeleton)
+    np.testing.assert_allclose(motion.poses[:, 0], 1.0)
+    np.testing.assert_allclose(angles_of(motion, "ltibia")[:, 0], np.degrees(0.5))
 
 
 def test_line_ends_blank_lines_and_comments_make_no_difference(skeleton: Skeleton, tmp_path: Path) -> None:
@@ -192,13 +183,6 @@ def test_line_ends_blank_lines_and_comments_make_no_difference(skeleton: Skeleto
         np.testing.assert_array_equal(read_amc(amc_file(tmp_path, text), skeleton).poses, plain.poses)
     (tmp_path / "crlf.asf").write_bytes(asf_text().replace("\n", "\r\n").encode())
     np.testing.assert_array_equal(read_asf(tmp_path / "crlf.asf").offsets, skeleton.offsets)
-
-
-def test_radians_are_understood(skeleton: Skeleton, tmp_path: Path) -> None:
-    text = amc_text().replace(":DEGREES", ":radians").replace("0 90 0", "0 1 0").replace("ltibia 40", "ltibia 0.5")
-    motion = read_amc(amc_file(tmp_path, text.replace("10 20 30", "0 0 0")), skeleton)
-    np.testing.assert_allclose(motion.poses[:, 0], 1.0)
-    np.testing.assert_allclose(angles_of(motion, "ltibia")[:, 0], np.degrees(0.5))
 
 
 def test_angles_are_unwrapped_along_time(skeleton: Skeleton, tmp_path: Path) -> None:
@@ -307,29 +291,17 @@ def damaged(content: bytes, cuts: list[tuple[float, int, bytes]]) -> bytes:
     return content
 
 
-@given(damage)
-def test_a_damaged_motion_is_read_or_refused_with_its_line(
-    workshop: Path, cuts: list[tuple[float, int, bytes]]
+@given(damage, st.booleans())
+def test_a_damaged_file_is_read_or_refused_with_its_line(
+    workshop: Path, cuts: list[tuple[float, int, bytes]], moving: bool
 ) -> None:
-    path = workshop / "damaged.amc"
-    path.write_bytes(damaged(amc_text().encode(), cuts))
+    path = workshop / ("damaged.amc" if moving else "damaged.asf")
+    path.write_bytes(damaged((amc_text() if moving else asf_text()).encode(), cuts))
     try:
-        motion = read_amc(path, read_asf(workshop / "small.asf"))
+        read = read_amc(path, read_asf(workshop / "small.asf")).poses if moving else read_asf(path).offsets
+        assert len(read) >= 1
+        assert np.isfinite(read).all()
     except ValueError as error:
         rest = str(error).removeprefix(f"{path}:")
         assert rest != str(error)
-        assert rest.split(":")[0].isdigit()
-    else:
-        assert len(motion) >= 1
-
-
-@given(damage)
-def test_a_damaged_skeleton_is_read_or_refused(workshop: Path, cuts: list[tuple[float, int, bytes]]) -> None:
-    path = workshop / "damaged.asf"
-    path.write_bytes(damaged(asf_text().encode(), cuts))
-    try:
-        skeleton = read_asf(path)
-    except ValueError as error:
-        assert str(error).startswith(f"{path}:")
-    else:
-        assert np.isfinite(skeleton.offsets).all()
+        assert not moving or rest.split(":")[0].isdigit()

@@ -216,14 +216,6 @@ def test_arms_that_are_held_out_are_level_and_one_that_waves_points_up() -> None
     assert (hanging[:, 1] < 0.0).all()
 
 
-def test_the_library_is_small_and_states_its_origin() -> None:
-    text = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
-    assert len(text.encode()) < 100_000
-    origin = json.loads(text)["origin"]
-    assert "The data used in this project was obtained from mocap.cs.cmu.edu." in origin
-    assert "The database was created with funding from NSF EIA-0196217." in origin
-
-
 @each("ask", [built_in.motion, built_in.other_styles])
 def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
     with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):

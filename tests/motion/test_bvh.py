@@ -13,6 +13,7 @@ from posefit.arrays import Array
 from posefit.motion import built_in, bvh
 from posefit.motion.bvh import read_bvh, write_bvh
 from tests.cases import each
+from tests.geometry.turns import about
 
 pytest.importorskip("pybvh")
 
@@ -110,13 +111,6 @@ def written(folder: Path, root: Node, values: Array) -> Path:
     return path
 
 
-def about(axis: str, degrees: float) -> Array:
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array(
-        {"X": [[1, 0, 0], [0, c, -s], [0, s, c]], "Y": [[c, 0, s], [0, 1, 0], [-s, 0, c]], "Z": [[c, -s, 0], [s, c, 0], [0, 0, 1]]}[axis]
-    )  # fmt: skip
-
-
 def tips(root: Node, nodes: dict[str, Node], row: Array) -> Array:
     """Return where each of the 27 bones ends, from the definition of BVH. End bones do not turn by themselves."""
     values = {id(node): row[3 + 3 * k : 6 + 3 * k] for k, node in enumerate(in_order(root))}
@@ -127,7 +121,7 @@ def tips(root: Node, nodes: dict[str, Node], row: Array) -> Array:
         starts[id(node)] = start
         turning = frame
         for axis, degrees in zip(node.order, values[id(node)], strict=True):
-            turning = turning @ about(axis, degrees)
+            turning = turning @ about("XYZ".index(axis), np.radians(degrees))
         ends = ("ltoes", "rtoes", "head", "lhand", "rhand")
         frames[id(node)] = frame if any(node is nodes[bone] for bone in ends) else turning
         for child in node.children:

@@ -39,12 +39,16 @@ def test_a_clip_is_the_recorded_one_to_a_centimetre(cmu30: Path, subject: str) -
             assert away.max() < 0.01 + ROUNDED
 
 
-def test_the_file_is_small_says_where_it_comes_from_and_opens_without_pickle() -> None:
+def test_the_files_are_small_and_say_where_they_come_from_and_open_without_pickle() -> None:
     path = files("posefit.motion") / "recorded.npz"
     assert len(path.read_bytes()) < 3_000_000
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
         assert "mocap.cs.cmu.edu" in str(stored["origin"])
         assert "NSF EIA-0196217" in str(stored["origin"])
+    built_in = (files("posefit.motion") / "built_in.json").read_text(encoding="utf-8")
+    assert len(built_in.encode()) < 100_000
+    assert "mocap.cs.cmu.edu" in json.loads(built_in)["origin"]
+    assert "NSF EIA-0196217" in json.loads(built_in)["origin"]
 
 
 def test_between_two_stored_poses_lies_their_mean_and_after_the_last_nothing_moves() -> None:

@@ -6,12 +6,6 @@ from hypothesis import strategies as st
 from posefit.silhouette.mask import Silhouette, pack, unpack
 
 
-@given(st.integers(1, 200), st.integers(1, 20), st.integers(0, 2**32 - 1))
-def test_unpacking_undoes_packing(width: int, height: int, seed: int) -> None:
-    mask = np.random.default_rng(seed).random((height, width)) < 0.5
-    np.testing.assert_array_equal(unpack(pack(mask), width, height), mask)
-
-
 def test_pixel_65_is_bit_1_of_the_third_strip() -> None:
     mask = np.zeros((3, 70), dtype=bool)
     mask[2, 65] = True
@@ -59,13 +53,6 @@ def test_the_bits_of_a_silhouette_lie_within_the_known_ones(width: int, height: 
     observed, valid = silhouette.bits
     assert not (observed & ~valid).any()
     np.testing.assert_array_equal(unpack(observed, width, height), silhouette.mask)
-
-
-def test_a_silhouette_does_not_follow_later_changes_of_the_image() -> None:
-    image = np.zeros((2, 2), dtype=bool)
-    silhouette = Silhouette.of(image)
-    image[0, 0] = True
-    assert not silhouette.mask.any()
 
 
 def test_small_pieces_apart_have_no_say_in_where_the_borders_are() -> None:
