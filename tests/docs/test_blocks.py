@@ -146,6 +146,18 @@ def test_messages_that_are_explained_exist() -> None:
     assert [message for message, part in parts if part not in code] == []
 
 
+def test_words_and_counts_are_compared_exactly_and_figures_about() -> None:
+    for shown, line, holds in (
+        ("error 1.21 degrees, 5.6 ms a frame", "error 1.04 degrees, 90.1 ms a frame", True),
+        ("cost 1.65 after 2440 proposals", "cost 6.91 after 2440 proposals", False),
+        ("20 checks ran, 1 failed", "20 checks ran, 2 failed", False),
+        ("10 poses, toe 269", "10 poses, toe 281", True),
+        ("build: 1.65 m, feet 0.95, ...", "build: 1.66 m, feet 0.94, hands 1.02", True),
+        ("error 1.21", "errors 1.21", False),
+    ):
+        assert printed.same(shown, line) == holds, shown
+
+
 def test_pages_import_posefit_and_its_plugin_module_alone() -> None:
     deep = [str(block) for block in BLOCKS if re.search(r"(from|import) posefit\.(?!plugin\b)", block.text)]
     assert deep == []
