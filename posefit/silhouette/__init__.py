@@ -9,7 +9,7 @@
 | half and quarter size: every second pixel of every second row | pyramid.py |
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
 | a body drawn as spans of bits, compiled | rasteriser.py, lanes.py |
-| its pixels counted against silhouettes, compiled | kernels.py, popcount.py |
+| its pixels counted against silhouettes, compiled | kernels.py |
 | a person separated from a background, pixel by pixel | foreground.py |
 | what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |
 """

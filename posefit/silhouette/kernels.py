@@ -5,9 +5,9 @@ Bit images are as `rasteriser` makes them.
 
 import numpy as np
 
-from posefit.arrays import Array, Bits, inlined, jit
+from posefit.arrays import inlined, jit
 from posefit.geometry.kernels import Chain
-from posefit.silhouette.popcount import popcount
+from posefit.silhouette.lanes import popcount
 from posefit.silhouette.rasteriser import NONE, STRIP_PIXELS, View, draw_pose, scratch
 
 
@@ -93,10 +93,3 @@ def add_mismatch(areas, scale, beta, costs):
         spilled = b / (b + y) if b + y > 0.0 else 1.0
         missed = r / (r + y) if r + y > 0.0 else 1.0
         costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
-
-
-def draw_bits(chain: Chain, radii: Array, view: View, pose: Array, translation: Array) -> Bits:
-    """Return the bit image of one body. Not compiled itself: it draws a picture, and calls what is compiled anyway."""
-    work = scratch(view, chain.parents.size, pose.size)
-    image, _ = draw_pose(chain, radii, view, pose, translation, work)
-    return image

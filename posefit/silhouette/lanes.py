@@ -1,4 +1,4 @@
-"""Eight rows at a time: what numba's loops cannot say, or would not say in vector registers.
+"""Bits of a word, and eight rows at a time: what numba's loops cannot say, or would not say in vector registers.
 
 Each function stands here as plain Python, and below it as numba compiles it.
 """
@@ -14,6 +14,21 @@ from numba.extending import intrinsic, overload
 BLOCK = 8  # rows filled at a time
 LISTED = 16  # numbers of blocks that are written at a time
 _STRIP = 32  # bits of a lane
+
+
+def popcount(bits: Any) -> int:
+    """Return how many bits of a word are set."""
+    return int(bits).bit_count()
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _ctpop(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba calls both functions by these names
+    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])  # noqa: ARG005
+
+
+@overload(popcount)  # type: ignore[untyped-decorator]
+def _popcount_compiled(bits):  # type: ignore[no-untyped-def]  # noqa: ARG001 - numba compares the two signatures
+    return lambda bits: _ctpop(bits)  # type: ignore[call-arg]
 
 
 def root(x: Any) -> Any:

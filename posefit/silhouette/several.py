@@ -6,7 +6,7 @@ Bit images are as `rasteriser` makes them. Shapes are checked by the callers.
 import numpy as np
 
 from posefit.arrays import jit
-from posefit.silhouette.popcount import popcount
+from posefit.silhouette.lanes import popcount
 from posefit.silhouette.rasteriser import NONE, draw_pose, scratch
 
 

@@ -3,44 +3,16 @@
 import json
 from importlib.resources import files
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import INNER, JOINTS, MIRROR, angle_index
 from posefit.motion import built_in
-from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from tests.cases import each
 
-# Clip, and the frames that were fitted: the walk of 05_01 ends in a turn.
-CLIPS = {
-    "walk-a": ("16/16_15", 2, None),
-    "walk-b": ("02/02_01", 0, None),
-    "walk-c": ("05/05_01", 0, 380),
-    "run-a": ("16/16_35", 0, None),
-    "run-b": ("09/09_01", 0, None),
-    "march-a": ("13/13_29", 2700, 3780),
-    "march-b": ("14/14_06", 1580, 2330),
-    "jacks-a": ("13/13_29", 20, 440),
-    "jacks-b": ("14/14_06", 20, 410),
-    "squat-a": ("13/13_29", 3800, 4580),
-    "squat-b": ("14/14_06", 1015, 1565),
-    "jump-a": ("49/49_02", 130, 400),
-    "jump-b": ("16/16_01", 60, 262),
-    "step-a": ("05/05_01", 0, 380),
-    "step-b": ("16/16_17", 0, 200),
-    "arms-out-a": ("02/02_01", 0, None),
-    "arms-out-b": ("16/16_17", 0, 200),
-    "wave-a": ("05/05_01", 0, 380),
-    "wave-b": ("16/16_17", 0, 200),
-}
-# The largest mean error over all 66 angles that a style may have: no repetition of an exercise equals another.
-RESIDUAL_DEGREES = {"walk": 1.0, "run": 1.0, "jacks": 1.6, "squat": 1.6, "jump": 1.6, "march": 3.2}
-RESIDUAL_DEGREES |= {"step": 1.0, "arms-out": 1.0, "wave": 1.0}
 KINDS = ("walk", "run", "march", "jacks", "squat", "jump", "step", "arms-out", "wave")
 GAITS = ("walk", "run", "arms-out", "wave")
 DRAWN = {"arms-out": "lr", "wave": "r"}  # whose arms are not the clip's
@@ -70,7 +42,7 @@ def cycle(name: str, cycles: int = 1, **settings: Any) -> Motion:
 
 
 def test_names_are_kinds_and_styles_and_the_other_styles_of_a_motion_never_contain_it() -> None:
-    assert built_in.names() == KINDS + tuple(CLIPS)
+    assert built_in.names() == KINDS + tuple(stored())
     assert built_in.other_styles("walk-b") == ("walk-a", "walk-c")
     assert built_in.other_styles("run") == ("run-a", "run-b")
     for name in built_in.names():
@@ -168,39 +140,6 @@ def test_the_skeleton_is_its_own_mirror_image_and_an_adults() -> None:
     np.testing.assert_allclose(skeleton.axes @ skeleton.axes.mT, np.tile(np.eye(3), (26, 1, 1)), atol=1e-9)
     assert 1.4 < np.ptp(skeleton.joints(np.zeros(66))[:, 1]) < 1.8  # from the sole to the head's joint
     assert {bone for bone, _ in skeleton.channels} <= {JOINTS[joint] for joint in INNER}
-
-
-@each("name", CLIPS)
-def test_the_series_gives_back_the_clip_it_was_fitted_to(cmu: Path, name: str) -> None:
-    path, start, stop = CLIPS[name]
-    folder, clip = path.split("/")
-    model = stored()[name]
-    assert model["source"] == clip
-    recorded = read_clip(cmu / folder / f"{folder}.asf", cmu / folder / f"{clip}.amc")
-    recorded = recorded.frames(start, stop or len(recorded))
-    times = np.arange(len(recorded)) / recorded.fps
-    direction = np.polyfit(times, recorded.translations, 1)[0]
-    poses = recorded.poses.copy()
-    pace = np.hypot(direction[0], direction[2])
-    if pace > 0.2:
-        assert model["speed"] == (0.0 if name.startswith("step") else pytest.approx(pace, abs=1e-3))
-        poses[:, 0] -= np.arctan2(direction[0], direction[2])
-    else:
-        assert model["speed"] == 0.0
-        poses[:, 0] -= np.angle(np.exp(1j * poses[:, 0]).mean())
-
-    same = np.ones(66, dtype=bool)
-    for side in DRAWN.get(built_in.activity_of(name), ""):
-        shoulder, elbow = (angle_index(JOINTS.index(side + bone)) for bone in ("humerus", "radius"))
-        same[[shoulder, shoulder + 1, shoulder + 2, elbow]] = False
-
-    def error(phase: float) -> float:
-        model = built_in.motion(name, frames=len(recorded), fps=recorded.fps, phase=phase)
-        return float(np.degrees(np.abs(wrapped(model.poses - poses))[::4, same].mean()))  # whole turns do not count
-
-    least = min(error(phase) for phase in np.arange(400) / 400)
-    assert least < RESIDUAL_DEGREES[built_in.activity_of(name)]
-    assert least == pytest.approx(model["residual_degrees"], abs=0.05 if same.all() else 0.3)
 
 
 def test_arms_that_are_held_out_are_level_and_one_that_waves_points_up() -> None:
