@@ -5,6 +5,7 @@ from dataclasses import fields
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from posefit.errors import InputError
 from posefit.reading import quoted
@@ -27,6 +28,27 @@ def parsed_by(parse: Callable[[str], Any]) -> Callable[[click.Context, click.Par
     return callback
 
 
+def methods_from(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[str]:
+    """Return the methods that begin so, for a shell to complete."""
+    from posefit.registry import registry
+
+    offers = registry().offers
+    optimiser, at, _ = begun.partition("@")
+    names = [f"{optimiser}@{prior}" for prior in offers["prior"]] if at else [*offers["tracker"], *offers["optimiser"]]
+    return [name for name in names if name.startswith(begun)]
+
+
+def sources_from(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Return the built-in motions that begin so, and have the shell add files."""
+    from posefit.motion import built_in
+
+    names = [CompletionItem(name) for name in built_in.names() if name.startswith(begun)]
+    return [*names, CompletionItem(begun, type="file")]
+
+
+COMPLETED = {"method": methods_from, "train": sources_from}  # options whose values a shell completes
+
+
 def track_flags(*names: str) -> list[Decorator]:
     """Return the click options of some options of a track; without names, of all that the command line has."""
     listed = {one.name: one for one in fields(TrackOptions)}
@@ -34,7 +56,7 @@ def track_flags(*names: str) -> list[Decorator]:
     for name in names or [name for name, one in listed.items() if declared(one).flag != ""]:
         one, default = declared(listed[name]), listed[name].default
         flag = (one.flag or name).replace("_", "-")
-        words: dict[str, Any] = {"help": one.help}
+        words: dict[str, Any] = {"help": one.help, "shell_complete": COMPLETED.get(name)}
         if one.parse is bool:
             flags.append(click.option(f"--{flag}/--no-{flag}", name, default=None, **words))
             continue
@@ -81,7 +103,7 @@ WITHOUT = click.option(
     "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
 )
 TRACK: tuple[Any, ...] = (
-    click.argument("source", nargs=-1),
+    click.argument("source", nargs=-1, shell_complete=sources_from),
     *track_flags(),
     WITHOUT,
     *EXTRACTION,

@@ -154,6 +154,16 @@ def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: p
         assert summary_of(*words, *QUICK)["translation"] == "known"
 
 
+def test_a_shell_completes_methods_and_motions() -> None:
+    def completed(words: str, place: int) -> list[str]:
+        asked = {"COMP_WORDS": words, "COMP_CWORD": str(place), "_POSEFIT_COMPLETE": "bash_complete"}
+        return CliRunner().invoke(main, [], prog_name="posefit", env=asked).stdout.split()
+
+    assert "plain,sapso" in completed("posefit track walk --method sap", 4)
+    assert "plain,sapso@pca" in completed("posefit track walk --method sapso@p", 4)
+    assert {"plain,walk", "file,wa"} <= set(completed("posefit track wa", 2))
+
+
 def test_a_result_has_three_lines_and_messages_only_where_they_are_wanted() -> None:
     result = run("track", "walk", "--frames", "0:5", *QUICK)
     assert len(result.stdout.splitlines()) == 3
