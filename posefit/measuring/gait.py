@@ -151,13 +151,8 @@ def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: s
     seconds = (end - start) / fps
     if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(range(int(start), int(end) + 2)):
         return False
-    return _forwards(events, start, end) >= MIN_SPEED * seconds
-
-
-def _forwards(events: GaitEvents, start: float, end: float) -> float:
-    """Return how far the pelvis moved on the way that it faces, in metres."""
     moved: Array = at_frames(events.pelvis, end) - at_frames(events.pelvis, start)
-    return float(moved @ at_frames(events.heading, 0.5 * (start + end)))
+    return float(moved @ at_frames(events.heading, 0.5 * (start + end))) >= MIN_SPEED * seconds
 
 
 def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float) -> str:

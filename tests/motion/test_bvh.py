@@ -2,7 +2,6 @@
 
 import re
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -184,27 +183,14 @@ def test_mistakes_name_the_file(tmp_path: Path, before: str, after: str, message
     assert str(path) in str(caught.value)
 
 
-def with_a_shifted_shoulder(_: Node, nodes: dict[str, Node], __: Array) -> None:
-    nodes["rclavicle"].offset = nodes["rclavicle"].offset + [0.0, 0.1, 0.0]
-
-
-def under_another_name(_: Node, nodes: dict[str, Node], __: Array) -> None:
-    nodes["rclavicle"].name, nodes["lfemur"].name = "LeftUpLeg", "RightShoulder"
-
-
-@each(
-    ("spoil", "message"),
-    [
-        (with_a_shifted_shoulder, r"x\.bvh: expected joint 'RightShoulder' at OFFSET"),
-        (under_another_name, "expected joint 'LeftUpLeg' right under 'LHipJoint', got it under 'Spine1'"),
-    ],
-)
-def test_a_tree_of_another_kind_is_refused(tmp_path: Path, spoil: Callable[..., None], message: str) -> None:
+def test_a_tree_of_another_kind_is_refused(tmp_path: Path) -> None:
     root, nodes = build("cgspeed")
-    values = random_values(root)
-    spoil(root, nodes, values)
-    with pytest.raises(ValueError, match=message):
-        read_bvh(written(tmp_path, root, values))
+    nodes["rclavicle"].offset = nodes["rclavicle"].offset + [0.0, 0.1, 0.0]
+    with pytest.raises(ValueError, match=r"x\.bvh: expected joint 'RightShoulder' at OFFSET"):
+        read_bvh(written(tmp_path, root, random_values(root)))
+    nodes["rclavicle"].name, nodes["lfemur"].name = "LeftUpLeg", "RightShoulder"
+    with pytest.raises(ValueError, match="expected joint 'LeftUpLeg' right under 'LHipJoint', got it under 'Spine1'"):
+        read_bvh(written(tmp_path, root, random_values(root)))
 
 
 def test_without_the_library_the_way_out_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
