@@ -1,11 +1,5 @@
 """Folders and files that appear whole under their name, or not at all.
 
-- `new_folder`, `new_file`: their name must be free.
-- `replaced_file`: it may replace an earlier file of its kind, which is recognised by its first bytes.
-- `Unfinished`: a folder that is written for so long that it may have to be continued later.
-- `check_new`, `check_place`: refuse a name before anything is computed for it.
-- `create_once`: a small file that several processes may try to create, such as a claim; exactly one succeeds.
-
 Files are written beside their place, under a random name that begins with a dot. They are created exclusively, so that
 no other file or link is written through; and nothing is ever removed but what the call itself has made, or what carries
 the mark of an earlier one that has ended.
@@ -19,6 +13,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Self
 
@@ -138,17 +133,18 @@ class Unfinished:
     def interrupted(cls, target: Path) -> list[Self]:
         """Return the folders of a target that carry a mark and are not in use, the latest first."""
         folders = []
-        for entry in sorted(target.parent.glob(f".{glob.escape(target.name)}.*/{MARK}"), key=_age):
+        for entry in target.parent.glob(f".{glob.escape(target.name)}.*/{MARK}"):
             if entry.is_symlink() or entry.parent.is_symlink():
                 continue
             with suppress(OSError, ValueError, KeyError, TypeError):
+                modified = entry.stat().st_mtime
                 file = os.open(entry, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
                 mark = parsed_json(read_text(entry, MAX_MARK_BYTES)) if _locked(file) else None
                 if mark is not None and mark["target"] == target.name and isinstance(mark["info"], dict):
-                    folders.append(cls(target, entry.parent, file, mark["info"]))
+                    folders.append((modified, cls(target, entry.parent, file, mark["info"])))
                 else:
                     os.close(file)
-        return folders[::-1]
+        return [folder for _, folder in sorted(folders, key=itemgetter(0), reverse=True)]
 
     def close(self) -> None:
         """Release the folder, so that it can be continued; a second call does nothing."""
@@ -218,13 +214,6 @@ def _locked(file: int) -> bool:
     except OSError:  # a file system without locks
         return True
     return True
-
-
-def _age(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return 0.0
 
 
 def create_once(path: Path, content: object) -> bool:

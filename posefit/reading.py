@@ -1,9 +1,5 @@
 """What a stranger's file says, read so that it can neither fill the memory nor end in a traceback.
 
-- `read_text`: a file that may have so many bytes, in UTF-8.
-- `parsed_toml`, `parsed_json`: the values of a text. Whatever is wrong with it raises InputError.
-- `quoted`: a value as messages quote it; `suggestion`: the known name that a wrong one is near.
-
 Archives of arrays have `posefit.archive`, pictures `posefit.footage.images`.
 """
 
