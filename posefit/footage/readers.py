@@ -48,14 +48,19 @@ Masks = NDArray[Any] | tuple[Path, ...]  # of one camera: (frames, height, width
 def read_masks(source: Path | Masks, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of images, of a folder of them, of an array, or of an .npz or .npy file, cut to `frames`.
 
-    `label` is the person's value, where masks hold several. Raises InputError naming the file.
+    Images of a folder come in the natural order of their names: 2 before 10. `label` is the person's value, where masks
+    hold several. Raises InputError naming the file.
     """
     if isinstance(source, tuple):
         return read_images(source, name_of(source), frames, label)
     if isinstance(source, np.ndarray):
         return _packed(name_of(source), {"masks": source}, frames, label)
     if source.is_dir():
-        return read_folder(source, frames, label)
+        # hidden files are ignored: some systems put one beside each image that they copy
+        files = (file for file in source.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
+        if not (images := sorted(files, key=_natural)):
+            raise InputError(f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+        return read_images(images, str(source), frames, label)
     existing(source)
     if source.suffix.lower() == ".npy":
         stack = mapped(source)
@@ -73,19 +78,6 @@ def name_of(source: str | Path | Masks) -> str:
     if isinstance(source, tuple) and len(source) == 1:
         return str(source[0])
     return str(source[0].parent) if isinstance(source, tuple) and source[0].parent.name else "masks"
-
-
-def read_folder(path: Path, frames: Range, label: int | None = None) -> PackedMasks:
-    """Return the masks of a folder of images in the natural order of their names: 2 comes before 10.
-
-    Raises InputError naming the file where one is no image, or of another size than the first.
-    """
-    # hidden files are ignored: some systems put one beside each image that they copy
-    files = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
-    images = sorted(files, key=_natural)
-    if not images:
-        raise InputError(f"{path}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
-    return read_images(images, str(path), frames, label)
 
 
 def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:

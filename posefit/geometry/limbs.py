@@ -39,11 +39,6 @@ def check_limbs(limbs: Mapping[str, Sequence[str]]) -> None:
             )
 
 
-def rows_of(bones: Sequence[str]) -> NDArray[np.intp]:
-    """Return the numbers of bones, rows of a body's radii, by name."""
-    return np.array([BONES.index(bone) for bone in bones], dtype=np.intp)
-
-
 def turns_of(bones: Sequence[str]) -> NDArray[np.intp]:
     """Return where in a pose (66,) the angles stand that turn bones."""
     return np.array([angle for bone in bones for angle in channel_angles(bone, ("rx", "ry", "rz"))], dtype=np.intp)

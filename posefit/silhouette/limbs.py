@@ -11,7 +11,7 @@ from posefit.arrays import Array, Bits, writeable
 from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.limbs import LIMBS, check_limbs, rows_of, turns_of
+from posefit.geometry.limbs import LIMBS, check_limbs, turns_of
 from posefit.geometry.skeleton import ANGLES, BONES
 from posefit.silhouette import drawn, several
 from posefit.silhouette.cost import Areas, view_of
@@ -78,7 +78,8 @@ class LimbPoses:
         theirs[0] = True
         at = 1
         for bones, candidates in zip(self.limbs.values(), self.candidates, strict=True):
-            mine, rows, turns = slice(at, at + len(candidates)), rows_of(bones), turns_of(bones)
+            mine, turns = slice(at, at + len(candidates)), turns_of(bones)
+            rows = [BONES.index(bone) for bone in bones]
             theirs[0, rows] = False
             theirs[mine, rows] = True
             poses[mine, turns] = np.asarray(candidates)[:, turns]

@@ -13,7 +13,7 @@ from posefit.footage import images
 from posefit.footage.cameras import CameraView, combined
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import PackedMasks
-from posefit.footage.readers import read_folder, read_masks
+from posefit.footage.readers import read_masks
 from posefit.footage.source import body_of, scene_of
 from posefit.tracking.front import track
 from tests.cases import each
@@ -196,7 +196,7 @@ def test_numbers_in_names_count_as_numbers(walk: list[Any], tmp_path: Path) -> N
     for k in (2, 10, 1, 100):
         cv2.imwrite(str(path / f"mask{k}.png"), np.where(walk[0], 255, 0).astype(np.uint8))
     (path / "._mask1.png").write_bytes(b"what a Mac puts beside it")
-    assert [Path(name).name for name in read_folder(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
+    assert [Path(name).name for name in read_masks(path, ALL).names] == [f"mask{k}.png" for k in (1, 2, 10, 100)]
 
 
 def stack(path: Path, masks: Sequence[Any]) -> Path:

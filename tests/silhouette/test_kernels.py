@@ -15,15 +15,9 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
-from tests.silhouette.twin import body_distance, hull_distance
+from tests.silhouette.twin import body_distance, hull_distance, random_poses
 
 TIE = 1e-3  # pixels; the kernel's rows are float32
-
-
-def random_poses(rng: np.random.Generator, count: int) -> Array:
-    poses = rng.normal(0.0, 0.4, (count, ANGLES))
-    poses[:, 0] = rng.uniform(-np.pi, np.pi, count)
-    return poses
 
 
 def assert_equals_the_twin(body: Body, camera: Camera, pose: Array, translation: Array) -> bool:

@@ -24,18 +24,13 @@ from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.pyramid import coarser_silhouette
 from posefit.testing.problem import pose_problem, walking_angles
 from tests.cases import each
+from tests.silhouette.twin import random_poses
 
 pytestmark = [
     pytest.mark.device,
     # a body far off the image has coordinates that no float32 holds: on a device as on a CPU these are infinite
     pytest.mark.filterwarnings("ignore::RuntimeWarning"),
 ]
-
-
-def some_poses(rng: np.random.Generator, count: int) -> Array:
-    poses = rng.normal(0.0, 0.4, (count, ANGLES))
-    poses[:, 0] = rng.uniform(-np.pi, np.pi, count)
-    return poses
 
 
 def seen_by(body: Body, camera: Camera, pose: Array, rng: np.random.Generator) -> Silhouette:
@@ -57,7 +52,7 @@ def test_200_poses_have_the_areas_that_a_cpu_counts(body: Body, size: tuple[int,
     rng = np.random.default_rng(2)
     camera = Camera.around(np.zeros(3), 0.4, depth, size, field_of_view=0.9)
     count = 32 if size == (40, 30) else 12
-    assert_equals_the_cpu(body, camera, some_poses(rng, count), rng.normal(0.0, 0.4, (count, 3)) * [1.0, 1.0, 0.2])
+    assert_equals_the_cpu(body, camera, random_poses(rng, count), rng.normal(0.0, 0.4, (count, 3)) * [1.0, 1.0, 0.2])
 
 
 def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the_same_areas(body: Body) -> None:
@@ -65,12 +60,12 @@ def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the
     towards = camera.rotation.T @ np.array([0.0, 0.0, -1.0])
     across = np.array([[0.9, 0.5, 0.0], [-0.9, 0.3, 0.0], [0.2, -0.9, 0.0], [9.0, 0.0, 0.0], [0.0, -9.0, 0.0]])
     places = [*across, *(depth * towards for depth in (3.2, 3.7, 3.95, 4.0, 4.4, 9.0)), np.full(3, 1e300)]
-    assert_equals_the_cpu(body, camera, some_poses(np.random.default_rng(3), len(places)), np.array(places))
+    assert_equals_the_cpu(body, camera, random_poses(np.random.default_rng(3), len(places)), np.array(places))
 
 
 def test_a_pose_that_is_no_number_draws_nothing_and_spoils_no_other(body: Body, camera: Camera) -> None:
     for bad in [np.nan, np.inf]:
-        poses, places = some_poses(np.random.default_rng(4), 3), np.zeros((3, 3))
+        poses, places = random_poses(np.random.default_rng(4), 3), np.zeros((3, 3))
         places[1] = bad
         assert_equals_the_cpu(body, camera, poses, places)
 
@@ -79,7 +74,7 @@ def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: p
     monkeypatch.setattr("posefit.silhouette.cuda.areas.PART", 3)
     rng = np.random.default_rng(6)
     camera = Camera.around(np.zeros(3), 0.4, 3.0, (24, 20))
-    assert_equals_the_cpu(body, camera, some_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3)))
+    assert_equals_the_cpu(body, camera, random_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3)))
 
 
 def test_no_poses_have_no_areas(body: Body, camera: Camera) -> None:

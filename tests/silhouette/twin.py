@@ -5,8 +5,15 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import PARENTS
+from posefit.geometry.skeleton import ANGLES, PARENTS
 from posefit.silhouette.rasteriser import FAR, NEAR
+
+
+def random_poses(rng: np.random.Generator, count: int) -> Array:
+    """Return poses (n, 66) that face every way."""
+    poses = rng.normal(0.0, 0.4, (count, ANGLES))
+    poses[:, 0] = rng.uniform(-np.pi, np.pi, count)
+    return poses
 
 
 def hull_distance(x: Array, y: Array, first: Array, second: Array, r0: float, r1: float) -> Array:
