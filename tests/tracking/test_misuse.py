@@ -28,7 +28,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"ask_seconds": 1e300}, "ask_seconds must lie in 0.001 to 1e[+]08, got 1e[+]300"),
     ({"view_degrees": 361}, "view_degrees must lie in -360 to 360 degrees, got 361"),
     ({"force": True}, "force must be given with out, the folder of the track, got none"),
-    ({"settings": ("sapso.cooling=0.9", "sapso.cooling=0.8")}, "must give a setting once, got 'sapso.cooling' twice"),
+    ({"settings": ("sapso.cooling=0.9", "sapso.cooling=0.8")}, "must be given once, got 'sapso.cooling' twice"),
     ({"asf": "a.asf"}, "asf must be given for .amc files and footage only, got 'a.asf'"),
     ({"extraction": Extraction()}, "extraction must be given for video only, got Extraction.* for a motion"),
     ({"up": "y"}, "up must be given for calibrations only, got 'y' for a motion"),
