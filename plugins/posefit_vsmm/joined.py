@@ -23,7 +23,7 @@ from posefit_vsmm.motion import library
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ERROR, FIRST_BONE, YAW_PITCH_ROLL, Reliance, decode, encode, free_errors
 from posefit_vsmm.switching import Measure
-from posefit_vsmm.tracker import VSMM, Matcher
+from posefit_vsmm.tracker import VSMM, matched
 
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 
@@ -96,8 +96,7 @@ class Search:
 
     def likelihood(self, state: Array, observation: Observation) -> float:
         """Return the log-likelihood of a predicted state (43,): its silhouette's cost, weighed."""
-        costs, _ = Matcher(self.task, observation, self.reliance).costs(state[None])
-        return -self.weight * float(costs[0])
+        return -self.weight * float(matched(self.task, observation, self.reliance, state[None])[0][0])
 
     def find(
         self, state: Array, spread: Array, observation: Observation, budget: int, rng: np.random.Generator

@@ -8,7 +8,6 @@ longer to compile than a whole function.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import jit
 from posefit.geometry.skeleton import JOINTS, PARENTS
@@ -21,15 +20,9 @@ _OTHER_JOINTS = np.array([j for j in range(1, len(JOINTS)) if j in PARENTS and j
 _OTHER_PIVOTS = np.array([PARENTS[joint] for joint in _OTHER_JOINTS])
 
 
-def _hanging() -> NDArray[np.bool_]:
-    """Return which joints (column) move when a joint (row) turns: it and all that hang on it."""
-    hangs = np.eye(len(JOINTS), dtype=np.bool_)
-    for joint in range(1, len(JOINTS)):
-        hangs[:, joint] |= hangs[:, PARENTS[joint]]
-    return hangs
-
-
-_HANGS = _hanging()
+_HANGS = np.eye(len(JOINTS), dtype=np.bool_)  # which joints (column) move when a joint (row) turns
+for _joint in range(1, len(JOINTS)):
+    _HANGS[:, _joint] |= _HANGS[:, PARENTS[_joint]]
 
 
 @jit

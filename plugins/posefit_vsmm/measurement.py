@@ -97,12 +97,15 @@ class JointCameras:
     figure: Figure
     how: Settings
 
-    def detect(self, view: int, lines: Lines | None, expected: Array, spread: Array) -> JointMeasurement:
-        """Return the joints that a camera shows, where a state (43,) is expected with a covariance (33, 33).
+    def detect(self, views: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement]:
+        """Return the joints that each camera shows, where a state (43,) is expected with a covariance (33, 33).
 
-        Detections outside the Mahalanobis gate are rejected. Where the camera shows nobody, no joint is detected.
+        Detections outside the Mahalanobis gate are rejected. Where a camera shows nobody, no joint is detected.
         """
-        camera = self.cameras[view]
+        each = zip(self.cameras, views, strict=True)
+        return [self._detected(camera, lines, expected, spread) for camera, lines in each]
+
+    def _detected(self, camera: Camera, lines: Lines | None, expected: Array, spread: Array) -> JointMeasurement:
         pixels, jacobian = self.figure.project(camera, expected)
         if lines is None:
             return JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, None)

@@ -2,8 +2,9 @@
 
 import inspect
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -20,7 +21,7 @@ from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
 from posefit_vsmm.motion import STIFF, MotionModel, library, turned
-from posefit_vsmm.preprocess import Lines, lines_of
+from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
 from posefit_vsmm.switching import Models
@@ -36,40 +37,31 @@ TYPICAL_DEVIATION = np.radians(15.0)  # from a typical pose: a quaternion that f
 SPREADS = np.radians([20.0, 12.0, 7.0, 4.0])  # of the draws, one a round, the last one for the rest
 
 
-class Matcher:
-    """Compares states with one observation."""
-
-    def __init__(self, task: Task, observation: Observation, reliance: Reliance) -> None:
-        self._task, self._observation, self._reliance = task, observation, reliance
-        self.free = free_errors(task.body.skeleton)
-        self.evaluations = 0
-
-    def costs(self, states: Array) -> tuple[Array, Array]:
-        """Return the costs (n,) of states (n, 43), and the states, moved to where their silhouettes fit."""
-        task, observation = self._task, self._observation
-        poses, places = decode(states, self._reliance)
-        if observation.translation is not None:
-            places[:] = observation.translation
-        else:
-            places = align(task.body, task.cameras, observation.silhouettes, poses, places)
-        silhouettes = observation.silhouettes
-        costs, _ = pose_costs(task.body, task.cameras, silhouettes, poses, places, threads=task.threads)
-        self.evaluations += len(states)
-        return costs, np.column_stack([places, states[:, 3:]])
+def matched(task: Task, observation: Observation, reliance: Reliance, states: Array) -> tuple[Array, Array]:
+    """Return the costs (n,) of states (n, 43) in an observation, and the states, moved to where they fit it."""
+    poses, places = decode(states, reliance)
+    scene = task.body, task.cameras, observation.silhouettes
+    if observation.translation is not None:
+        places[:] = observation.translation
+    else:
+        places = align(*scene, poses, places)
+    return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
 
 
 def estimated_state(
-    matcher: Matcher,
-    models: Sequence[MotionModel],
+    match: Callable[[Array], tuple[Array, Array]],
+    free: Array,
+    models: Iterable[MotionModel],
     yaw: float | None,
     anchor: Array,
     given: Array | None,
     budget: int,
     rng: np.random.Generator,
-) -> Array:
-    """Return the state (43,) that fits an observation best, for at most so many evaluations.
+) -> tuple[Array, int]:
+    """Return the state (43,) that fits an observation best, and the evaluations that it took, at most the budget.
 
-    `yaw` is about where the person faces, None for anywhere; `given` is a known pose (66,), if there is one.
+    `match` is `matched` in it, `free` says which errors (33,) joints allow. `yaw` is about where the person
+    faces, None for anywhere; `given` is a known pose (66,), if there is one.
     """
     yaws = ALL_AROUND if yaw is None else yaw + NEAR
     typical = np.concatenate([model.poses for model in models])
@@ -79,20 +71,19 @@ def estimated_state(
     states = states[np.linspace(0, len(states) - 1, room).astype(np.int64)]
     if given is not None:
         states = np.concatenate([encode(given[None], anchor[None]), states])
-    costs, states = matcher.costs(states)
+    costs, states = match(states)
     best, least = states[costs.argmin()], float(costs.min())
-    home = best
-    left, turn = budget - len(states), 0
-    while left >= ROUND:
+    home, used = best, len(states)
+    for turn in range((budget - used) // ROUND):
         errors = rng.normal(0.0, SPREADS[min(turn, len(SPREADS) - 1)], (ROUND, ERROR))
         errors[:, :3] = 0.0
-        errors *= matcher.free
-        costs, states = matcher.costs(np.array([plus(best, error) for error in errors]))
+        errors *= free
+        costs, states = match(np.array([plus(best, error) for error in errors]))
         costs += [((minus(state, home)[3:] / TYPICAL_DEVIATION) ** 2).sum() for state in states]
         if costs.min() < least:
             best, least = states[costs.argmin()], float(costs.min())
-        left, turn = left - ROUND, turn + 1
-    return np.asarray(best)
+        used += ROUND
+    return np.asarray(best), used
 
 
 MAX_BLIND_FRAMES = 15  # frames that the models go on alone without a visible person; then the track is lost
@@ -144,10 +135,10 @@ class TrackFilter:
         state, spread = models.fused(belief)
         likely = models.known[models.active[int(belief.probabilities.argmax())]]
         expected, spread = likely.predict(state, spread)
-        measured = self._look(lines, expected, spread)
+        measured = self._cameras.detect(lines, expected, spread)
         if self._how.recovery and (extra := self._missing_spread(measured)).any():
             belief = models.widened(belief, extra)
-            measured = self._look(lines, expected, spread + np.diag(extra))
+            measured = self._cameras.detect(lines, expected, spread + np.diag(extra))
         details = {**self._joints(measured), "detection_seconds": time.perf_counter() - began}
         if self._how.hidden == "imputed":
             measured = [joints.imputed(points) for joints, points in zip(measured, details["joints"], strict=True)]
@@ -182,26 +173,23 @@ class TrackFilter:
         details |= {"surprise": surprise, **self._model_details()}
         return self._frame(pose, place, observation, used + 1, began, details)
 
-    def _look(self, lines: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement]:
-        return [self._cameras.detect(view, one, expected, spread) for view, one in enumerate(lines)]
-
     def _begin(self, observation: Observation) -> int:
         """Estimate a pose from this frame alone, with all models equally probable; return the evaluations that took."""
         task, latest = self._task, self._latest
-        matcher = Matcher(task, observation, self._reliance)
         yaw, anchor, given = task.yaw, task.anchor, None
         if latest is not None:
             yaw, anchor, given = float(latest.pose[0]), latest.translation, latest.pose
         elif task.first_pose is not None:
             given = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
         budget = task.evaluations - 1 if self._searcher is None else task.evaluations // 2
-        models = list(self._models.known.values())
-        state = estimated_state(matcher, models, yaw, np.asarray(anchor), given, budget, self._rng)
+        match = partial(matched, task, observation, self._reliance)
+        free, models = free_errors(task.body.skeleton), self._models.known.values()
+        state, used = estimated_state(match, free, models, yaw, np.asarray(anchor), given, budget, self._rng)
         self._models.restart()
         self._belief = self._models.start(state, self._how.initial_noise * np.diag((UNSURE * self._free) ** 2))
         self._bad = 0
         self._missing = dict.fromkeys(_LIMBS, 0)
-        return matcher.evaluations
+        return used
 
     def _missing_spread(self, measured: Sequence[JointMeasurement]) -> Array:
         """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
@@ -227,9 +215,8 @@ class TrackFilter:
     def _model_details(self) -> dict[str, Any]:
         """Return the details of a frame that are about the models."""
         belief, models = self._belief, self._models
-        details: dict[str, Any] = {"lost": belief is None, "models": models.active}
-        details |= {"group": models.group, "newcomer": models.newcomer, "groups": models.groups}
-        details |= {"restarts": models.restarts}
+        details = {name: getattr(models, name) for name in ("group", "newcomer", "groups", "restarts")}
+        details |= {"lost": belief is None, "models": models.active}
         if belief is not None:
             details |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
         return details
@@ -257,18 +244,9 @@ class TrackFilter:
         seconds = time.perf_counter() - began
         spent = time.process_time() - self._begun
         models, belief = self._models, self._belief
-        self._latest = Frame(
-            pose,
-            place,
-            cost,
-            counts,
-            used,
-            seconds,
-            np.array([cost]),
-            details=details,
-            cpu_seconds=spent,
-            activity=None if belief is None else models.topology.activity(models.active, belief.probabilities),
-        )
+        activity = None if belief is None else models.topology.activity(models.active, belief.probabilities)
+        figures = pose, place, cost, counts, used, seconds, np.array([cost])
+        self._latest = Frame(*figures, details=details, cpu_seconds=spent, activity=activity)
         return self._latest
 
 
