@@ -13,7 +13,6 @@ from posefit.sweep.engines.processes import Processes
 PATIENCE = 0.2  # seconds between checks for an interruption
 
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
-Say = Callable[[str], None]
 K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
 

@@ -12,7 +12,6 @@ from posefit.evolution.strategy import Constants, Strategy, default_population_s
 # Six proposals in two dimensions, worked by hand. mu = 3 and ln 3.5 - ln i is:
 RAW = np.array([1.252763, 0.559616, 0.154151, -0.133531, -0.356675, -0.538997])
 MU_EFF = 2.028615  # 1.966530^2 / (1.569415 + 0.313170 + 0.023763)
-MU_EFF_MINUS = 2.431917  # 1.029203^2 / (0.017831 + 0.127217 + 0.290518)
 SMALL = Constants.of(2, 6)
 EIGHT = Constants.of(3, 8)  # those of `learnt`
 
