@@ -133,14 +133,16 @@ def fold(space: Space, proposals: Array) -> Array:
 
 
 def repair(space: Space, proposals: Array, home: Array) -> Array:
-    """Return proposals (n, d), each infeasible one moved towards the feasible point `home` (d,) until it is feasible.
+    """Return proposals (n, d), each infeasible one moved towards a feasible `home` until it is feasible.
 
-    It becomes the farthest feasible one of 32 evenly spaced points on the line between them.
+    `home` is one point (d,) or one for each proposal (n, d). A moved proposal becomes the farthest feasible one of 32
+    evenly spaced points on the line between them.
     """
     repaired = np.clip(wrap(space, np.asarray(proposals, dtype=np.float64)), -1.0, 1.0)
     repaired = np.where(np.isfinite(repaired), repaired, home)
     broken = np.flatnonzero(~space.feasible(repaired))
     if len(broken):
+        home = np.broadcast_to(home, repaired.shape)[broken]
         way = displacement(space, home, repaired[broken])
         shares = np.arange(REPAIR_STEPS - 1, 0, -1) / REPAIR_STEPS
         line = np.clip(wrap(space, home + shares[:, None, None] * way), -1.0, 1.0)

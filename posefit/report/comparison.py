@@ -49,9 +49,9 @@ def compare(
 ) -> Comparison:
     """Return how methods compare on motions, each pair run with so many seeds in `workers` processes.
 
-    `lists` are the other fields of a plan's product and defaults: `views`, `corruptions`, `instances`, `frames`,
-    `evaluations` and so on. With `out` the ledger is kept in that folder, and a comparison with the same goes on there.
-    Raises InputError for every mistake.
+    A method is named as it is registered. `lists` are the other fields of a plan's product and defaults: `views`,
+    `corruptions`, `instances`, `frames`, `evaluations` and so on. With `out` the ledger is kept in that folder, and a
+    comparison with the same goes on there. Raises InputError for every mistake.
     """
     crossed = {"methods": list(methods), "motions": list(motions), "seeds": seeds}
     crossed |= {name: lists.pop(name) for name in ("views", "corruptions", "instances") if name in lists}

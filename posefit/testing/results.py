@@ -1,5 +1,6 @@
 """The rules of a kind of plugin as checks, and their results: passed, failed with the reason, or skipped with it."""
 
+import re
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -94,9 +95,9 @@ class Report:
         width = max((len(result.name) for result in self.results), default=0)
         for result in self.results:
             lines.append(f"  {result.outcome:8} {result.name:{width}}  {result.detail}".rstrip())
-            if result.traceback and result.detail not in causes:  # one traceback a cause
+            if result.traceback and _cause(result.detail) not in causes:  # one traceback a cause
                 lines += [f"           {line}".rstrip() for line in result.traceback.splitlines()]
-            causes.add(result.detail)
+            causes.add(_cause(result.detail))
         return "\n".join(lines)
 
     @property
@@ -119,9 +120,14 @@ def not_run(name: str, earlier: Sequence[Result]) -> Result | None:
     causes: dict[str, list[str]] = {}
     for result in earlier:
         if result.outcome == "failed":
-            causes.setdefault(result.detail, []).append(result.name)
+            causes.setdefault(_cause(result.detail), []).append(result.name)
     failed = next((names[:SAME_CAUSE] for names in causes.values() if len(names) >= SAME_CAUSE), None)
     return Result(name, "skipped", f"not run: {' and '.join(failed)} fail for one cause") if failed else None
+
+
+def _cause(detail: str) -> str:
+    """Return a message without its numbers: shapes differ from check to check."""
+    return re.sub(r"\d+", "", detail)
 
 
 def _plugin_traceback(error: BaseException) -> str:

@@ -211,7 +211,7 @@ class TrackOptions:
     )
     frames: "Range" = option(
         (None, None),
-        "Only these frames: of footage as filmed, of a motion after resampling.",
+        "Only these frames, (start, stop) in Python: of footage as filmed, of a motion after resampling.",
         _range,
         "A:B",
         "",  # `track` has it, and `fit` one frame instead

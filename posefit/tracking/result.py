@@ -21,7 +21,7 @@ from posefit.progress import QUIET
 from posefit.reading import quoted, suggestion
 from posefit.tracking.evaluation import unseen
 from posefit.tracking.measures import Measures
-from posefit.tracking.table import table
+from posefit.tracking.table import brief, table
 from posefit.uncertainty.modes import TrackMode
 
 if TYPE_CHECKING:
@@ -49,6 +49,11 @@ class Track:
 
     def __str__(self) -> str:
         return table(self.summary)
+
+    @property
+    def trust(self) -> str:
+        """Whether the track can be trusted, in one sentence; where the truth is known, its errors."""
+        return brief(self.summary)[0]
 
     @property
     def joints(self) -> Array:

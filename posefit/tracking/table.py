@@ -21,7 +21,9 @@ def brief(summary: Mapping[str, Any]) -> list[str]:
         worth = f"{_shown(summary, 'mpjpe_mm')}, {error}, {_shown(summary, 'lost_rate')} of frames"
     else:
         worth = trust["sentence"]
-    work = f"{summary['motion']}: {counted(summary['frames'], 'frame')} by {summary['method']}, {_effort(summary)}"
+    guessed = ", camera guessed" if summary["camera"] == "guessed" else ""
+    frames = counted(summary["frames"], "frame")
+    work = f"{summary['motion']}: {frames} by {summary['method']}{guessed}, {_effort(summary)}"
     return [printable(worth), printable(work)]
 
 

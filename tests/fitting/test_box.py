@@ -66,6 +66,8 @@ def test_a_repair_moves_to_the_farthest_feasible_point_of_the_line() -> None:
     mended = repair(space, np.array([[0.2], [0.9], [-3.0], [np.nan]]), home)
     # of 32 points on the way from 0 to 0.9 the 17th is the last below 0.5; from 0 to -1 the 15th
     np.testing.assert_allclose(mended[:, 0], [0.2, 0.9 * 17 / 32, -15 / 32, 0.0])
+    each = repair(space, np.array([[0.2], [0.9]]), np.array([[0.1], [0.0]]))  # a home for each proposal
+    np.testing.assert_allclose(each[:, 0], [0.2, 0.9 * 17 / 32])
 
 
 def test_a_repair_is_always_feasible() -> None:
