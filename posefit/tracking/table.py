@@ -99,7 +99,8 @@ def _effort(summary: Mapping[str, Any]) -> str:
     used = summary["evaluations"] / summary["frames"]
     budget = summary["evaluations_per_frame"] * max(len(summary["hypotheses"]), 1)
     seconds = MEASURES["seconds_per_frame"].number(summary["seconds_per_frame"])
-    return f"{_shown(summary, 'iou')}, {used:,.0f} of {budget:,} evaluations and {seconds} ms a frame"
+    of = f" of {budget:,}" if used <= budget else ""  # frames that are tracked again have more than one budget
+    return f"{_shown(summary, 'iou')}, {used:,.0f}{of} evaluations and {seconds} ms a frame"
 
 
 def _frames(count: int, of: str) -> str:
