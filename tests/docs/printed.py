@@ -8,7 +8,8 @@ from tests.docs.pages import Block
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?")
 _TIME = re.compile(r"\s*(ms|us|s|seconds?|poses a second)\b")
 TOLERANCE = 0.5  # relative: on another processor a search finds another minimum
-COUNTS = 100  # below which a number of a line without fractions is a count
+COUNTS = 100  # below which a number without a unit, of a line without fractions, is a count
+_UNIT = re.compile(r"\s*(mm|cm|m|%|degrees|deg)(?!\w)")
 
 
 def differences(block: Block, output: str) -> Iterator[str]:
@@ -33,9 +34,13 @@ def same(shown: str, line: str) -> bool:
         line = _cut(line, shown)
     if _NUMBER.sub("#", shown) != _NUMBER.sub("#", line):
         return False
-    pairs = [(a[0], b[0]) for a, b in _numbers(shown, line)]
-    counts = not any("." in number for pair in pairs for number in pair)
-    return all(a == b if counts and max(map(_value, (a, b))) < COUNTS else _close(a, b) for a, b in pairs)
+    pairs = list(_numbers(shown, line))
+    whole = not any("." in number[0] for pair in pairs for number in pair)
+
+    def is_count(a: re.Match[str]) -> bool:
+        return whole and _value(a[0]) < COUNTS and not _UNIT.match(shown[a.end() :])
+
+    return all(a[0] == b[0] if is_count(a) else _close(a[0], b[0]) for a, b in pairs)
 
 
 def _numbers(shown: str, line: str) -> Iterator[tuple[re.Match[str], re.Match[str]]]:

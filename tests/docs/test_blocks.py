@@ -152,6 +152,7 @@ def test_words_and_counts_are_compared_exactly_and_figures_about() -> None:
         ("cost 1.65 after 2440 proposals", "cost 6.91 after 2440 proposals", False),
         ("20 checks ran, 1 failed", "20 checks ran, 2 failed", False),
         ("10 poses, toe 269", "10 poses, toe 281", True),
+        ("MPJPE 18 mm, lost 0 % of frames", "MPJPE 17 mm, lost 0 % of frames", True),
         ("build: 1.65 m, feet 0.95, ...", "build: 1.66 m, feet 0.94, hands 1.02", True),
         ("error 1.21", "errors 1.21", False),
     ):
