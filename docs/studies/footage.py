@@ -1,4 +1,8 @@
-"""What the tracks of a real walk are worth, whose truth is unknown: overlap, direction and steps, seed by seed."""
+"""Tracks of real films.
+
+python docs/studies/footage.py tracks VIDEO --roi X,Y,W,H    what tracks of a walk are worth, seed by seed
+python docs/studies/footage.py figures FOLDER                figures 8 and 10 of the SAPSO paper
+"""
 
 import tempfile
 from collections.abc import Iterator
@@ -10,6 +14,7 @@ import click
 import cv2
 import numpy as np
 
+from footage_figures import figures
 from posefit.arrays import Array
 from posefit.cli.options import FRAMES, box, parsed_by
 from posefit.footage.masks import Range, existing
@@ -87,9 +92,6 @@ def frequency(series: Array, fps: float) -> float:
     return float(tried[np.abs(waves @ (away * np.hanning(len(away)))).argmax()])
 
 
-SEEDS = 5
-
-
 def filmed(
     video: str, roi: Box, frames: Range, seeds: int, workers: int | None, progress: Progress | None = None
 ) -> dict[str, Any]:
@@ -149,7 +151,15 @@ def _overlaps(motion: Motion, radii: Array, camera: Camera, seen: list[Mask]) ->
     return np.array(overlaps)
 
 
-@click.command(help=__doc__)
+@click.group()
+def main() -> None:
+    """Tracks of real films."""
+
+
+main.add_command(figures)
+
+
+@main.command("tracks")
 @click.argument("video")
 @click.option(
     "--roi", callback=parsed_by(box), required=True, metavar="X,Y,W,H", help="Where the person is, in pixels."
@@ -157,7 +167,8 @@ def _overlaps(motion: Motion, radii: Array, camera: Camera, seen: list[Mask]) ->
 @FRAMES
 @click.option("--seeds", type=click.IntRange(1), default=5, show_default=True, help="Tracks, one a seed.")
 @WORKERS
-def main(video: str, roi: Box, frames: Range, seeds: int, workers: int | None) -> None:
+def tracks(video: str, roi: Box, frames: Range, seeds: int, workers: int | None) -> None:
+    """What tracks of a real walk are worth, whose truth is unknown: overlap, direction and steps, seed by seed."""
     for line in filmed_lines(filmed(video, roi, frames, seeds, workers, bar)):
         click.echo(line)
 

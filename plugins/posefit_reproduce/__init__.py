@@ -1,16 +1,14 @@
 """The experiments of the two publications, and the benchmark: `posefit reproduce` and `posefit bench`.
 
-    posefit reproduce sapso    Acta Automatica Sinica 38(5): its tables, figures and claims
-    posefit reproduce footage  its figures 8 and 10, on real films that a user has
-    posefit reproduce vsmm     CN101894278: four activities, against an IMM over all models
-    posefit bench              how fast the loop is
+    posefit reproduce sapso  Acta Automatica Sinica 38(5): its tables, figures and claims
+    posefit reproduce vsmm   CN101894278: four activities, against an IMM over all models
+    posefit bench            how fast the loop is
 
 Each has `--help`, and `--json` for one JSON object on stdout. Other measurements are scripts in the repository's
 folder `docs/studies`.
 
     commands/       the command lines
     sapso/, vsmm/   the experiments
-    footage/        data sets of real films, and the experiments on them
     bench/          the benchmark
     jobs.py         runs jobs in processes, by the engine of `posefit sweep`
 """

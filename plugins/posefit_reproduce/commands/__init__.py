@@ -10,7 +10,7 @@ import click
 
 from posefit import hookimpl
 from posefit_reproduce.commands.benchmark import bench_command
-from posefit_reproduce.commands.papers import footage_command, sapso_command, vsmm_command
+from posefit_reproduce.commands.papers import sapso_command, vsmm_command
 
 
 @click.group("reproduce")
@@ -19,7 +19,6 @@ def reproduce_group() -> None:
 
 
 reproduce_group.add_command(sapso_command)
-reproduce_group.add_command(footage_command)
 reproduce_group.add_command(vsmm_command)
 
 

@@ -1,12 +1,12 @@
-"""`posefit reproduce sapso`, `posefit reproduce footage` and `posefit reproduce vsmm`."""
+"""`posefit reproduce sapso` and `posefit reproduce vsmm`."""
 
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import click
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, options, track_flags
+from posefit.cli.options import JSON
 from posefit.cli.output import json_line, progress
 
 NEIGHBOURS = "Processes. Seconds of a frame are those beside so many neighbours."
@@ -67,32 +67,5 @@ def sapso_command(
     scale = replace(QUICK if quick else Scale(), first_yaw=first_yaw)
     report = paper_report(clips, seeds, scale, out, workers, partial(progress, unit="run"))
     click.echo(json_line(report) if as_json else paper_text(report))
-    if out and not as_json:
-        click.echo(f"written to {out}: look at {', '.join(report['figures'])}")
-
-
-@click.command("footage")
-@click.argument("folder", type=click.Path())
-@click.option("--only", default="", metavar="TEXT", help="Films with it in their path; by default a walk and a run.")
-@click.option("--activity", type=click.Choice(["walk", "run"]), help="What films show whose names do not say it.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all random numbers.")
-@CLIPS
-@click.option("--out", metavar="DIR", help="New folder for report.json and the pictures of figures 8 and 10.")
-@options((FRAMES, *track_flags("height"), *EXTRACTION, JSON))
-def footage_command(out: str | None, as_json: bool, **given: Any) -> None:
-    """Figures 8 and 10 of Acta Automatica Sinica 38(5), on real films.
-
-    FOLDER is that of KTH's actions, HumanEva-I or CMU's motion capture database as unpacked, or a film by itself. Of
-    each film 100 frames are taken, from the first that shows the person by what its data set says, unless --frames
-    chooses others.
-    """
-    from posefit.footage.segmentation import Extraction
-    from posefit_reproduce.footage.experiment import Choice, footage_report, footage_text
-
-    how = {name: given.pop(name) for name in ("background", "roi", "ignore", "width")}
-    how["method"] = given.pop("extraction")
-    extraction = Extraction(**{name: value for name, value in how.items() if value is not None})
-    report = footage_report(Choice(**given, extraction=extraction), out, partial(progress, unit="film"))
-    click.echo(json_line(report) if as_json else footage_text(report))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(report['figures'])}")

@@ -6,15 +6,21 @@ and the first yaw is unknown.
 """
 
 import json
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import click
 import cv2
 import numpy as np
 
+from footage_sets import Activity, Recording, errors_mm, films_in, recording_of
+from posefit.cli.options import EXTRACTION, FRAMES, JSON, options, track_flags
+from posefit.cli.output import json_line, progress, say
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
@@ -31,12 +37,11 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
-from posefit_reproduce.footage.humaneva import errors_mm
-from posefit_reproduce.footage.recordings import Activity, Recording, films_in, recording_of
+from posefit_reproduce.commands.papers import CLIPS
 from posefit_reproduce.sapso.design import METHODS, OURS, PAPER, settings_of
 from posefit_reproduce.sapso.experiment import estimate_images
 from posefit_reproduce.sapso.motions import paper_motions
-from posefit_reproduce.sapso.numbers import FRAMES
+from posefit_reproduce.sapso.numbers import FRAMES as FRAMES_OF_THE_PAPER
 
 IMAGES = 6  # estimated by themselves, and shown
 TALL = 300  # pixels of a picture in a figure
@@ -75,7 +80,7 @@ def footage_report(choice: Choice, out: str | Path | None, progress: Progress) -
 
     Raises InputError where files or choices do not fit.
     """
-    chosen, motions = _chosen(choice), paper_motions(choice.clips, FRAMES)
+    chosen, motions = _chosen(choice), paper_motions(choice.clips, FRAMES_OF_THE_PAPER)
     with nullcontext() if out is None else new_folder(out) as folder:
         rows: dict[str, Any] = {}
         figures: list[str] = []
@@ -118,7 +123,7 @@ def filmed_scene(recording: Recording, choice: Choice) -> tuple[Scene, int]:
     """Return the scene of 100 frames of a film, or of those chosen, and the number of its first frame."""
     given, count = choice.frames != (None, None), Video.of(recording.film).count()
     start, stop = span(choice.frames if given else recording.frames, count)
-    stop = stop if given else min(stop, start + FRAMES)
+    stop = stop if given else min(stop, start + FRAMES_OF_THE_PAPER)
     scene = scene_of(
         [recording.film],
         camera=() if recording.calibration is None else (recording.calibration,),
@@ -210,11 +215,6 @@ def _square(image: Image, silhouette: Silhouette) -> Image:
     return square
 
 
-def footage_text(report: dict[str, Any]) -> str:
-    """Return the report as it is printed."""
-    return "\n".join(_lines(report))
-
-
 def _lines(report: dict[str, Any]) -> Iterator[str]:
     for name, film in report["films"].items():
         first, stop = film["frames"]
@@ -231,3 +231,31 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         for warning in film["warnings"]:
             yield f"  {warning}"
     yield "mm: HumanEva's error, the mean distance of 15 virtual markers, and the same with both pelvises in one place"
+
+
+@click.command("figures")
+@click.argument("folder", type=click.Path())
+@click.option("--only", default="", metavar="TEXT", help="Films with it in their path; by default a walk and a run.")
+@click.option("--activity", type=click.Choice(["walk", "run"]), help="What films show whose names do not say it.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all random numbers.")
+@CLIPS
+@click.option("--out", metavar="DIR", help="New folder for report.json and the pictures of figures 8 and 10.")
+@options((FRAMES, *track_flags("height"), *EXTRACTION, JSON))
+def figures(out: str | None, as_json: bool, **given: Any) -> None:
+    """Figures 8 and 10 of Acta Automatica Sinica 38(5), on real films.
+
+    FOLDER is that of KTH's actions, HumanEva-I or CMU's motion capture database as unpacked, or a film by itself. Of
+    each film 100 frames are taken, from the first that shows the person by what its data set says, unless --frames
+    chooses others.
+    """
+    how = {name: given.pop(name) for name in ("background", "roi", "ignore", "width")}
+    how["method"] = given.pop("extraction")
+    extraction = Extraction(**{name: value for name, value in how.items() if value is not None})
+    try:
+        report = footage_report(Choice(**given, extraction=extraction), out, partial(progress, unit="film"))
+    except InputError as mistake:
+        say(f"posefit: {mistake}")
+        sys.exit(2)
+    click.echo(json_line(report) if as_json else "\n".join(_lines(report)))
+    if out and not as_json:
+        click.echo(f"written to {out}: look at {', '.join(report['figures'])}")
