@@ -38,10 +38,10 @@ from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands.papers import CLIPS
-from posefit_reproduce.sapso.design import METHODS, OURS, PAPER, settings_of
 from posefit_reproduce.sapso.experiment import estimate_images
 from posefit_reproduce.sapso.motions import paper_motions
-from posefit_reproduce.sapso.numbers import FRAMES as FRAMES_OF_THE_PAPER
+from posefit_reproduce.sapso.paper import FRAMES as FRAMES_OF_THE_PAPER
+from posefit_reproduce.sapso.paper import METHODS, OURS, PAPER, settings_of
 
 IMAGES = 6  # estimated by themselves, and shown
 TALL = 300  # pixels of a picture in a figure

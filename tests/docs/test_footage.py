@@ -23,7 +23,7 @@ from posefit.motion import built_in
 from posefit.motion.asf import write_asf
 from posefit.motion.motion import Motion
 from posefit.tracking.drawing import draw_body
-from posefit_reproduce.sapso.design import PAPER
+from posefit_reproduce.sapso.paper import PAPER
 from tests.cases import each
 
 SIZE = (160, 120)

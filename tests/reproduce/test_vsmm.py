@@ -1,7 +1,6 @@
 """The experiment of the VSMM patent: what it comes to, and what `posefit reproduce vsmm` prints and draws."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from posefit.motion import built_in
 from posefit_reproduce.vsmm import activities
 from posefit_reproduce.vsmm.activities import film_of
 from posefit_reproduce.vsmm.experiment import HAND, METHODS, PatentTrack, change, detected_cm, follow_film
-from posefit_reproduce.vsmm.switches import ModelState, activity_figures, model_states, switching_figures
+from posefit_reproduce.vsmm.switches import State, activity_figures, model_states, switching_figures
 from posefit_vsmm.state import AT
 
 WORDS = ("walk", "arms-out", "jacks", "squat")  # the labels of the film's activities
@@ -77,19 +76,17 @@ def test_reproduce_says_what_seeds_must_be() -> None:
     assert result.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
 
 
-def states(film: activities.Film, probability: float = 0.9) -> list[ModelState]:
+def states(film: activities.Film, probability: float = 0.9) -> list[State]:
     """Return the states of a tracker that is always right and has one group an activity."""
     groups = {one.label: tuple(sorted(one.models)) for one in activities.ACTIVITIES}
+    counts = {"lost": False, "repairs": 0, "restarts": 0, "filter_seconds": 0.001, "detection_seconds": 0.002}
     every = []
     for label in film.labels:
         name = activities.ACTIVITIES[label].label
         shares = np.full(len(groups[name]), (1.0 - probability) / max(len(groups[name]) - 1, 1))
         shares[0] = probability
-        empty = np.empty(0)
-        times = 0.001, 0.002
-        every.append(
-            ModelState(groups, name, None, groups[name], shares, WORDS[label], False, 0, 0, *times, empty, empty)
-        )
+        force = {"group": name, "newcomer": None, "models": groups[name], "probabilities": shares}
+        every.append({"groups": groups, **force, "activity": WORDS[label], **counts})
     return every
 
 
@@ -111,8 +108,8 @@ def test_a_group_that_never_changes_is_late_by_whole_activities(film: activities
 
 def test_a_restart_is_no_right_group_and_a_newcomer_may_be_a_wrong_one(film: activities.Film) -> None:
     every = states(film)
-    every[5] = replace(every[5], newcomer="squat")
-    every[7] = replace(every[7], group=None)
+    every[5] = {**every[5], "newcomer": "squat"}
+    every[7] = {**every[7], "group": None}
     figures = switching_figures(film, every)
     assert (figures["activations"], figures["wrong_activations"]) == (1, 1)
     assert figures["right_group_fraction"] == 449 / 450
@@ -122,7 +119,7 @@ def test_labels_are_counted_by_activity(film: activities.Film) -> None:
     figures = activity_figures(film, states(film))
     assert figures["confusion"] == [[120, 0, 0, 0, 0], [0, 130, 0, 0, 0], [0, 0, 140, 0, 0], [0, 0, 0, 60, 0]]
     assert (figures["activity_accuracy"], figures["chance"]) == (1.0, 140 / 450)
-    jump = replace(states(film)[0], activity="jump")
+    jump = {**states(film)[0], "activity": "jump"}
     assert activity_figures(film, [jump] * 450)["confusion"][3] == [0, 0, 0, 0, 60]
 
 
@@ -131,11 +128,11 @@ def test_errors_against_detected_joints_leave_hidden_ones_out(film: activities.F
     pixels, depths = film.camera.project(truth)
     nothing = np.zeros((1, 3), dtype=np.int64)
     frame = Frame(film.truth.poses[0], film.truth.translations[0], 0.0, nothing, 1, 0.0, np.zeros(1))
-    state = replace(states(film)[0], joints=np.zeros((1, 17, 2)), confidence=np.zeros((1, 17)))
+    joints, confidence = np.zeros((1, 17, 2)), np.zeros((1, 17))
     point = AT["right hand"]
-    state.joints[0, point] = pixels[0, HAND] + [3.0, 4.0]
-    state.confidence[0, point] = 0.5
-    elbow, hand = detected_cm(film, [frame], [state])[0]
+    joints[0, point] = pixels[0, HAND] + [3.0, 4.0]
+    confidence[0, point] = 0.5
+    elbow, hand = detected_cm(film, [frame], [{"joints": joints, "confidence": confidence}])[0]
     assert np.isnan(elbow)
     assert hand == pytest.approx(100.0 * 5.0 * depths[0, HAND] / film.camera.focal[0])
 

@@ -61,7 +61,7 @@ def sapso_command(
     as_json: bool,
 ) -> None:
     """A walk, a walk with a turn and a run: tables 1 and 2 and figures 3-7 and 9 of Acta Automatica Sinica 38(5)."""
-    from posefit_reproduce.sapso.design import QUICK, Scale
+    from posefit_reproduce.sapso.paper import QUICK, Scale
     from posefit_reproduce.sapso.report import paper_report, paper_text
 
     scale = replace(QUICK if quick else Scale(), first_yaw=first_yaw)

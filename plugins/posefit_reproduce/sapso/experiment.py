@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
+from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import place_of
 from posefit.footage.scene import Scene, with_corruption
@@ -26,27 +27,31 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
 from posefit_reproduce.jobs import Progress, check_seeds, each
-from posefit_reproduce.sapso.design import COMPARED, DRIVEN, LETTER, OCCLUDER, OURS, WORKERS, Scale, settings_of
 from posefit_reproduce.sapso.motions import PaperMotion, paper_scene
+from posefit_reproduce.sapso.paper import (
+    COMPARED,
+    DRIVEN,
+    LETTER,
+    OCCLUDER,
+    OURS,
+    WORKERS,
+    Scale,
+    settings_of,
+)
+from posefit_swarm.sapso import SAPSO
+
+# a motion tracked; its frames each by itself, and with a part hidden; what needs no search; searches of its first frame
+Kind = Literal["tracked", "images", "hidden", "baselines", "first frame"]
 
 
-class TrackKey(NamedTuple):
-    """Names a track."""
+class Run(NamedTuple):
+    """Names what is run."""
 
+    kind: Kind
     motion: str
-    method: str
     view: float
-    seed: int
-
-
-class ImageKey(NamedTuple):
-    """Names the estimates of a motion's frames, each by itself; `hidden` where an occluder covers a part."""
-
-    motion: str
-    method: str
-    view: float
-    seed: int
-    hidden: bool = False
+    seed: int = 0
+    method: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,70 +69,42 @@ class PaperTrack:
 class PaperResults:
     """All results, from which tables and figures are made."""
 
-    motions: dict[str, PaperMotion]
+    motions: Mapping[str, PaperMotion]
     scale: Scale
     seeds: int
-    tracks: dict[TrackKey, PaperTrack] = field(repr=False)
-    images: dict[ImageKey, PaperTrack] = field(repr=False)
-    baselines: dict[tuple[str, float], dict[str, Array]] = field(repr=False)  # poses (T, 66) of each baseline
-    histories: dict[tuple[str, float, int], Array] = field(repr=False)  # (swarms, iterations + 1) lowest cost
+    # a `PaperTrack` where poses are estimated, by name the poses (T, 66) of baselines, and of first frames the lowest
+    # costs (swarms, iterations + 1)
+    runs: Mapping[Run, Any] = field(repr=False)
 
-    def of(self, motion: str, method: str) -> list[PaperTrack]:
-        """Return the tracks of a method, view by view and seed by seed."""
-        return [self.tracks[TrackKey(motion, method, view, seed)] for view, seed in self._pairs]
-
-    @property
-    def _pairs(self) -> list[tuple[float, int]]:
-        return list(product(self.scale.views, range(self.seeds)))
-
-    def poses(self, motion: str, name: str) -> Array:
-        """Return what a method or a baseline makes of a motion, (views, seeds, T, 66)."""
-        results = [
-            self.baselines[motion, view][name]
-            if name in BASELINES
-            else self.tracks[TrackKey(motion, name, view, seed)].poses
-            for view, seed in self._pairs
+    def of(self, motion: str, method: str = "", kind: Kind = "tracked") -> list[Any]:
+        """Return the results of a method, view by view and seed by seed."""
+        return [
+            self.runs[Run(kind, motion, view, seed, method)]
+            for view, seed in product(self.scale.views, range(self.seeds))
         ]
-        return np.array(results).reshape(len(self.scale.views), self.seeds, *results[0].shape)
 
-    def errors(self, motion: str, name: str) -> Array:
-        """Return the errors (8) in degrees of a method or a baseline, (views, seeds, T)."""
-        poses, truth = self.poses(motion, name), self.motions[motion].test.poses
-        return np.array([[metrics.pose_error_degrees(truth, one) for one in view] for view in poses])
-
-    def free_errors(self, motion: str, name: str) -> Array:
-        """Return the errors (8) in degrees over the angles that move alone, (views, seeds, T). Interpretation S18."""
-        poses, test = self.poses(motion, name), self.motions[motion].test
-        free = test.skeleton.free
-        return np.array([[metrics.pose_error_degrees(test.poses, one, free) for one in view] for view in poses])
-
-    def estimated(self, motion: str, name: str = OURS, hidden: bool = False) -> Array:
-        """Return the poses of single images, (views, seeds, T, 66); of a baseline as in `poses`. Section 5.3."""
+    def poses(self, motion: str, name: str = OURS, kind: Kind = "tracked") -> Array:
+        """Return what a method or a baseline makes of a motion, (views, seeds, T, 66)."""
         if name in BASELINES:
-            return self.poses(motion, name)
-        keys = [ImageKey(motion, name, view, seed, hidden) for view, seed in self._pairs]
-        poses = np.array([self.images[key].poses for key in keys])
-        return poses.reshape(len(self.scale.views), self.seeds, *poses.shape[1:])
+            poses = [self.runs[Run("baselines", motion, view)][name] for view in self.scale.views]
+            return np.repeat(np.array(poses)[:, None], self.seeds, axis=1)
+        results = np.array([result.poses for result in self.of(motion, name, kind)])
+        return results.reshape(len(self.scale.views), self.seeds, *results.shape[1:])
 
-    def angle_errors(self, motion: str, name: str = OURS, hidden: bool = False) -> Array:
-        """Return the absolute errors (views, seeds, T, 66) of each angle in degrees, of single images."""
-        away = wrapped(self.estimated(motion, name, hidden) - self.motions[motion].test.poses)
+    def errors(self, motion: str, name: str, free: bool = False) -> Array:
+        """Return the errors (8) in degrees of a method or a baseline, (views, seeds, T).
+
+        Those of all angles, or of the `free` ones that move. Interpretation S18.
+        """
+        test = self.motions[motion].test
+        chosen = test.skeleton.free if free else None
+        poses = self.poses(motion, name)
+        return np.array([[metrics.pose_error_degrees(test.poses, one, chosen) for one in view] for view in poses])
+
+    def angle_errors(self, motion: str, name: str = OURS, kind: Kind = "images") -> Array:
+        """Return the absolute errors (views, seeds, T, 66) of each angle in degrees. Section 5.3."""
+        away = wrapped(self.poses(motion, name, kind) - self.motions[motion].test.poses)
         return np.asarray(np.degrees(np.abs(away)))
-
-
-class ViewKey(NamedTuple):
-    """Key of a motion seen from a side."""
-
-    motion: str
-    view: float
-
-
-class StartKey(NamedTuple):
-    """Names searches of a motion's first frame."""
-
-    motion: str
-    view: float
-    seed: int
 
 
 def repeat_paper(
@@ -142,49 +119,35 @@ def repeat_paper(
     Raises ValueError where `seeds` is no positive number.
     """
     check_seeds(seeds)
-    jobs: dict[TrackKey | ImageKey | ViewKey | StartKey, Callable[[], PaperTrack | dict[str, Array] | Array]] = {}
-    for motion, view, seed in product(motions, scale.views, range(seeds)):
-        for method in COMPARED[motion]:
-            key = TrackKey(motion, method, view, seed)
-            jobs[key] = partial(follow_paper, motions[motion], key, scale)
-    for motion, name, view, seed, hidden in product(motions, (OURS, LETTER), scale.views, range(seeds), (False, True)):
-        image = ImageKey(motion, name, view, seed, hidden)
-        jobs[image] = partial(estimate_paper, motions[motion], image, scale)
-    for motion, view in product(motions, scale.views):
-        jobs[ViewKey(motion, view)] = partial(baseline_poses, motions[motion], view)
-    for motion, view, seed in product(("walk", "run"), scale.views, range(seeds)):
-        jobs[StartKey(motion, view, seed)] = partial(converge, motions[motion], scale, view, seed)
-    results = each(jobs, workers, progress)
-    return PaperResults(
-        dict(motions),
-        scale,
-        seeds,
-        {key: one for key, one in results.items() if isinstance(key, TrackKey) and isinstance(one, PaperTrack)},
-        {key: one for key, one in results.items() if isinstance(key, ImageKey) and isinstance(one, PaperTrack)},
-        {key: one for key, one in results.items() if isinstance(key, ViewKey) and isinstance(one, dict)},
-        {key: one for key, one in results.items() if isinstance(key, StartKey) and isinstance(one, np.ndarray)},
-    )
+    jobs: dict[Run, Callable[[], Any]] = {}
+    for (name, motion), view in product(motions.items(), scale.views):
+        jobs[Run("baselines", name, view)] = partial(baseline_poses, motion, view)
+        for seed in range(seeds):
+            runs = [Run("tracked", name, view, seed, method) for method in COMPARED[name]]
+            jobs |= {run: partial(follow_paper, motion, run, scale) for run in runs}
+            images: tuple[Kind, ...] = ("images", "hidden")
+            runs = [Run(kind, name, view, seed, method) for kind, method in product(images, (OURS, LETTER))]
+            jobs |= {run: partial(estimate_paper, motion, run, scale) for run in runs}
+            if name in ("walk", "run"):
+                jobs[Run("first frame", name, view, seed)] = partial(converge, motion, scale, view, seed)
+    return PaperResults(motions, scale, seeds, each(jobs, workers, progress))
 
 
-def follow_paper(motion: PaperMotion, key: TrackKey, scale: Scale) -> PaperTrack:
+def follow_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
     """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
     results = track(
-        paper_scene(motion, key.view, first_yaw=scale.first_yaw),
+        paper_scene(motion, run.view, first_yaw=scale.first_yaw),
         restarts=RESTARTS if scale.first_yaw == "unknown" else None,
         train=motion.training,
-        method=key.method,
-        settings=settings_of(key.method),
+        method=run.method,
+        settings=settings_of(run.method),
         iterations=scale.iterations,
-        seed=key.seed,
+        seed=run.seed,
     )
     summary = results.summary
-    return PaperTrack(
-        results.motion.poses,
-        summary["seconds_per_frame"],
-        summary["evaluations"] / summary["frames"],
-        summary["swap_rate"],
-        summary["lost_rate"],
-    )
+    evaluations = summary["evaluations"] / summary["frames"]
+    shares = summary["swap_rate"], summary["lost_rate"]
+    return PaperTrack(results.motion.poses, summary["seconds_per_frame"], evaluations, *shares)
 
 
 def estimate_images(
@@ -210,14 +173,14 @@ def estimate_images(
     return frames
 
 
-def estimate_paper(motion: PaperMotion, key: ImageKey, scale: Scale) -> PaperTrack:
+def estimate_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
     """Estimate the pose in each frame by itself; the translation is known. Section 5.3."""
-    scene = paper_scene(motion, key.view)
+    scene = paper_scene(motion, run.view)
     observations = scene.observations
-    if key.hidden:
-        observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, key.seed)
+    if run.kind == "hidden":
+        observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, run.seed)
     images = dict(enumerate(observations))
-    frames = estimate_images(scene, images, motion.training, key.method, scale.iterations, key.seed)
+    frames = estimate_images(scene, images, motion.training, run.method, scale.iterations, run.seed)
     estimate = replace(motion.test, poses=np.array([frame.pose for frame in frames]))
     truth, joints = motion.test.joints, estimate.joints
     return PaperTrack(
@@ -254,3 +217,49 @@ def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array
         for count in scale.swarms
     ]
     return np.array([one.estimates[0].history for one in tracks])
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedSwarm:
+    """A swarm in the first frame, from iteration to iteration."""
+
+    scene: Scene
+    poses: Sequence[Array] = field(repr=False)  # of each iteration (n, 66)
+    translations: Sequence[Array] = field(repr=False)  # of each iteration (n, 3)
+    best: Sequence[int]  # of each iteration, the proposal of lowest cost
+    history: Array = field(repr=False)  # (iterations + 1,) lowest cost so far
+
+
+def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int = 0) -> WatchedSwarm:
+    """Return the proposals of SAPSO in the first frame."""
+    scene = paper_scene(motion, scale.shown, (0, 1), scale.first_yaw)
+
+    class Watched(SAPSO):
+        def __init__(
+            self, space: SearchSpace, rng: np.random.Generator, *, population_size: int, iterations: int
+        ) -> None:
+            super().__init__(space, rng, population_size=population_size, iterations=iterations)
+            self.decoded: list[tuple[Array, Array]] = []
+            self.cheapest: list[int] = []
+            self.searched = space
+            searches.append(self)
+
+        def tell(self, proposals: Array, costs: Array) -> None:
+            self.decoded.append(self.searched.decode(proposals))
+            self.cheapest.append(int(np.argmin(costs)))
+            super().tell(proposals, costs)
+
+    searches: list[Watched] = []
+    result = track(
+        scene,
+        optimiser=Watched,
+        method="@pca",
+        train=motion.training,
+        population_size=particles,
+        iterations=scale.iterations,
+        settings=DRIVEN,
+        seed=seed,
+    )
+    search = searches[-1]  # the one before it only compiles
+    poses, translations = zip(*search.decoded, strict=True)
+    return WatchedSwarm(scene, poses, translations, search.cheapest, result.estimates[0].history)

@@ -1,5 +1,6 @@
 """The figures of the SAPSO paper, drawn again: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,23 +10,30 @@ from matplotlib.figure import Figure
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
-from posefit_reproduce.sapso.design import METHODS, OURS, PAPER
-from posefit_reproduce.sapso.experiment import PaperResults
-from posefit_reproduce.sapso.first_frame import WatchedSwarm, compact_space, watched_swarm
-from posefit_reproduce.sapso.motions import LABELS
-from posefit_reproduce.sapso.numbers import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES
+from posefit.report.figures import COLOURS
+from posefit_priors.pca import PCA
+from posefit_reproduce.sapso.experiment import PaperResults, WatchedSwarm, watched_swarm
+from posefit_reproduce.sapso.motions import LABELS, PaperMotion
+from posefit_reproduce.sapso.paper import (
+    CONVERGED,
+    METHODS,
+    OURS,
+    PAPER,
+    SHOWN_ITERATIONS,
+    SHOWN_PARTICLES,
+    SMALL_DEGREES,
+)
 
-# Okabe and Ito, Color universal design, 2008: distinguished by colour-blind readers too
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MOTIONS = ("walk", "run")
 _DIM = "0.55"
+_LEGEND: dict[str, Any] = {"fontsize": 8, "frameon": False}
 
 
 def paper_figures(results: PaperResults, folder: Path) -> list[str]:
     """Write the figures to a folder that is there, and return the names of the files."""
     figures = {
-        "figure-3-latents.png": latent_figure(results),
-        "figure-4-clusters.png": cluster_figure(results),
+        "figure-3-latents.png": _in_compact_space(results, _latents),
+        "figure-4-clusters.png": _in_compact_space(results, _clusters),
         "figure-5-swarm.png": swarm_figure(watched_swarm(results.motions["walk"], results.scale, SHOWN_PARTICLES)),
         "figure-6-convergence.png": lowest_cost_figure(results),
         "figure-7-dimensions.png": dimension_figure(results),
@@ -36,45 +44,38 @@ def paper_figures(results: PaperResults, folder: Path) -> list[str]:
     return list(figures)
 
 
-def latent_figure(results: PaperResults) -> Figure:
-    """Return the first three latents of the training poses, a colour a clip."""
+def _in_compact_space(results: PaperResults, draw: Callable[[Any, PaperMotion, PCA], str]) -> Figure:
+    """Return the first three latents of two motions, drawn by a function that returns a title."""
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     for k, motion in enumerate(MOTIONS):
-        followed = results.motions[motion]
-        prior, axes = compact_space(followed), _space(figure, k)
-        for clip, colour in zip(followed.training, COLOURS, strict=False):
-            points = prior.transform(clip.poses[:, 3:])
-            axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
-        kept = 100.0 * prior.explained
-        axes.set_title(
-            f"{LABELS[motion]}: {kept[:3].sum():.0f} % of the variance, six keep {kept.sum():.1f} %", fontsize=9
-        )
-        axes.legend(fontsize=7, frameon=False)
+        axes: Any = figure.add_subplot(1, len(MOTIONS), k + 1, projection="3d")
+        axes.set(xlabel="latent 1", ylabel="latent 2", zlabel="latent 3")
+        axes.tick_params(labelsize=7)
+        axes.set_box_aspect(None, zoom=0.88)  # else the last label is cut
+        title = draw(axes, results.motions[motion], PCA().fit(results.motions[motion].angles))
+        axes.set_title(f"{LABELS[motion]}: {title}", fontsize=9)
     return figure
 
 
-def cluster_figure(results: PaperResults) -> Figure:
-    """Return the training poses by their nearest centre of K-means, with the centres."""
-    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
-    for k, motion in enumerate(MOTIONS):
-        followed = results.motions[motion]
-        prior, axes = compact_space(followed), _space(figure, k)
-        points = prior.transform(followed.angles)
-        away = np.abs(points[:, None] - prior.centres).mean(axis=2)
-        for one, colour in zip(range(len(prior.centres)), COLOURS, strict=False):
-            axes.plot(*points[away.argmin(axis=1) == one, :3].T, ".", color=colour, markersize=3)
-            axes.plot(*prior.centres[one, :3, None], "*", color=colour, markersize=13, markeredgecolor="black")
-        within = 100.0 * (away.min(axis=1) < prior.reach).mean()
-        axes.set_title(f"{LABELS[motion]}: K = {len(prior.centres)}, {within:.0f} % of the poses valid", fontsize=9)
-    return figure
+def _latents(axes: Any, motion: PaperMotion, prior: PCA) -> str:
+    """Draw the training poses, a colour a clip."""
+    for clip, colour in zip(motion.training, COLOURS, strict=False):
+        points = prior.transform(clip.poses[:, 3:])
+        axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
+    axes.legend(fontsize=7, frameon=False)
+    kept = 100.0 * prior.explained
+    return f"{kept[:3].sum():.0f} % of the variance, six keep {kept.sum():.1f} %"
 
 
-def _space(figure: Figure, k: int) -> Any:
-    axes: Any = figure.add_subplot(1, len(MOTIONS), k + 1, projection="3d")
-    axes.set(xlabel="latent 1", ylabel="latent 2", zlabel="latent 3")
-    axes.tick_params(labelsize=7)
-    axes.set_box_aspect(None, zoom=0.88)  # else the last label is cut
-    return axes
+def _clusters(axes: Any, motion: PaperMotion, prior: PCA) -> str:
+    """Draw the training poses by their nearest centre of K-means, with the centres."""
+    points = prior.transform(motion.angles)
+    away = np.abs(points[:, None] - prior.centres).mean(axis=2)
+    for one, colour in zip(range(len(prior.centres)), COLOURS, strict=False):
+        axes.plot(*points[away.argmin(axis=1) == one, :3].T, ".", color=colour, markersize=3)
+        axes.plot(*prior.centres[one, :3, None], "*", color=colour, markersize=13, markeredgecolor="black")
+    within = 100.0 * (away.min(axis=1) < prior.reach).mean()
+    return f"K = {len(prior.centres)}, {within:.0f} % of the poses valid"
 
 
 def swarm_figure(swarm: WatchedSwarm) -> Figure:
@@ -85,24 +86,19 @@ def swarm_figure(swarm: WatchedSwarm) -> Figure:
     panels: Any = figure.subplots(1, 1 + len(shown), squeeze=False)[0]
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     side = 0.62 * max(np.ptp(rows), np.ptp(columns))
+    extent = 0, mask.shape[1], mask.shape[0], 0
     for axes in panels:
-        axes.imshow(
-            np.where(mask, 0.75, 1.0), cmap="gray", vmin=0.0, vmax=1.0, extent=(0, mask.shape[1], mask.shape[0], 0)
-        )
+        axes.imshow(np.where(mask, 0.75, 1.0), cmap="gray", vmin=0.0, vmax=1.0, extent=extent)
         axes.set(xlim=columns.mean() + np.array([-side, side]), ylim=rows.mean() + np.array([side, -side]))
         axes.set(xticks=[], yticks=[])
     panels[0].set_title("silhouette", fontsize=9)
     for axes, k in zip(panels[1:], shown, strict=True):
-        bones = _bones(camera.project(scene.body.skeleton.joints(swarm.poses[k], swarm.translations[k]))[0])
+        pixels = camera.project(scene.body.skeleton.joints(swarm.poses[k], swarm.translations[k]))[0]
+        bones = np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)  # their ends, (n, 26, 2, 2)
         axes.add_collection(LineCollection([*bones.reshape(-1, 2, 2)], colors="black", linewidths=0.5, alpha=0.12))
         axes.add_collection(LineCollection([*bones[swarm.best[k]]], colors=COLOURS[1], linewidths=1.4))
         axes.set_title(f"iteration {k}, N = {len(bones)}\nlowest cost so far {swarm.history[k]:.1f}", fontsize=9)
     return figure
-
-
-def _bones(pixels: Array) -> Array:
-    """Return the ends (n, 26, 2, 2) of bones whose joints are at pixels (n, 27, 2)."""
-    return np.stack([pixels[:, list(PARENTS[1:])], pixels[:, 1:]], axis=2)
 
 
 def lowest_cost_figure(results: PaperResults) -> Figure:
@@ -110,14 +106,14 @@ def lowest_cost_figure(results: PaperResults) -> Figure:
     figure = Figure(figsize=(10.0, 3.8), layout="constrained")
     panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        histories = np.array([history for key, history in results.histories.items() if key[0] == motion])
+        histories = np.array(results.of(motion, kind="first frame"))
         for k, count in enumerate(results.scale.swarms):
             _band(axes, histories[:, k], COLOURS[k], f"N = {count}")
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
         axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {len(histories)} runs")
         _plain(axes)
     panels[0].set_ylabel("lowest cost")
-    panels[-1].legend(fontsize=8, frameon=False)
+    panels[-1].legend(**_LEGEND)
     return figure
 
 
@@ -127,19 +123,15 @@ def dimension_figure(results: PaperResults) -> Figure:
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
     panels: Any = figure.subplots(len(results.motions), 1, sharex=True)
     for axes, motion in zip(panels, results.motions, strict=True):
-        for name, style in ((OURS, "bars"), ("mean_pose", "marks")):
-            away = results.angle_errors(motion, name).mean(axis=(0, 1, 2))
-            where = np.arange(len(away))
-            if style == "bars":
-                axes.bar(where, away, color=COLOURS[0], label=METHODS[name].label)
-            else:
-                axes.plot(where, away, "_", color=COLOURS[1], markersize=7, label="mean training pose, true root")
+        ours, mean = (results.angle_errors(motion, name).mean(axis=(0, 1, 2)) for name in (OURS, "mean_pose"))
+        axes.bar(np.arange(len(ours)), ours, color=COLOURS[0], label=METHODS[OURS].label)
+        axes.plot(mean, "_", color=COLOURS[1], markersize=7, label="mean training pose, true root")
         axes.axhline(SMALL_DEGREES, color=_DIM, linewidth=0.8, linestyle=":")
-        axes.set(ylabel="degrees", xlim=(-1, len(away)), title=LABELS[motion])
-        for k in range(3, len(away), 3):
+        axes.set(ylabel="degrees", xlim=(-1, len(ours)), title=LABELS[motion])
+        for k in range(3, len(ours), 3):
             axes.axvline(k - 0.5, color="0.92", linewidth=0.8, zorder=0)
         _plain(axes)
-    panels[0].legend(fontsize=8, frameon=False)
+    panels[0].legend(**_LEGEND)
     panels[-1].set_xticks(3 * np.arange(len(names)) + 1, names, rotation=60, ha="right", fontsize=8)
     panels[-1].tick_params(axis="x", length=0)
     return figure
@@ -157,7 +149,7 @@ def frame_figure(results: PaperResults) -> Figure:
         axes.plot(mean, color=_DIM, linewidth=1.0, linestyle="--", label="mean training pose, true root")
         axes.set(ylabel="error, degrees", ylim=(0.0, None), title=LABELS[motion], xlim=(0, len(mean) - 1))
         _plain(axes)
-    panels[0].legend(fontsize=8, frameon=False, ncols=4)
+    panels[0].legend(ncols=4, **_LEGEND)
     panels[-1].set_xlabel("frame")
     return figure
 

@@ -13,8 +13,7 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import load_motion
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit_reproduce.sapso.design import FirstYaw
-from posefit_reproduce.sapso.numbers import TRAINING_FRAMES
+from posefit_reproduce.sapso.paper import TRAINING_FRAMES, FirstYaw
 
 SIZE = (320, 240)  # pixels
 FPS = 60.0  # not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a run nearly
@@ -33,7 +32,6 @@ LABELS = {"walk": "walk", "turn": "walk with a turn", "run": "run"}
 class PaperMotion:
     """A motion to follow, and what a prior may learn from."""
 
-    name: str
     test: Motion
     training: Sequence[Motion] = field(repr=False)
 
@@ -54,9 +52,13 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
 
 def _from_clips(folder: str | Path, name: str) -> PaperMotion:
     test, training = CLIPS[name]
-    motions = [load_motion(path, FPS) for path in [clip_path(folder, clip) for clip in (test, *training)]]
+    paths = [Path(folder) / f"{clip}.amc" for clip in (test, *training)]
+    for clip, path in zip((test, *training), paths, strict=True):
+        if not path.is_file():
+            raise InputError(f"clips must be a folder of CMU clips such as {clip}.amc, got {folder}, which has none")
+    motions = [load_motion(path, FPS) for path in paths]
     motions = [motion.frames(BROKEN, len(motion)) for motion in motions]
-    return PaperMotion(name, motions[0], motions[1:])
+    return PaperMotion(motions[0], motions[1:])
 
 
 def _built_in(name: str, frames: int) -> PaperMotion:
@@ -66,7 +68,7 @@ def _built_in(name: str, frames: int) -> PaperMotion:
     if name == "turn":
         test = turned(built_in.motion(kind, frames=frames, fps=FPS, speed=0.9, phase=0.3), TURN)
     count = round(TRAINING_FRAMES[name] / len(styles))
-    return PaperMotion(name, test, [built_in.motion(style, frames=count, fps=FPS) for style in styles])
+    return PaperMotion(test, [built_in.motion(style, frames=count, fps=FPS) for style in styles])
 
 
 def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None), first_yaw: FirstYaw = "known") -> Scene:
@@ -85,13 +87,3 @@ def turned(motion: Motion, degrees: float) -> Motion:
     return Motion(
         f"{motion.name}, turning", motion.skeleton, poses, motion.translations[0] + bent.cumsum(axis=0), motion.fps
     )
-
-
-def clip_path(folder: str | Path | None, name: str) -> Path:
-    """Return the path of a clip in a folder of them. Raises ValueError where there is none."""
-    if folder is None:
-        raise InputError(f"clips must be a folder of CMU clips such as {name}.amc, by --clips or POSEFIT_CMU, got none")
-    path = Path(folder) / f"{name}.amc"
-    if not path.is_file():
-        raise InputError(f"clips must be a folder of CMU clips such as {name}.amc, got {folder}, which has none")
-    return path

@@ -2,99 +2,36 @@
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from dataclasses import asdict
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, angle_index
 from posefit.tracking.measures import BASELINES
 from posefit.tracking.restarts import RESTARTS
 from posefit.version import __version__
-from posefit_reproduce.jobs import Progress
+from posefit_reproduce.jobs import Progress, figures_folder
 from posefit_reproduce.sapso.claims import paper_claims
-from posefit_reproduce.sapso.design import COMPARED, LETTER, METHODS, OURS, WORKERS, Scale
 from posefit_reproduce.sapso.experiment import PaperResults, repeat_paper
 from posefit_reproduce.sapso.motions import FPS, LABELS, SIZE, paper_motions
-from posefit_reproduce.sapso.numbers import FRAMES, TABLE_1, TABLE_1_JOINTS, TABLE_2, TRAINING_FRAMES
-
-
-def paper_text(report: dict[str, Any]) -> str:
-    """Return the report as it is printed."""
-    return "\n".join(
-        [*_lines_1(report), "", *_lines_2(report), "", *_lines_claims(report), "", *_lines_shortened(report)]
-    )
-
-
-def _lines_1(report: dict[str, Any]) -> Iterator[str]:
-    yield "Table 1: angles in degrees of single images, the yaw unknown. Ours are x, y, z of an Acclaim skeleton, whose"
-    yield "knee has x alone; the paper's axes are not given. Error: mean of the twelve, in this frame and in all frames"
-    yield f"{'':39} {''.join(f'{name:>24}' for name in TABLE_1_JOINTS)}  error  all frames"
-    for motion, rows in report["table_1"].items():
-        paper = rows["paper"]
-        yield _angles(f"{LABELS[motion]}, the paper's truth", paper["truth"])
-        yield _angles("  the paper's estimate", paper["estimate"], f"{paper['error']:7.2f}")
-        yield _angles(f"  ours, truth of frame {rows['frame']}", rows["truth"])
-        for name in (OURS, LETTER, *BASELINES):
-            one = rows[name]
-            errors = f"{one['error']:7.2f} {one['error_all_frames']:11.2f}"
-            yield _angles(f"  {_label(name)}", one["angles"], errors)
-
-
-def _angles(label: str, joints: list[list[float]], errors: str = "") -> str:
-    return f"{label:39} " + "".join(f"{x:8.1f}{y:8.1f}{z:8.1f}" for x, y, z in joints) + errors
-
-
-def _lines_2(report: dict[str, Any]) -> Iterator[str]:
-    yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours; free: over the"
-    yield "angles that move; wrong: runs that err more than the mean pose"
-    heads: tuple[str, ...] = ("paper", "spread", "s", "ours", "free", "worst", "spread", "s", "skill")
-    heads += ("swapped", "lost", "wrong", "evaluations")
-    for motion, rows in report["table_2"].items():
-        yield f"{LABELS[motion]:39}" + "".join(f"{head:>{12 if head == 'evaluations' else 8}}" for head in heads)
-        for name, one in rows.items():
-            paper = list(one["paper"].values()) if "paper" in one else []
-            cells = [f"{value:8}" for value in paper] or [f"{'-':>8}"] * 3
-            figures = ("error_degrees", "free_degrees", "worst_degrees", "spread_degrees")
-            cells += [f"{one[key]:8.2f}" for key in figures]
-            cells.append(f"{one['seconds_per_frame']:8.4f}" if name in METHODS else f"{'-':>8}")
-            cells.append(f"{'-':>8}" if one["skill"] is None else f"{one['skill']:8.2f}")
-            if name in METHODS:
-                cells += [f"{100 * one[key]:6.0f} %" for key in ("swapped", "lost", "wrong")]
-                cells.append(f"{one['evaluations']:12,.0f}")
-            yield f"  {_label(name):37}" + "".join(cells)
-
-
-def _label(name: str) -> str:
-    return f"{METHODS[name].label} ({name})" if name in METHODS else BASELINES[name]
-
-
-def _lines_claims(report: dict[str, Any]) -> Iterator[str]:
-    yield "What the paper says. Pairs are views and seeds of one clip, of single images of all; p-values are of these."
-    for one in report["claims"]:
-        if one["source"]:
-            yield f"  {one['verdict']}: {one['text']} ({one['source']}): {one['evidence']}"
-    yield "What it does not ask"
-    for one in report["claims"]:
-        if not one["source"]:
-            yield f"  {one['verdict']}: {one['text']}: {one['evidence']}"
-
-
-def _lines_shortened(report: dict[str, Any]) -> Iterator[str]:
-    yield "What was given"
-    for experiment, given in report["given"].items():
-        yield f"  {experiment}: {given}"
-    yield f"Against the paper ({report['seeds']} seeds)"
-    for one in report["shortened"]:
-        yield f"  {one}"
-
+from posefit_reproduce.sapso.paper import (
+    COMPARED,
+    FRAMES,
+    LETTER,
+    METHODS,
+    OURS,
+    TABLE_1,
+    TABLE_1_JOINTS,
+    TABLE_2,
+    TRAINING_FRAMES,
+    WORKERS,
+    Scale,
+)
 
 # LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding
 _ANGLES = np.array([angle_index(JOINTS.index(bone)) for bone in ("lfemur", "rfemur", "ltibia", "rtibia")])
@@ -114,14 +51,19 @@ def paper_report(
     Raises ValueError where `seeds` is no positive number, `clips` no folder of CMU clips or the folder cannot be
     written, and ImportError where the figures need a library that is not installed.
     """
-    if out is not None and find_spec("matplotlib") is None:
-        raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
-    made = paper_motions(clips, scale.frames)
-    with nullcontext() if out is None else new_folder(out) as folder:
-        results = repeat_paper(made, seeds, scale, workers, progress)
+    with figures_folder(out) as folder:
+        results = repeat_paper(paper_motions(clips, scale.frames), seeds, scale, workers, progress)
         report = {
             "version": __version__,
-            "motions": {name: _described(results, name) for name in results.motions},
+            "motions": {
+                name: {
+                    "test": one.test.name,
+                    "train": [clip.name for clip in one.training],
+                    "frames": len(one.test),
+                    "training_frames": len(one.angles),
+                }
+                for name, one in results.motions.items()
+            },
             "seeds": seeds,
             "views_degrees": list(scale.views),
             "given": _given(scale),
@@ -150,51 +92,40 @@ def _given(scale: Scale) -> dict[str, str]:
     }
 
 
-def _described(results: PaperResults, motion: str) -> dict[str, Any]:
-    one = results.motions[motion]
-    return {
-        "test": one.test.name,
-        "train": [clip.name for clip in one.training],
-        "frames": len(one.test),
-        "training_frames": len(one.angles),
-    }
-
-
 def _table_1(results: PaperResults, motion: str) -> dict[str, Any]:
     """Return four joints' angles in the middle frame, in degrees, and their mean absolute errors."""
     truth, scale = results.motions[motion].test.poses, results.scale
     frame, view = len(truth) // 2, scale.views.index(scale.shown)
-    poses = {name: results.estimated(motion, name)[view, 0] for name in (OURS, LETTER, *BASELINES)}
     true, estimate = TABLE_1[motion]
-    rows = {name: _row(truth, one, frame) for name, one in poses.items()}
     paper = {"truth": true.tolist(), "estimate": estimate.tolist(), "error": float(np.abs(estimate - true).mean())}
-    return {"paper": paper, "frame": frame, "view_degrees": scale.shown, "truth": _shown(truth[frame]), **rows}
 
+    def angles(pose: Array) -> list[list[float]]:
+        return [[float(angle) for angle in joint] for joint in np.degrees(wrapped(pose[_ANGLES])).reshape(-1, 3)]
 
-def _row(truth: Array, poses: Array, frame: int) -> dict[str, Any]:
-    away = np.degrees(np.abs(wrapped(poses - truth)))[:, _ANGLES]
-    return {
-        "angles": _shown(poses[frame]),
-        "error": float(away[frame].mean()),
-        "error_all_frames": float(away.mean()),
-    }
-
-
-def _shown(pose: Array) -> list[list[float]]:
-    return [[float(angle) for angle in joint] for joint in np.degrees(wrapped(pose[_ANGLES])).reshape(-1, 3)]
+    rows: dict[str, Any] = {}
+    for name in (OURS, LETTER, *BASELINES):
+        poses = results.poses(motion, name, "images")[view, 0]
+        away = np.degrees(np.abs(wrapped(poses - truth)))[:, _ANGLES]
+        errors = {"error": float(away[frame].mean()), "error_all_frames": float(away.mean())}
+        rows[name] = {"angles": angles(poses[frame]), **errors}
+    return {"paper": paper, "frame": frame, "view_degrees": scale.shown, "truth": angles(truth[frame]), **rows}
 
 
 def _table_2(results: PaperResults, motion: str) -> dict[str, Any]:
     """Return what each method and each baseline is worth on a motion: means over views and seeds."""
-    mean = float(_by_run(results, motion, "mean_pose").mean())
+
+    def by_run(name: str, measure: Callable[[Array], float]) -> Array:
+        return np.array([measure(one) for view in results.errors(motion, name) for one in view])
+
+    mean = float(by_run("mean_pose", metrics.mean_error).mean())
     rows: dict[str, dict[str, Any]] = {}
     for name in (*COMPARED[motion], *BASELINES):
-        error, spread = _by_run(results, motion, name), _by_run(results, motion, name, metrics.error_spread)
+        error = by_run(name, metrics.mean_error)
         rows[name] = {
             "error_degrees": float(error.mean()),
-            "free_degrees": float(results.free_errors(motion, name).mean()),
+            "free_degrees": float(results.errors(motion, name, free=True).mean()),
             "worst_degrees": float(error.max()),
-            "spread_degrees": float(spread.mean()),
+            "spread_degrees": float(by_run(name, metrics.error_spread).mean()),
             "skill": metrics.skill(float(error.mean()), mean),
         }
         if name in METHODS:
@@ -211,14 +142,6 @@ def _table_2(results: PaperResults, motion: str) -> dict[str, Any]:
     return rows
 
 
-def _by_run(
-    results: PaperResults, motion: str, name: str, measure: Callable[[Array], float] = metrics.mean_error
-) -> Array:
-    """Return a measure of the errors of each run (views x seeds,)."""
-    errors = results.errors(motion, name)
-    return np.array([measure(one) for one in errors.reshape(-1, errors.shape[2])])
-
-
 def _shortened(results: PaperResults, clips: bool, workers: int) -> list[str]:
     lengths = {name: (len(one.test), len(one.angles)) for name, one in results.motions.items()}
     tests = ", ".join(f"{count} of the {LABELS[name]}" for name, (count, _) in lengths.items())
@@ -226,21 +149,78 @@ def _shortened(results: PaperResults, clips: bool, workers: int) -> list[str]:
         f"{count} ({TRAINING_FRAMES[name]}) for the {LABELS[name]}" for name, (_, count) in lengths.items()
     )
     views = ", ".join(f"{view:.0f}" for view in results.scale.views)
-    lines = [
+    at_once = "one track" if workers == 1 else f"{'two' if workers == 2 else workers} tracks"
+    return [
+        "clips: the first frame of each is left out, for 16_15 begins with a pose that is not of the walk"
+        if clips
+        else "motions are built in, and smooth: --clips CMU_DIR takes the paper's source",
         f"frames: {tests}; the paper has {FRAMES} of each, at a rate it does not give, here {FPS:.0f} a second",
         f"training poses (the paper's): {trained}; which clips it took, and of whom, the paper does not say",
         f"silhouettes: rendered, {SIZE[0]} x {SIZE[1]} pixels, seen from {views} degrees (0: in front), both ours",
         "left out: figures 8 and 10, of real video, which docs/studies/footage.py makes of a copy of the data sets",
         "full space: the range of the training poses; PF is in that space, as far as the paper tells",
-        f"every method has the same evaluations a frame, which the paper's had not; {_at_once(workers)} ran at once",
+        f"every method has the same evaluations a frame, which the paper's had not; {at_once} ran at once",
     ]
-    first = (
-        "clips: the first frame of each is left out, for 16_15 begins with a pose that is not of the walk"
-        if clips
-        else "motions are built in, and smooth: --clips CMU_DIR takes the paper's source"
-    )
-    return [first, *lines]
 
 
-def _at_once(workers: int) -> str:
-    return {1: "one track", 2: "two tracks"}.get(workers, f"{workers} tracks")
+def paper_text(report: dict[str, Any]) -> str:
+    """Return the report as it is printed."""
+    return "\n".join([*_lines_1(report), "", *_lines_2(report), "", *_lines_claims(report), "", *_lines_given(report)])
+
+
+def _lines_1(report: dict[str, Any]) -> Iterator[str]:
+    yield "Table 1: angles in degrees of single images, the yaw unknown. Ours are x, y, z of an Acclaim skeleton, whose"
+    yield "knee has x alone; the paper's axes are not given. Error: mean of the twelve, in this frame and in all frames"
+    yield f"{'':39} {''.join(f'{name:>24}' for name in TABLE_1_JOINTS)}  error  all frames"
+    for motion, rows in report["table_1"].items():
+        paper = rows["paper"]
+        yield _angles(f"{LABELS[motion]}, the paper's truth", paper["truth"])
+        yield _angles("  the paper's estimate", paper["estimate"], f"{paper['error']:7.2f}")
+        yield _angles(f"  ours, truth of frame {rows['frame']}", rows["truth"])
+        for name in (OURS, LETTER, *BASELINES):
+            one = rows[name]
+            errors = f"{one['error']:7.2f} {one['error_all_frames']:11.2f}"
+            yield _angles(f"  {_label(name)}", one["angles"], errors)
+
+
+def _angles(label: str, joints: list[list[float]], errors: str = "") -> str:
+    return f"{label:39} " + "".join(f"{x:8.1f}{y:8.1f}{z:8.1f}" for x, y, z in joints) + errors
+
+
+def _lines_2(report: dict[str, Any]) -> Iterator[str]:
+    yield "Table 2: error in degrees (9), its spread (10) and seconds a frame, the paper's and ours; free: over the"
+    yield "angles that move; wrong: runs that err more than the mean pose"
+    heads = ["paper", "spread", "s", "ours", "free", "worst", "spread", "s", "skill", "swapped", "lost", "wrong"]
+    for motion, rows in report["table_2"].items():
+        yield f"{LABELS[motion]:39}" + "".join(f"{head:>8}" for head in heads) + f"{'evaluations':>12}"
+        for name, one in rows.items():
+            cells = list(one["paper"].values()) if "paper" in one else ["-"] * 3
+            figures = ("error_degrees", "free_degrees", "worst_degrees", "spread_degrees")
+            cells += [f"{one[key]:.2f}" for key in figures]
+            cells.append(f"{one['seconds_per_frame']:.4f}" if name in METHODS else "-")
+            cells.append("-" if one["skill"] is None else f"{one['skill']:.2f}")
+            cells += [f"{100 * one[key]:.0f} %" for key in ("swapped", "lost", "wrong") if key in one]
+            evaluations = f"{one['evaluations']:12,.0f}" if name in METHODS else ""
+            yield f"  {_label(name):37}" + "".join(f"{cell:>8}" for cell in cells) + evaluations
+
+
+def _label(name: str) -> str:
+    return f"{METHODS[name].label} ({name})" if name in METHODS else BASELINES[name]
+
+
+def _lines_claims(report: dict[str, Any]) -> Iterator[str]:
+    yield "What the paper says. Pairs are views and seeds of one clip, of single images of all; p-values are of these."
+    for one in report["claims"]:
+        if one["source"]:
+            yield f"  {one['verdict']}: {one['text']} ({one['source']}): {one['evidence']}"
+    yield "What it does not ask"
+    for one in report["claims"]:
+        if not one["source"]:
+            yield f"  {one['verdict']}: {one['text']}: {one['evidence']}"
+
+
+def _lines_given(report: dict[str, Any]) -> Iterator[str]:
+    yield "What was given"
+    yield from (f"  {experiment}: {given}" for experiment, given in report["given"].items())
+    yield f"Against the paper ({report['seeds']} seeds)"
+    yield from (f"  {line}" for line in report["shortened"])

@@ -21,7 +21,7 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
-from posefit_reproduce.vsmm.switches import ModelState, model_states, switching_figures
+from posefit_reproduce.vsmm.switches import State, model_states, switching_figures
 from posefit_vsmm.motion import library
 from posefit_vsmm.settings import OURS, PATENT
 from posefit_vsmm.state import AT
@@ -113,7 +113,7 @@ def patent_errors(film: Film, frames: Sequence[Frame]) -> dict[str, float]:
     }
 
 
-def detected_cm(film: Film, frames: Sequence[Frame], states: Sequence[ModelState]) -> Array:
+def detected_cm(film: Film, frames: Sequence[Frame], states: Sequence[State]) -> Array:
     """Return how far the estimated right elbow and hand (T, 2) are from the detected ones; NaN where hidden.
 
     This is what the patent's figure 11 shows, in centimetres at the estimate's depth.
@@ -121,12 +121,12 @@ def detected_cm(film: Film, frames: Sequence[Frame], states: Sequence[ModelState
     _, estimate = both_joints(film, frames)
     pixels, depths = film.camera.project(estimate[:, [ELBOW, HAND]])
     points = [AT["right elbow"], AT["right hand"]]
-    joints = np.array([state.joints[0, points] for state in states])
+    joints = np.array([state["joints"][0, points] for state in states])
     away = 100.0 * np.linalg.norm((pixels - joints) / film.camera.focal, axis=-1) * depths
-    return np.where(np.array([state.confidence[0, points] for state in states]) > 0.0, away, np.nan)
+    return np.where(np.array([state["confidence"][0, points] for state in states]) > 0.0, away, np.nan)
 
 
-def detected_errors(film: Film, frames: Sequence[Frame], states: Sequence[ModelState]) -> dict[str, float]:
+def detected_errors(film: Film, frames: Sequence[Frame], states: Sequence[State]) -> dict[str, float]:
     """Return the errors of right elbow and hand against the detected joints; nothing for a tracker without them."""
     if not states:
         return {}

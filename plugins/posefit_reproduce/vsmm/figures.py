@@ -16,7 +16,7 @@ from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, detected_cm, projected_cm
-from posefit_reproduce.vsmm.switches import ModelState, model_states
+from posefit_reproduce.vsmm.switches import State, model_states
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
 PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors
@@ -39,12 +39,12 @@ def patent_figures(film: Film, frames: Sequence[Frame], folder: Path) -> list[st
     return [stills, *figures]
 
 
-def probability_figure(film: Film, states: Sequence[ModelState]) -> Figure:
+def probability_figure(film: Film, states: Sequence[State]) -> Figure:
     """Return the probability of each model over time, with the groups that are in force."""
-    names = list(dict.fromkeys(model for group in states[0].groups.values() for model in group))
+    names = list(dict.fromkeys(model for group in states[0]["groups"].values() for model in group))
     values = np.zeros((len(names), len(states)))
     for k, one in enumerate(states):
-        for model, probability in zip(one.models, one.probabilities, strict=True):
+        for model, probability in zip(one["models"], one["probabilities"], strict=True):
             values[names.index(model), k] = probability
     figure = Figure(figsize=(10.0, 4.6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4.0, 1.0))
@@ -53,9 +53,9 @@ def probability_figure(film: Film, states: Sequence[ModelState]) -> Figure:
         upper.plot(seconds, series, linewidth=1.2, label=name)
     upper.set(ylabel="probability", ylim=(0.0, 1.14))
     upper.legend(fontsize=7, frameon=False, ncols=len(names), loc="upper center", bbox_to_anchor=(0.5, 1.14))
-    groups = list(states[0].groups)
+    groups = list(states[0]["groups"])
     for row, group in enumerate(groups):
-        force = [k for k, one in enumerate(states) if group in (one.group, one.newcomer) or one.group is None]
+        force = [k for k, one in enumerate(states) if group in (one["group"], one["newcomer"]) or one["group"] is None]
         lower.scatter(seconds[force], np.full(len(force), row), s=4, marker="s")
     lower.set(yticks=range(len(groups)), yticklabels=groups, ylim=(-0.6, len(groups) - 0.4), xlabel="seconds")
     lower.set_ylabel("in force")
@@ -64,7 +64,7 @@ def probability_figure(film: Film, states: Sequence[ModelState]) -> Figure:
     return figure
 
 
-def error_figure(film: Film, frames: Sequence[Frame], states: Sequence[ModelState]) -> Figure:
+def error_figure(film: Film, frames: Sequence[Frame], states: Sequence[State]) -> Figure:
     """Return the errors of right elbow and hand over time, against the detected joints and against the truth."""
     truth, estimate = (joints[:, [ELBOW, HAND]] for joints in both_joints(film, frames))
     errors = {
@@ -95,21 +95,21 @@ def _activities(axes: Any, film: Film, label: bool) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def film_stills(film: Film, frames: Sequence[Frame], states: Sequence[ModelState]) -> Image:
+def film_stills(film: Film, frames: Sequence[Frame], states: Sequence[State]) -> Image:
     """Return stills: the detected joints on the mask, the fitted body on it, and the body from its side."""
     columns = [_still(film, frames[k], states[k], k) for k in STILLS]
     rows = [np.hstack(columns[k : k + len(columns) // 2]) for k in (0, len(columns) // 2)]
     return np.asarray(np.vstack(rows))
 
 
-def _still(film: Film, frame: Frame, states: ModelState, k: int) -> Image:
+def _still(film: Film, frame: Frame, state: State, k: int) -> Image:
     mask = film.observations[k].silhouettes[0].mask
     grey = np.where(mask, 150, 28).astype(np.uint8)
     blank = cv2.cvtColor(
         cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR
     )
     marked = np.asarray(blank, dtype=np.uint8).copy()
-    for point, sure in zip(states.joints[0], states.confidence[0], strict=True):
+    for point, sure in zip(state["joints"][0], state["confidence"][0], strict=True):
         cv2.circle(marked, _pixel(point), 4, _JOINT if sure > 0.0 else _HIDDEN, -1 if sure > 0.0 else 1, cv2.LINE_AA)
     drawn = np.repeat(grey[..., None], 3, axis=2)
     draw_body(drawn, film.body, film.camera, frame.pose, frame.translation)

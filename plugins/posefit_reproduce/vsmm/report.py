@@ -2,16 +2,13 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posefit.files import new_folder
 from posefit.version import __version__
-from posefit_reproduce.jobs import Progress
+from posefit_reproduce.jobs import Progress, figures_folder
 from posefit_reproduce.vsmm.activities import ACTIVITIES, film_of
 from posefit_reproduce.vsmm.experiment import SHOWN, WORKERS, repeat_patent
 
@@ -68,9 +65,7 @@ def patent_report(
     Raises ValueError where seeds is no positive number or the folder cannot be written, and ImportError where the
     pictures need a library that is not installed.
     """
-    if out is not None and find_spec("matplotlib") is None:
-        raise ImportError("the figures need the library matplotlib: pip install posefit[figures]")
-    with nullcontext() if out is None else new_folder(out) as folder:
+    with figures_folder(out) as folder:
         figures, shown = repeat_patent(seeds, searches, alternatives, workers, progress)
         figures["version"] = __version__
         if folder is not None:

@@ -1,86 +1,61 @@
 """How the models' probabilities and the groups in force fare: what the patent's figure 10 shows, as numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film
 
 # the film's activity that each label stands for; a jump is none of them
 LABELS = {"walk": 0, "arms-out": 1, "jacks": 2, "squat": 3}
+State = Mapping[str, Any]  # a frame's `details` by the vsmm tracker, and its `activity`
 
 
-@dataclass(frozen=True, eq=False)
-class ModelState:
-    """The models and the groups in force in a frame, and the detected joints."""
-
-    groups: Mapping[str, tuple[str, ...]]  # the models of every group there is
-    group: str | None  # the one in force; None while one is chosen
-    newcomer: str | None  # the one that contends with it
-    models: tuple[str, ...]  # in force
-    probabilities: Array  # of each of these
-    activity: str | None  # the label
-    lost: bool
-    repairs: int  # of covariances, so far
-    restarts: int  # of all models, so far
-    filter_seconds: float
-    detection_seconds: float
-    joints: Array = field(repr=False)  # (views, 17, 2) pixels
-    confidence: Array = field(repr=False)  # (views, 17)
-
-    @property
-    def contending(self) -> tuple[str, ...]:
-        """The models of the newcomer."""
-        return () if self.newcomer is None else self.groups[self.newcomer]
-
-    @classmethod
-    def of(cls, frame: Frame) -> Self | None:
-        """Return the state in a frame's `details`; None for a tracker without models."""
-        if "probabilities" not in frame.details:
-            return None
-        details = {**frame.details, "activity": frame.activity}
-        return cls(**{one.name: details[one.name] for one in fields(cls)})
+def model_states(frames: Sequence[Frame]) -> list[State]:
+    """Return the models and the groups in force in every frame; an empty list for a tracker without models."""
+    if not all("probabilities" in frame.details for frame in frames):
+        return []
+    return [{**frame.details, "activity": frame.activity} for frame in frames]
 
 
-def model_states(frames: Sequence[Frame]) -> list[ModelState]:
-    """Return the state in every frame; an empty list where one has none."""
-    states = [ModelState.of(frame) for frame in frames]
-    return [] if None in states else [one for one in states if one is not None]
-
-
-def switching_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any]:
+def switching_figures(film: Film, states: Sequence[State]) -> dict[str, Any]:
     """Return how the models' probabilities and the groups in force fare; nothing for a tracker without models."""
     if not states:
         return {}
     right = [ACTIVITIES[label].models for label in film.labels]
-    likely = [one.models[int(np.argmax(one.probabilities))] for one in states]
-    right_group = [bool(_group_models(state) & models) for state, models in zip(states, right, strict=True)]
+    likely = [one["models"][int(np.argmax(one["probabilities"]))] for one in states]
+    right_group = [
+        bool((_models(state, "group") | _models(state, "newcomer")) & models)
+        for state, models in zip(states, right, strict=True)
+    ]
     delays = [_delay(right_group, first, film.labels) for first in film.switches]
+    newcomers = [
+        _models(state, "newcomer") & models
+        for (before, state), models in zip(pairwise(states), right[1:], strict=True)
+        if state["newcomer"] not in (None, before["newcomer"])
+    ]
+    terminations = [
+        set(before["models"]) & models and not set(state["models"]) & models
+        for (before, state), models in zip(pairwise(states), right[1:], strict=True)
+    ]
     return {
-        "dominant_fraction": float(np.mean([one.probabilities.max() > 0.5 for one in states])),
+        "dominant_fraction": float(np.mean([one["probabilities"].max() > 0.5 for one in states])),
         "right_model_fraction": float(np.mean([a in b for a, b in zip(likely, right, strict=True)])),
         "right_group_fraction": float(np.mean(right_group)),
-        "restarts": int(states[-1].restarts),
+        "restarts": int(states[-1]["restarts"]),
         **activity_figures(film, states),
         "switch_delay_frames": max(delays),
         "switch_delays_frames": delays,
-        "filter_ms": 1e3 * float(np.mean([one.filter_seconds for one in states])),
-        "detection_ms": 1e3 * float(np.mean([one.detection_seconds for one in states])),
-        "activations": sum(_came(before, now) for before, now in pairwise(states)),
-        "wrong_activations": sum(
-            _came(states[k - 1], states[k]) and not right[k] & set(states[k].contending) for k in range(1, len(states))
-        ),
-        "wrong_terminations": sum(
-            bool(set(states[k - 1].models) & right[k]) and not set(states[k].models) & right[k]
-            for k in range(1, len(states))
-        ),
-        "repairs": int(states[-1].repairs),
-        "lost_frames": sum(bool(one.lost) for one in states),
+        "filter_ms": 1e3 * float(np.mean([one["filter_seconds"] for one in states])),
+        "detection_ms": 1e3 * float(np.mean([one["detection_seconds"] for one in states])),
+        "activations": len(newcomers),
+        "wrong_activations": sum(not models for models in newcomers),
+        "wrong_terminations": sum(map(bool, terminations)),
+        "repairs": int(states[-1]["repairs"]),
+        "lost_frames": sum(bool(one["lost"]) for one in states),
     }
 
 
@@ -92,12 +67,12 @@ def _delay(right_group: Sequence[bool], first: int, labels: Sequence[int]) -> in
     return len(labels) - first
 
 
-def _group_models(state: ModelState) -> set[str]:
-    """Return the models of the group in force and of the one that contends with it; none while one is chosen."""
-    return {model for name in (state.group, state.newcomer) if name is not None for model in state.groups[name]}
+def _models(state: State, which: str) -> set[str]:
+    """Return the models of the `group` in force, or of the `newcomer` that contends with it."""
+    return set() if state[which] is None else set(state["groups"][state[which]])
 
 
-def activity_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any]:
+def activity_figures(film: Film, states: Sequence[State]) -> dict[str, Any]:
     """Return how well the frames' labels name the activity.
 
     `confusion` has the frames of each true activity by label, the last column being a label of none; chance always says
@@ -105,11 +80,7 @@ def activity_figures(film: Film, states: Sequence[ModelState]) -> dict[str, Any]
     """
     counts = np.zeros((len(ACTIVITIES), len(ACTIVITIES) + 1), dtype=np.int64)
     for state, label in zip(states, film.labels, strict=True):
-        counts[label, LABELS.get(state.activity or "", len(ACTIVITIES))] += 1
+        counts[label, LABELS.get(state["activity"] or "", len(ACTIVITIES))] += 1
     right = np.trace(counts)
     chance = counts.sum(axis=1).max() / counts.sum()
     return {"activity_accuracy": float(right / counts.sum()), "chance": float(chance), "confusion": counts.tolist()}
-
-
-def _came(before: ModelState, now: ModelState) -> bool:
-    return now.newcomer is not None and now.newcomer != before.newcomer
