@@ -1,0 +1,69 @@
+"""The names of `posefit`, each with the module that it is imported from when it is first used."""
+
+from pluggy import HookimplMarker
+
+from posefit.ambiguity.estimate import ambiguity_of as ambiguity_of
+from posefit.fitting.box import Space as Space
+from posefit.fitting.box import Start as Start
+from posefit.fitting.optimiser import Filter as Filter
+from posefit.fitting.optimiser import Minimum as Minimum
+from posefit.fitting.optimiser import Optimiser as Optimiser
+from posefit.fitting.optimiser import minimise as minimise
+from posefit.fitting.prior import Prior as Prior
+from posefit.fitting.problem import PoseProblem as PoseProblem
+from posefit.fitting.space import SearchSpace as SearchSpace
+from posefit.fitting.tracker import Frame as Frame
+from posefit.fitting.tracker import Observation as Observation
+from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
+from posefit.fitting.tracker import Task as Task
+from posefit.fitting.tracker import Tracker as Tracker
+from posefit.footage.segmentation import Extraction as Extraction
+from posefit.footage.source import load_motion as load_motion
+from posefit.geometry.body import Body as Body
+from posefit.geometry.camera import Camera as Camera
+from posefit.geometry.skeleton import JOINTS as JOINTS
+from posefit.geometry.skeleton import Skeleton as Skeleton
+from posefit.geometry.symmetry import exchanged_limbs as exchanged_limbs
+from posefit.geometry.symmetry import facing as facing
+from posefit.geometry.symmetry import mirrored_poses as mirrored_poses
+from posefit.geometry.symmetry import reflected_poses as reflected_poses
+from posefit.geometry.symmetry import turned_poses as turned_poses
+from posefit.measuring.angles import clinical_angles as clinical_angles
+from posefit.measuring.centres import joint_centres as joint_centres
+from posefit.measuring.gait import gait_of as gait_of
+from posefit.motion.motion import Motion as Motion
+from posefit.niching import best_apart as best_apart
+from posefit.niching import niche_instance as niche_instance
+from posefit.niching import scored as scored
+from posefit.registry import optimiser as optimiser
+from posefit.registry import prior as prior
+from posefit.report.comparison import Comparison as Comparison
+from posefit.report.comparison import compare as compare
+from posefit.silhouette.cost import areas as areas
+from posefit.silhouette.cost import mismatch as mismatch
+from posefit.silhouette.cost import pose_costs as pose_costs
+from posefit.silhouette.cost import project as project
+from posefit.silhouette.cuda.device import moved_to as moved_to
+from posefit.silhouette.limbs import LimbMasks as LimbMasks
+from posefit.silhouette.limbs import LimbPoses as LimbPoses
+from posefit.silhouette.limbs import every_combination as every_combination
+from posefit.silhouette.mask import Silhouette as Silhouette
+from posefit.statistics.intervals import iqm_intervals as iqm_intervals
+from posefit.statistics.ranks import friedman as friedman
+from posefit.suites.problem import Problem as Problem
+from posefit.suites.problem import Suite as Suite
+from posefit.suites.problem import suite as suite
+from posefit.sweep.ledger import Ledger as Ledger
+from posefit.tracking.evaluation import unseen as unseen
+from posefit.tracking.front import fit as fit
+from posefit.tracking.front import track as track
+from posefit.tracking.live import track_live as track_live
+from posefit.tracking.modes import modes as modes
+from posefit.tracking.result import Fit as Fit
+from posefit.tracking.result import Track as Track
+from posefit.uncertainty.intervals import angle_intervals as angle_intervals
+from posefit.uncertainty.intervals import joint_intervals as joint_intervals
+from posefit.uncertainty.modes import modes_of as modes_of
+from posefit.version import __version__ as __version__
+
+hookimpl: HookimplMarker
