@@ -22,8 +22,7 @@ level; only the ten heaviest poses of a report count.
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
-from typing import Literal, Self, final
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +30,17 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import displacement, wrap
-from posefit.fitting.check import positive
+from posefit.fitting.check import positive, whole
+from posefit.fitting.prior import Components
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angle_index
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in, recorded
-from posefit.reading import quoted
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Posterior, poses_apart
@@ -59,61 +58,6 @@ for _joint in INNER:
 ARMS = np.flatnonzero(_ARMS)  # angles of a pose (66,) that belong to its arms
 
 
-@final
-class LegsAndArms:
-    """A prior of joint angles: principal components of legs and trunk, and of the arms by themselves."""
-
-    mean: Array  # (63,)
-    components: Array  # (m, 63), those of legs and trunk first
-    low: Array  # (m,)
-    high: Array  # (m,)
-
-    def fit(
-        self,
-        angles: Array,
-        skeleton: Skeleton | None = None,  # noqa: ARG002, as of any prior
-        arms: Array | None = None,
-    ) -> Self:
-        """Fit to joint angles (T, 63); the arms to other angles (n, 63) where they are given."""
-        samples, columns = (angles, angles if arms is None else arms), (~_ARMS[3:], _ARMS[3:])
-        self.mean, self.components = np.zeros(ANGLES - 3), np.zeros((sum(COMPONENTS), ANGLES - 3))
-        blocks = (slice(0, COMPONENTS[0]), slice(COMPONENTS[0], None))
-        for sample, part, count, block in zip(samples, columns, COMPONENTS, blocks, strict=True):
-            self.mean[part] = sample[:, part].mean(axis=0)
-            directions = np.linalg.svd(sample[:, part] - self.mean[part], full_matrices=False)[2][:count]
-            directions *= np.sign(directions[np.arange(count), np.abs(directions).argmax(axis=1)])[:, None]
-            self.components[block, part] = directions
-        latents = [self.transform(sample)[:, block] for sample, block in zip(samples, blocks, strict=True)]
-        self.low = np.concatenate([some.min(axis=0) for some in latents])
-        self.high = np.concatenate([some.max(axis=0) for some in latents])
-        return self
-
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m)."""
-        angles = np.tile(self.mean, (len(latents), 1))
-        for k, direction in enumerate(self.components):  # no matrix product: its last bits depend on the other rows
-            angles += latents[:, k, None] * direction
-        return angles
-
-    def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are feasible (n,)."""
-        return np.ones(len(latents), dtype=bool)
-
-    def save(self, path: str | Path) -> None:
-        """Write the fitted arrays to an .npz file."""
-        np.savez(path, mean=self.mean, components=self.components, low=self.low, high=self.high)
-
-    def clipped(self, poses: Array) -> Array:
-        """Return the poses (n, 66) of the box that are nearest to poses (n, 66)."""
-        poses = np.array(poses, dtype=np.float64)
-        poses[:, 3:] = self.inverse_transform(np.clip(self.transform(poses[:, 3:]), self.low, self.high))
-        return poses
-
-
 @lru_cache(maxsize=1)
 def stride_poses() -> Array:
     """Return the poses (n, 66) of walks and runs, and their mirror images."""
@@ -127,15 +71,35 @@ def lent_arms() -> Array:
 
 
 @lru_cache(maxsize=1)
-def legs_and_arms() -> LegsAndArms:
-    """Return the prior of the niching task."""
-    return LegsAndArms().fit(stride_poses()[:, 3:], arms=lent_arms()[:, 3:])
+def legs_and_arms() -> Components:
+    """Return the prior of the niching task: components of legs and trunk, and then of the arms by themselves."""
+    mean, directions, ranges = np.zeros(ANGLES - 3), np.zeros((sum(COMPONENTS), ANGLES - 3)), []
+    first = 0
+    for poses, part, count in zip((stride_poses(), lent_arms()), (~_ARMS[3:], _ARMS[3:]), COMPONENTS, strict=True):
+        angles, block = poses[:, 3:], slice(first, first + count)
+        mean[part] = angles[:, part].mean(axis=0)
+        axes = np.linalg.svd(angles[:, part] - mean[part], full_matrices=False)[2][:count]
+        directions[block, part] = axes * np.sign(axes[np.arange(count), np.abs(axes).argmax(axis=1)])[:, None]
+        first += count
+    prior = Components(mean, directions, np.empty(0), np.empty(0))
+    for poses, block in ((stride_poses(), slice(None, COMPONENTS[0])), (lent_arms(), slice(COMPONENTS[0], None))):
+        latents = prior.transform(poses[:, 3:])[:, block]
+        ranges.append((latents.min(axis=0), latents.max(axis=0)))
+    prior.low, prior.high = (np.concatenate(ends) for ends in zip(*ranges, strict=True))
+    return prior
+
+
+def clipped(poses: Array) -> Array:
+    """Return the poses (n, 66) of the box that are nearest to poses (n, 66)."""
+    prior, poses = legs_and_arms(), np.array(poses, dtype=np.float64)
+    poses[:, 3:] = prior.inverse_transform(np.clip(prior.transform(poses[:, 3:]), prior.low, prior.high))
+    return poses
 
 
 @lru_cache(maxsize=1)
 def box_arms() -> Array:
-    """Return the angles of these arms (n, 30), moved into the box."""
-    arms = legs_and_arms().clipped(lent_arms())[:, ARMS]
+    """Return the angles of the lent arms (n, 30), moved into the box."""
+    arms = clipped(lent_arms())[:, ARMS]
     arms.setflags(write=False)
     return arms
 
@@ -180,7 +144,7 @@ class NicheInstance:
     @property
     def proposals(self) -> Array:
         """The known poses as proposals (K, d)."""
-        return _proposals(self.problem.space, legs_and_arms(), self.known)
+        return _proposals(self.problem.space, self.known)
 
     def distances_mm(self, poses: Array) -> Array:
         """Return the distances (n, K) in millimetres of poses (n, 66) from the known ones; see `poses_apart`."""
@@ -193,8 +157,8 @@ def niche_instance(number: int) -> NicheInstance:
 
     Raises ValueError where the number is out of range.
     """
-    if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < COUNT:
-        raise InputError(f"instance must be a whole number from 0 to {COUNT - 1}, got {quoted(number)}")
+    if whole("instance", number, 0) >= COUNT:
+        raise InputError(f"instance must be at most {COUNT - 1}, got {number}")
     kind, rng = KINDS[number % len(KINDS)], np.random.default_rng([RNG_STREAM, number])
     for _ in range(ATTEMPTS):
         instance = _attempt(int(number), kind, rng)
@@ -210,7 +174,7 @@ def niche_space() -> SearchSpace:
 
 def _attempt(number: int, kind: Kind, rng: np.random.Generator) -> NicheInstance | None:
     """Return the instance of one draw, or None where fewer than two of its poses qualify."""
-    prior, space, body = legs_and_arms(), niche_space(), Body.of(built_in.average_skeleton())
+    space, body = niche_space(), Body.of(built_in.average_skeleton())
     yaw, side = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0])
     view = np.radians(side * rng.uniform(*VIEWS[kind]) + (180.0 * rng.integers(2) if kind == "turns" else 0.0))
     camera = Camera.around(PLACE, yaw + view, DISTANCE, SIZE, FIELD_OF_VIEW)
@@ -218,11 +182,11 @@ def _attempt(number: int, kind: Kind, rng: np.random.Generator) -> NicheInstance
     pose[0], pose[1:3] = yaw, np.clip(wrapped(pose[1:3]), -ROOT_RANGE[1:], ROOT_RANGE[1:])
     if kind == "arms":
         pose[ARMS] = box_arms()[rng.integers(len(box_arms()))]
-    poses = prior.clipped(pose[None])
+    poses = clipped(pose[None])
     person = varied(body, BUILD_PERCENT, rng)
     if kind == "arms":
         poses = np.concatenate([poses, _other_arms(_problem(person, body, camera, poses[0], space), poses[0], rng)])
-    poses = np.concatenate([poses, prior.clipped(reflected_poses(body.skeleton, poses, facing(camera, PLACE)))])
+    poses = np.concatenate([poses, clipped(reflected_poses(body.skeleton, poses, facing(camera, PLACE)))])
     true = int(rng.integers(len(poses)))
     stance = poses[true].copy()
     stance[3:] += rng.normal(0.0, STANCE, len(stance) - 3)
@@ -270,7 +234,7 @@ def _is_separate_niche(problem: PoseProblem, poses: Array, costs: Array, k: int,
         return True
     if 1e3 * poses_apart(problem.body.skeleton, poses[[k]], poses[others]).min() < APART_MM:
         return False
-    proposals = _proposals(problem.space, legs_and_arms(), poses)
+    proposals = _proposals(problem.space, poses)
     for other in others:
         way = displacement(problem.space, proposals[k], proposals[other])
         between = problem.evaluate(wrap(problem.space, proposals[k] + STEPS[:, None] * way))
@@ -279,8 +243,8 @@ def _is_separate_niche(problem: PoseProblem, poses: Array, costs: Array, k: int,
     return True
 
 
-def _proposals(space: SearchSpace, prior: LegsAndArms, poses: Array) -> NDArray[np.float64]:
-    return space.proposals(np.column_stack([poses[:, :3], prior.transform(poses[:, 3:])]))
+def _proposals(space: SearchSpace, poses: Array) -> Array:
+    return space.proposals(np.column_stack([poses[:, :3], legs_and_arms().transform(poses[:, 3:])]))
 
 
 REPORTED = 10  # poses of a report that count; a report of everything would be worth nothing

@@ -20,8 +20,8 @@ from posefit.niching import (
     LEVELS_MM,
     REPORTED,
     STEPS,
-    LegsAndArms,
     best_apart,
+    clipped,
     legs_and_arms,
     niche_instance,
     niche_space,
@@ -81,20 +81,20 @@ def test_instances_differ_and_any_known_pose_may_be_the_true_one() -> None:
 
 def test_a_number_out_of_range_is_named() -> None:
     for number in (-1, COUNT, 1.5, "1", True, None):
-        with pytest.raises(ValueError, match=f"instance must be a whole number from 0 to {COUNT - 1}, got {number!r}"):
+        with pytest.raises(ValueError, match=f"instance must be .*, got {number!r}"):
             niche_instance(number)  # type: ignore[arg-type]
 
 
 def test_the_box_holds_the_mirror_image_of_what_it_holds() -> None:
-    skeleton, prior = built_in.average_skeleton(), legs_and_arms()
-    held = prior.clipped(stride_poses()[::97])
+    skeleton = built_in.average_skeleton()
+    held = clipped(stride_poses()[::97])
     mirrored = mirrored_poses(skeleton, held)
-    assert prior.clipped(mirrored)[:, 3:] == pytest.approx(mirrored[:, 3:], abs=1e-9)
-    assert prior.clipped(held) == pytest.approx(held, abs=1e-12)
+    assert clipped(mirrored)[:, 3:] == pytest.approx(mirrored[:, 3:], abs=1e-9)
+    assert clipped(held) == pytest.approx(held, abs=1e-12)
 
 
 def test_legs_do_not_move_the_arms_and_rows_are_independent() -> None:
-    prior: LegsAndArms = legs_and_arms()
+    prior = legs_and_arms()
     latents = np.random.default_rng(0).uniform(prior.low, prior.high, (7, len(prior.low)))
     angles = prior.inverse_transform(latents)
     alone = [prior.inverse_transform(latents[k : k + 1])[0] for k in range(len(latents))]

@@ -1,8 +1,6 @@
 """`sapso+vsmm`: the motion models of `vsmm` predict where a swarm starts, and learn from what it finds."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +14,6 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import Skeleton
 from posefit.registry import registry
 from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
@@ -30,7 +27,7 @@ STEP = 0.05  # radians to either side, from which a direction's angles are diffe
 
 @dataclass(eq=False)
 class Directions:
-    """Joint angles are `middle` + latents @ `ways`; a `posefit.fitting.prior.Prior` that needs no fit."""
+    """Joint angles are `middle` + latents @ `ways`; a prior that needs no fit."""
 
     middle: Array = field(repr=False)  # (63,)
     ways: Array = field(repr=False)  # (m, 63)
@@ -54,10 +51,6 @@ class Directions:
         far = reach * np.sqrt(values[chosen])
         return cls(middle[0], ways, -far, far)
 
-    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Return itself: everything is known already."""
-        return self
-
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) that come nearest to joint angles (n, 63)."""
         return np.asarray(wrapped(angles - self.middle) @ np.linalg.pinv(self.ways))
@@ -69,10 +62,6 @@ class Directions:
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return that all latents (n, m) are poses."""
         return np.ones(len(latents), dtype=bool)
-
-    def save(self, path: str | Path) -> None:
-        """Write everything to an .npz file."""
-        np.savez(path, middle=self.middle, ways=self.ways, low=self.low, high=self.high)
 
 
 LEAST = np.repeat([0.02, np.radians(4.0)], [3, ERROR - 3])  # metres and radians: deviations added to the filter's

@@ -1,10 +1,12 @@
 """`posefit suite`."""
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from posefit.cli.options import Decorator, options, parsed_by
+from posefit.cli.options import parsed_by
 from posefit.cli.output import json_line, progress, results_alone, say
 from posefit.errors import InputError
 from posefit.tracking.options import text_range
@@ -15,19 +17,6 @@ if TYPE_CHECKING:
 NAME = "posefit-2026.1"
 
 
-def _problem_options(instances: str) -> Decorator:
-    """Return a decorator that adds the options which select problems."""
-    numbers: dict[str, Any] = {"type": int, "multiple": True}
-    span: dict[str, Any] = {"default": instances, "show_default": True, "metavar": "A:B"}
-    return options(
-        (
-            click.option("--function", "functions", help="Its number; repeatable, by default each.", **numbers),
-            click.option("--dimension", "dimensions", help="Repeatable, by default 9.", **numbers),
-            click.option("--instances", callback=parsed_by(text_range), help="A to B - 1.", **span),
-        )
-    )
-
-
 @click.group(invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
@@ -35,8 +24,6 @@ def suite(context: click.Context, as_json: bool) -> None:
     """List the functions of the numbered benchmark, and their dimensions."""
     if context.invoked_subcommand is not None:
         return
-    from dataclasses import asdict
-
     from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 
     if as_json:
@@ -51,7 +38,16 @@ def suite(context: click.Context, as_json: bool) -> None:
 
 @suite.command("run")
 @click.argument("optimiser")
-@_problem_options("10000:10005")
+@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
+@click.option("--dimension", "dimensions", type=int, multiple=True, help="Repeatable, by default 9.")
+@click.option(
+    "--instances",
+    callback=parsed_by(text_range),
+    default="10000:10005",
+    show_default=True,
+    metavar="A:B",
+    help="A to B - 1.",
+)
 @click.option("--budget", type=int, default=100, show_default=True, help="Evaluations for each dimension, as in plans.")
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
@@ -78,18 +74,15 @@ def suite_run(
     from posefit.registry import registry
     from posefit.suites.problem import Suite
     from posefit.suites.running import run_on
-    from posefit.suites.tally import score_lines, suite_scores
 
     with results_alone():
         whole("budget", budget, 1)
         whole("seed", seed, 0)
         _check_free(out)
+        numbers = _numbers(*instances)
+        chosen_functions, chosen_dimensions = functions or None, dimensions or (9,)
         problems = Suite(
-            name,
-            functions=functions or None,
-            dimensions=dimensions or (9,),
-            instances=_numbers(instances),
-            infeasible=infeasible,
+            name, functions=chosen_functions, dimensions=chosen_dimensions, instances=numbers, infeasible=infeasible
         )
         for one in problems.passed_over:
             listed = ", ".join(map(str, one.dimensions))
@@ -100,12 +93,7 @@ def suite_run(
             for problem in problems
         )
         runs = list(progress(asked, len(problems), "run"))
-        scores = suite_scores(runs)
-        if out is not None:
-            write_runs(runs, out)
-            say(f"written to {out}: IOHprofiler's files")
-    for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
-        click.echo(line)
+    _print(runs, out, as_json)
 
 
 @suite.command("table")
@@ -114,63 +102,20 @@ def suite_run(
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
-    from posefit.suites.tally import score_lines, suite_scores
+    from posefit.reading import counted
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.table import search_runs
 
     _check_free(iohprofiler)
     results = Ledger(ledger, say)
     runs = list(search_runs(results))
-    scores = suite_scores(runs)
-    if iohprofiler is not None:
-        write_runs(runs, iohprofiler)
-        say(f"written to {iohprofiler}: IOHprofiler's files")
     if failed := len(results.quarantined()):
-        say(f"{failed} {'cell' if failed == 1 else 'cells'} failed, left out of all figures")
-    for line in [json_line([one.as_dict() for one in scores])] if as_json else score_lines(scores):
-        click.echo(line)
-
-
-@suite.command("audit")
-@_problem_options("10000:10003")
-@click.option("--method", "methods", multiple=True, help="Searches with the usual budget; repeatable.")
-@click.option("--times", type=int, default=100, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
-@click.option("--write", metavar="FILE", help="New file of the best costs, as known.json of the suite.")
-@click.pass_context
-def suite_audit(
-    context: click.Context,
-    functions: tuple[int, ...],
-    dimensions: tuple[int, ...],
-    instances: tuple[int | None, int | None],
-    methods: tuple[str, ...],
-    times: int,
-    write: str | None,
-) -> None:
-    """Search problems with each method, and check what is reported; exit status 1 where something is wrong."""
-    import json
-
-    from posefit.files import new_file
-    from posefit.fitting.check import whole
-    from posefit.suites.audit import METHODS, audit_lines, audited, known_json
-    from posefit.suites.problem import Suite
-
-    with results_alone():
-        whole("times", times, 0)
-        _check_free(write)
-        problems = Suite(functions=functions or None, dimensions=dimensions or (9,), instances=_numbers(instances))
-        searching = methods or METHODS
-        asked = audited(problems, searching, times=times)
-        rows = list(progress(asked, len(problems), "problem"))
-        if write is not None:
-            with new_file(write) as building:
-                building.write_text(json.dumps(known_json(rows, searching, times), indent=1) + "\n", encoding="utf-8")
-    for line in audit_lines(rows):
-        click.echo(line)
-    context.exit(1 if any(row.faults for row in rows) else 0)
+        say(f"{counted(failed, 'cell')} failed, left out of all figures")
+    _print(runs, iohprofiler, as_json)
 
 
 def _check_free(path: str | None) -> None:
-    """Return nothing. Raises ValueError where a file or folder exists already, or has no place."""
+    """Raise InputError where a file or folder exists already, or has no place."""
     from posefit.files import check_new, check_place
 
     if path is not None:
@@ -178,32 +123,24 @@ def _check_free(path: str | None) -> None:
         check_place(path)
 
 
-def _numbers(instances: tuple[int | None, int | None]) -> range:
-    """Return the instances of a range A:B. Raises ValueError where there are none."""
+def _numbers(start: int | None, stop: int | None) -> range:
+    """Return the instances of a range A:B. Raises InputError where there are none."""
     from posefit.suites.functions import INSTANCES
 
-    first, last = instances[0] or 0, INSTANCES.stop if instances[1] is None else instances[1]
+    first, last = start or 0, INSTANCES.stop if stop is None else stop
     if not 0 <= first < last <= INSTANCES.stop:
         raise InputError(f"--instances must be A:B with 0 <= A < B <= {INSTANCES.stop}, got {first}:{last}")
     return range(first, last)
 
 
-def write_runs(runs: "list[SuiteRun]", out: str) -> None:
-    """Write runs to a new folder, as IOHprofiler has them.
+def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
+    """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
+    from posefit.report.export import suite_runs, write_iohprofiler
+    from posefit.suites.tally import score_lines, suite_scores
 
-    The settings of a run include its way with infeasible proposals and, where a dimension has several budgets, the
-    budget. Both have names of several words, which no optimiser's setting has.
-    """
-    from posefit.report.export import LoggedRun, write_iohprofiler
-    from posefit.suites.functions import suite_function
-    from posefit.suites.tally import budgets_differ
-
-    several = budgets_differ(runs)
-
-    def logged(run: "SuiteRun") -> LoggedRun:
-        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
-        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
-        name = f"f{run.function} {suite_function(run.function).name}"
-        return LoggedRun(run.method, settings, name, run.dimension, run.instance, run.seed, run.evaluations, run.costs)
-
-    write_iohprofiler(map(logged, runs), out)
+    scores = suite_scores(runs)
+    if out is not None:
+        write_iohprofiler(suite_runs(runs), out)
+        say(f"written to {out}: IOHprofiler's files")
+    for line in [json_line([asdict(one) for one in scores])] if as_json else score_lines(scores):
+        click.echo(line)

@@ -20,23 +20,14 @@ RIDGE = 0.05  # ours: of the regression, where a latent's range is 2
 OVER = 0.75 * np.pi  # ours: radians to either side; who tilts so far turns over
 
 
-class Prior(Protocol):
-    """Maps joint angles (n, 63) to latents (n, m) and back. The root is no part of it: SAPSO section 2.
+class Latents(Protocol):
+    """Maps joint angles (n, 63) to latents (n, m) and back: a `Prior` once it is fitted, or one that needs no fit.
 
-    It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods below `fit` may be used
-    only after `fit`. `inverse_transform` and `feasible` must give the same bits for a row whatever rows stand
-    beside it.
-
-    A prior whose joint angles are affine in the latents may say so: by an attribute `affine`, the weights (m, 63) that
-    latents are multiplied with and the angles (63,) where all of them are 0. Then a GPU decodes, where one draws.
+    `inverse_transform` and `feasible` must give the same bits for a row whatever rows stand beside it.
     """
 
     low: Array  # (m,) the range of the latents, constraint 1
     high: Array  # (m,)
-
-    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
-        """Learn from joint angles (T, 63) in radians, of a person with this skeleton, and return itself."""
-        ...
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
@@ -50,9 +41,49 @@ class Prior(Protocol):
         """Return which latents (n, m) are poses at all (n,), constraint 2; constraint 1 is checked by the box."""
         ...
 
+
+class Prior(Latents, Protocol):
+    """Latents that are learned. The root is no part of a prior: SAPSO section 2.
+
+    It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods beside `fit` may be used
+    only after `fit`.
+
+    A prior whose joint angles are affine in the latents may say so: by an attribute `affine`, the weights (m, 63) that
+    latents are multiplied with and the angles (63,) where all of them are 0. Then a GPU decodes, where one draws.
+    """
+
+    def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
+        """Learn from joint angles (T, 63) in radians, of a person with this skeleton, and return itself."""
+        ...
+
     def save(self, path: str | Path) -> None:
         """Write everything `fit` learned to an .npz file."""
         ...
+
+
+@dataclass(eq=False)
+class Components:
+    """Latents along given directions: joint angles are a mean plus a sum of components."""
+
+    mean: Array  # (63,)
+    components: Array = field(repr=False)  # (m, 63), orthonormal
+    low: Array  # (m,)
+    high: Array  # (m,)
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        angles = np.tile(self.mean, (len(latents), 1))
+        for k, direction in enumerate(self.components):  # a matrix product's last bits depend on rows and machine
+            angles += latents[:, k, None] * direction
+        return angles
+
+    def feasible(self, latents: Array) -> NDArray[np.bool_]:
+        """Return that all latents (n, m) are feasible (n,)."""
+        return np.ones(len(latents), dtype=bool)
 
 
 # Builds an unfitted prior, as `factory(**settings)`.

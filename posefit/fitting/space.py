@@ -10,7 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.kernels import unpack_proposals, unpack_tilted, within
-from posefit.fitting.prior import Prior, Tilt
+from posefit.fitting.prior import Latents, Tilt
 from posefit.geometry.rotation import wrapped, yaw_first
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
@@ -32,7 +32,7 @@ class SearchSpace:
     with the latents, and the box of both moves with the last pose.
     """
 
-    prior: Prior = field(repr=False)
+    prior: Latents = field(repr=False)
     root_centre: Array  # (3,) radians: the middle of the root's range
     root_range: Array  # (3,) radians to either side; a range of pi wraps around
     anchor: Array  # (3,) metres: the known translation, the middle of the searched range, or where aligning starts

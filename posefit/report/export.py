@@ -21,6 +21,9 @@ from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import ANGLES
 from posefit.report.runs import damage, views
 from posefit.statistics.profiles import Trace
+from posefit.suites.functions import suite_function
+from posefit.suites.running import SuiteRun
+from posefit.suites.tally import budgets_differ
 from posefit.version import __version__
 
 if TYPE_CHECKING:
@@ -83,6 +86,20 @@ def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
             trace["evaluations"],
             trace["cost"],
         )
+
+
+def suite_runs(runs: Sequence[SuiteRun]) -> Iterator[LoggedRun]:
+    """Yield runs on a suite, whose settings include their way with infeasible proposals.
+
+    Where a dimension has several budgets, they include that, too. Both have names of several words, which no
+    optimiser's setting has.
+    """
+    several = budgets_differ(runs)
+    for run in runs:
+        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
+        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
+        name = f"f{run.function} {suite_function(run.function).name}"
+        yield LoggedRun(run.method, settings, name, run.dimension, run.instance, run.seed, run.evaluations, run.costs)
 
 
 def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:

@@ -10,13 +10,13 @@ import math
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.resources import files
-from pathlib import Path
-from typing import NoReturn, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.prior import Components
 
 HELD_OUT_PEOPLE = ("16", "49", "135")
 TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
@@ -55,37 +55,14 @@ def learned_without(subject: str) -> Learned:
     return _stored()[subject if subject in TRAINING_PEOPLE else HELD_OUT_GROUP]
 
 
-class _Stored:
-    """A box that is read, not learned."""
-
-    def fit(self, angles: Array, skeleton: object = None) -> NoReturn:  # noqa: ARG002, as of any prior
-        """Raise TypeError: a suite's box never changes."""
-        raise TypeError("the box of a suite must stay as it is, got something to learn from")
-
-    def save(self, path: str | Path) -> NoReturn:  # noqa: ARG002, as of any prior
-        """Raise TypeError: a suite's box is in its file."""
-        raise TypeError("the box of a suite must stay in its file, got a path to write to")
-
-
 @final
-class ComponentBox(_Stored):
-    """A prior of principal components; latents are poses within an ellipsoid that holds 98 % of the poses learned."""
+class ComponentBox(Components):
+    """Principal components; latents are poses within an ellipsoid that holds 98 % of the poses learned."""
 
     def __init__(self, learned: Learned, count: int) -> None:
-        self.mean, self.components = learned.mean, learned.components[:count]
-        self.low, self.high = -learned.half[:count], learned.half[:count]
+        half = learned.half[:count]
+        super().__init__(learned.mean, learned.components[:count], -half, half)
         self._spread, self._reach = learned.spread[:count], float(learned.reach[SIZES.index(count)])
-
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m)."""
-        angles = np.tile(self.mean, (len(latents), 1))
-        for k, direction in enumerate(self.components):  # no matrix product: its last bits depend on the machine
-            angles += latents[:, k, None] * direction
-        return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are within the ellipsoid (n,)."""
@@ -106,8 +83,8 @@ class ComponentBox(_Stored):
 
 
 @final
-class AngleBox(_Stored):
-    """A prior whose latents are joint angles themselves, those that move the most; the others stay at their mean."""
+class AngleBox:
+    """Latents are joint angles themselves, those that move the most; the others stay at their mean."""
 
     def __init__(self, learned: Learned, count: int) -> None:
         self.angles = np.sort(learned.order[:count])

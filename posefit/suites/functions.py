@@ -1,9 +1,6 @@
 """The functions of a suite, and its numbers and dimensions. None of this changes under one name."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
@@ -42,24 +39,16 @@ FUNCTIONS = (
 
 def suite_function(number: object) -> SuiteFunction:
     """Return the function of a number. Raises ValueError where there is none."""
-    if not _among(number, range(1, len(FUNCTIONS) + 1)):
-        raise InputError(f"function must be a whole number from 1 to {len(FUNCTIONS)}, got {quoted(number)}")
-    return next(one for one in FUNCTIONS if one.number == number)
+    known = {one.number: one for one in FUNCTIONS}
+    one_of("function", chosen := whole("function", number, 1), known)
+    return known[chosen]
 
 
 def checked_address(name: object, function: object, instance: object, dimension: object) -> tuple[int, int, int]:
     """Return function, instance and dimension as ints. Raises ValueError where a suite has no such problem."""
     one_of("suite", name, SUITES)
-    chosen = suite_function(function)
-    number = whole("instance", instance, 0)
+    chosen, number, d = suite_function(function), whole("instance", instance, 0), whole("dimension", dimension, 1)
     if number not in INSTANCES:
         raise InputError(f"instance must be at most {INSTANCES[-1]}, got {quoted(number)}")
-    if not _among(dimension, chosen.dimensions):
-        known = ", ".join(map(str, chosen.dimensions))
-        raise InputError(f"dimension of function {chosen.number} must be one of {known}, got {quoted(dimension)}")
-    return chosen.number, number, int(dimension)  # type: ignore[call-overload]
-
-
-def _among(value: object, numbers: Sequence[int]) -> bool:
-    """Return whether a value is one of some whole numbers, and neither a truth value nor a float."""
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value in numbers
+    one_of(f"dimension of function {chosen.number}", d, chosen.dimensions)
+    return chosen.number, number, d

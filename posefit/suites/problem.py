@@ -3,7 +3,7 @@
 `suite` returns one by its numbers, `Suite` goes through many. A problem's attributes have the names of COCO's, so that
 loops written for those run on it as they are.
 
-The best known costs are in known.json, which `posefit suite audit --write` made. A cost of the file may fall in a later
+The best known costs are in known.json, which `docs/studies/audit.py` made. A cost of the file may fall in a later
 version, and problems may be added; none may rise or go. Nothing else of a suite ever changes.
 """
 

@@ -40,11 +40,6 @@ class SuiteRun:
         return float(self.costs[-1])
 
 
-def usual_budget(dimension: int) -> int:
-    """Return the default budget: a hundred evaluations for each dimension."""
-    return EVALUATIONS * dimension
-
-
 def run_on(
     problem: Problem,
     method: str,
@@ -58,7 +53,7 @@ def run_on(
     Raises ValueError where there is no such optimiser or setting, where the budget does not hold one population, and
     where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
     """
-    evaluations = usual_budget(problem.dimension) if evaluations is None else evaluations
+    evaluations = EVALUATIONS * problem.dimension if evaluations is None else evaluations
     chosen, space = dict(chosen or {}), problem.space
     rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
     factory = registry().optimiser(method)

@@ -7,8 +7,7 @@ continuous optimizers in a black-box setting, 2021.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,10 +38,6 @@ class SuiteScore:
     reached: float  # share of runs and targets, at the end
     shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as budgets go
     running_times: dict[float, float | None]  # expected evaluations to so much above the best known; None for never
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        return asdict(self)
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
@@ -112,34 +107,22 @@ def _finite(value: Array | float) -> float | None:
 
 def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
     """Return the lines of two tables of scores, for a terminal: where runs end, and how soon they reach targets."""
-    heads = [f"ERT +{above:g}" for above in SHOWN]
-    labels = _labels(scores)
-    wide = max(24, *map(len, labels)) if scores else 24
-    lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
-    for one, label in zip(scores, labels, strict=True):
-        times = ["-" if one.running_times[above] is None else f"{one.running_times[above]:.0f}" for above in SHOWN]
-        figures = f"{one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}"
-        lines.append(f"{_start(one, label, wide)} {figures}{_cells(times)}")
-    points = sorted({point for one in scores for point in one.shares})
-    lines += ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
-    for one, label in zip(scores, labels, strict=True):
-        shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
-        lines.append(f"{_start(one, label, wide)}{_cells(shares)}".rstrip())
-    return lines
-
-
-def _labels(scores: Sequence[SuiteScore]) -> list[str]:
-    """Return the label of each score in tables: its method, and what else differs."""
     budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
-    return [
+    labels = [
         one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
     ]
-
-
-def _start(score: SuiteScore, label: str, wide: int) -> str:
-    """Return the columns that both tables begin with."""
-    function = score.name if score.function == ALL else f"{score.function} {score.name}"
-    return f"{score.dimension:>3} {function:22} {label:{wide}}"
+    wide, points = max(24, *map(len, labels)), sorted({point for one in scores for point in one.shares})
+    heads = [f"ERT +{above:g}" for above in SHOWN]
+    ends = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
+    courses = ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
+    for one, label in zip(scores, labels, strict=True):
+        function = one.name if one.function == ALL else f"{one.function} {one.name}"
+        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
+        times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
+        ends.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}")
+        shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
+        courses.append(f"{start}{_cells(shares)}".rstrip())
+    return ends + courses
 
 
 def _cells(texts: Sequence[str]) -> str:

@@ -1,19 +1,24 @@
-"""Checks of what methods report on a suite, and the best costs they reach.
+"""Checks of what methods report on a suite, and the best costs they reach, which `posefit/suites/known.json` holds.
 
 Every method of a list searches each problem at its usual budget. The cost of its best proposal is then computed again,
 against new cameras and silhouettes; and it may not be below the optimum. The strongest method, CMA-ES, searches once
 more with a hundred times the budget: the best cost of all is the best known.
 """
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import click
 import numpy as np
 
+from posefit.files import check_new, new_file
+from posefit.suites.functions import HELD_OUT
 from posefit.suites.instances import suite_instance
-from posefit.suites.problem import Problem, Suite, suite
-from posefit.suites.running import run_on, usual_budget
+from posefit.suites.problem import EVALUATIONS, Problem, Suite, suite
+from posefit.suites.running import run_on
+from table import bar
 
 METHODS = ("random", "sapso", "pso", "cma", "annealed", "scipy")
 STRONGEST, TIMES = "cma", 100  # of the longest search, and its budget in usual ones
@@ -42,7 +47,7 @@ def audited(problems: Suite, methods: Sequence[str] = METHODS, *, times: int = T
         plans = [(method, method, 1) for method in methods]
         for label, method, factor in [*plans, (f"{STRONGEST} x {times}", STRONGEST, times)][: len(plans) + bool(times)]:
             fresh = suite(problem.suite, problem.id_function, problem.instance, problem.dimension)
-            run_on(fresh, method, evaluations=factor * usual_budget(problem.dimension))
+            run_on(fresh, method, evaluations=factor * EVALUATIONS * problem.dimension)
             costs[label] = fresh.best_observed_fvalue1
             faults += [f"{label}: {fault}" for fault in reported_faults(fresh)]
         yield Audited(problem.id, problem.truth_cost, costs, tuple(faults))
@@ -74,11 +79,6 @@ def _share(wrong: int, both: int) -> float:
     return wrong / (wrong + both) if wrong + both else 1.0
 
 
-def known_costs(rows: Sequence[Audited]) -> dict[str, float]:
-    """Return the best cost by a problem's id, of those problems whose truth is not the best."""
-    return {row.problem: row.best for row in rows if row.best < row.truth_cost}
-
-
 def audit_lines(rows: Sequence[Audited]) -> list[str]:
     """Return the lines of a table, for a terminal: faults, and how far above the best of all each method ends."""
     labels = list(rows[0].costs)
@@ -103,5 +103,37 @@ def known_json(rows: Sequence[Audited], methods: Sequence[str], times: int) -> d
     return {
         "made_by": f"{STRONGEST} with {times} times the usual budget, and {usual} one" if times else f"{usual} budget",
         "problems": len(rows),
-        "best": known_costs(rows),
+        "best": {row.problem: row.best for row in rows if row.best < row.truth_cost},
     }
+
+
+@click.command(help=__doc__)
+@click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
+@click.option("--dimension", "dimensions", type=int, multiple=True, default=(9,), help="Repeatable, by default 9.")
+@click.option("--instances", type=int, default=3, show_default=True, help="Of each function, held out ones.")
+@click.option("--method", "methods", multiple=True, default=METHODS, help="Searches with the usual budget; repeatable.")
+@click.option("--times", type=int, default=TIMES, show_default=True, help="How much longer CMA-ES searches; 0 for not.")
+@click.option("--write", metavar="FILE", help="New file of the best costs, as known.json of the suite.")
+@click.pass_context
+def main(
+    context: click.Context,
+    functions: tuple[int, ...],
+    dimensions: tuple[int, ...],
+    instances: int,
+    methods: tuple[str, ...],
+    times: int,
+    write: str | None,
+) -> None:
+    if write is not None:
+        check_new(write)
+    problems = Suite(functions=functions or None, dimensions=dimensions, instances=HELD_OUT[:instances])
+    rows = list(bar(audited(problems, methods, times=times), len(problems)))
+    if write is not None:
+        with new_file(write) as building:
+            building.write_text(json.dumps(known_json(rows, methods, times), indent=1) + "\n", encoding="utf-8")
+    click.echo("\n".join(audit_lines(rows)))
+    context.exit(1 if any(row.faults for row in rows) else 0)
+
+
+if __name__ == "__main__":
+    main()
