@@ -3,6 +3,7 @@
 import json
 import platform
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,36 +11,39 @@ from click.testing import CliRunner
 
 from posefit.arrays import Array
 from posefit.cli import main
-from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit_reproduce.bench import device, experiment, kernel, optimisers
 from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
-from posefit_reproduce.bench.optimisers import Stopwatch, wide_space
+from posefit_reproduce.bench.optimisers import timed_search, wide_space
 from posefit_reproduce.bench.processor import instructions, processor
 from tests.cases import each
 
 
 class Line:
-    """Proposes the same three points for ever."""
+    """Proposes the same three points in so many populations of each frame."""
 
-    def __init__(self) -> None:
-        self.told = 0
+    def __init__(self, populations: int) -> None:
+        self.populations, self.costs, self.frames = populations, 0, 1
 
     def ask(self) -> Array:
-        return np.zeros((3, 2))
+        return np.zeros((3 if self.costs < 3 * self.populations * self.frames else 0, 2))
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        self.told += len(costs)
+        self.costs += len(costs)
+
+    def advance(self, space: Any) -> None:
+        self.frames += 1
 
 
-def test_a_stopwatch_ends_a_search_after_its_populations() -> None:
-    line = Line()
-    watch = Stopwatch(line, 4)
-    found = minimise(lambda proposals: np.ones(len(proposals)), watch, 10**9, budget_known=True)
-    assert (found.evaluations, watch.proposals, line.told) == (12, 12, 12)
-    assert watch.seconds > 0.0
+@each(("populations", "space", "costs", "frames"), [(9, None, 12, 1), (2, None, 6, 1), (2, "next", 24, 5)])
+def test_a_search_ends_after_its_populations_and_a_filter_after_its_frames(
+    populations: int, space: Any, costs: int, frames: int
+) -> None:
+    line = Line(populations)
+    assert timed_search(line, 4, space) > 0.0
+    assert (line.costs, line.frames) == (costs, frames)
 
 
 def test_the_wide_space_has_28_dimensions() -> None:
@@ -116,7 +120,7 @@ def test_mistakes_are_one_line_before_anything_is_timed(monkeypatch: pytest.Monk
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernel, "ROUNDS", 1)
-    monkeypatch.setattr(device, "_name", lambda: "simulated")
+    monkeypatch.setattr(device, "_memory", lambda: {"megabytes_held": 0.0, "gpu": "simulated"})
     figures = device.device_figures("cuda", sizes=((24, 18),), poses=(1, 2), frame=(2, 1))
     assert [(case["poses"], case["equal"], case["proposals_differing"]) for case in figures["cases"]] == [
         (1, True, 0),

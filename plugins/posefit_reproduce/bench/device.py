@@ -38,8 +38,7 @@ def device_figures(
     return {
         "cases": cases,
         "frame": _frame(bench_problem(cores()), device, *frame),
-        "megabytes_held": _megabytes(),
-        "gpu": _name(),
+        **_memory(),
         "cpu": processor(),
         "threads": cores(),
     }
@@ -60,21 +59,24 @@ def device_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
+    from numba import cuda
+
+    from posefit.silhouette.cuda.areas import drawing_on_device, launched
+
     proposals = _proposals(problem, count)
     poses, places = problem.decode(proposals)
     there = _on(problem, device)
     body, camera, observed = there.body, there.cameras[0], there.silhouettes[0]
-    resident = _resident(there, poses, places)
-    jobs: dict[str, Callable[[], object]] = {
+    drawing = drawing_on_device(body, camera, observed)
+    moved = cuda.to_device(poses), cuda.to_device(places)
+    jobs: dict[str, Callable[[], Any]] = {
         "cpu": lambda: problem.areas(poses, places),
         "proposals": lambda: there.evaluate(proposals),
         "poses": lambda: areas(body, camera, observed, poses, places),
-        "resident": resident,
+        "resident": lambda: launched(drawing, *moved).copy_to_host(),
     }
     seconds = fastest(jobs)
-    expected, counted = problem.areas(poses, places)[0], areas(body, camera, observed, poses, places)
-    away = np.abs(counted - expected).max(axis=1)
-    off = np.abs(there.evaluate(proposals) - problem.evaluate(proposals))
+    away = np.abs(jobs["poses"]() - jobs["cpu"]()[0]).max(axis=1)
     return {
         "size": "x".join(map(str, observed.size)),
         "poses": count,
@@ -82,12 +84,12 @@ def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
         "equal": not away.any(),
         "differing": int(np.count_nonzero(away)),
         "off_by": int(away.max()),
-        "proposals_differing": int(np.count_nonzero(off)),
+        "proposals_differing": int(np.count_nonzero(jobs["proposals"]() - problem.evaluate(proposals))),
     }
 
 
 def _proposals(problem: PoseProblem, count: int) -> Array:
-    """Return so many proposals (count, d) that are poses, or so near to one that they are seen as it is."""
+    """Return so many proposals (count, d) that are poses, or nearly so."""
     rng = np.random.default_rng(0)
     drawn = draw_population(problem.space, rng, min(count, DRAWN))
     return np.ascontiguousarray(np.resize(drawn, (count, drawn.shape[1])) + rng.normal(0.0, 1e-3, (count, 1)))
@@ -95,17 +97,6 @@ def _proposals(problem: PoseProblem, count: int) -> Array:
 
 def _on(problem: PoseProblem, device: str) -> PoseProblem:
     return replace(problem, silhouettes=[moved_to(one, device) for one in problem.silhouettes])
-
-
-def _resident(problem: PoseProblem, poses: Any, places: Any) -> Callable[[], object]:
-    """Return what counts poses that lie on the device already, as a library of them does, and copies their areas."""
-    from numba import cuda
-
-    from posefit.silhouette.cuda.areas import drawing_on_device, launched
-
-    drawing = drawing_on_device(problem.body, problem.cameras[0], problem.silhouettes[0])
-    there, where = cuda.to_device(poses), cuda.to_device(places)
-    return lambda: launched(drawing, there, where).copy_to_host()
 
 
 def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -> dict[str, Any]:
@@ -116,26 +107,20 @@ def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -
         optimiser = SAPSO(where.space, np.random.default_rng(0), population_size=particles, iterations=iterations)
         return minimise(where.evaluate, optimiser, particles * (iterations + 1), budget_known=True).cost
 
-    costs = {name: search(where) for name, where in (("device", there), ("cpu", problem))}
     seconds = fastest({"device": lambda: search(there), "cpu": lambda: search(problem)})
     return {
         "evaluations": particles * (iterations + 1),
         "ms": 1e3 * seconds["device"],
         "cpu_ms": 1e3 * seconds["cpu"],
-        "cost": costs["device"],
-        "cpu_cost": costs["cpu"],
+        "cost": search(there),
+        "cpu_cost": search(problem),
     }
 
 
-def _megabytes() -> float:
+def _memory() -> dict[str, Any]:
+    """Return the GPU's name and how much of its memory is in use."""
     from numba import cuda
 
     free, total = cuda.current_context().get_memory_info()
-    return float(total - free) / 1e6
-
-
-def _name() -> str:
-    from numba import cuda
-
     name = cuda.get_current_device().name
-    return name.decode() if isinstance(name, bytes) else str(name)
+    return {"megabytes_held": (total - free) / 1e6, "gpu": name.decode() if isinstance(name, bytes) else str(name)}

@@ -27,34 +27,31 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     instances, episodes of 40 steps, and their resets, in steps a second. The environments are found by name, as by
     users.
     """
-    kernel, vectors = _kernel(), {name: _pair(env, arguments) for name, (env, arguments) in CASES.items()}
+    vectors = {name: _pair(*case) for name, case in CASES.items()}
     vectors["configure_all_threads"] = _pair(*CASES["configure_each"], threads)
-    learning = _pair("FitImage-v0", {"max_evaluations": EPISODE, "target_cost": -1.0})
-    jobs: dict[str, Callable[[], object]] = {"kernel": kernel}
+    vectors["fit_learning"] = _pair("FitImage-v0", {"max_evaluations": EPISODE, "target_cost": -1.0})
+    problem = vectors["fit_each"]["native"].unwrapped.problems[0]
+    proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (ENVIRONMENTS, problem.space.dimensions))
+    jobs: dict[str, Callable[[], object]] = {"kernel": lambda: problem.evaluate(proposals)}
     for name, envs in vectors.items():
-        jobs |= {f"{name} {kind}": _steps(env, 1) for kind, env in envs.items()}
-    jobs |= {f"learning {kind}": _steps(env, EPISODE + 1) for kind, env in learning.items()}
+        steps = EPISODE + 1 if name == "fit_learning" else 1
+        jobs |= {f"{name} {kind}": _steps(env, steps) for kind, env in envs.items()}
     seconds = fastest(jobs)
-    figures = {}
+    kernel_us, figures = 1e6 * seconds["kernel"] / ENVIRONMENTS, {}
     for name, envs in vectors.items():
-        proposals = ENVIRONMENTS * _evaluations(envs["native"].unwrapped)
-        native, sync = (1e6 * seconds[f"{name} {kind}"] / proposals for kind in envs)
-        kernel_us = 1e6 * seconds["kernel"] / ENVIRONMENTS
-        figures[name] = {
-            "kernel_us": kernel_us,
-            "us_per_proposal": native,
-            "overhead_us": native - kernel_us,
-            "sync_us_per_proposal": sync,
-            "times_sync": sync / native,
-        }
-    steps = {kind: ENVIRONMENTS * EPISODE / seconds[f"learning {kind}"] for kind in learning}
-    figures["fit_learning"] = {
-        "steps_per_second": steps["native"],
-        "sync_steps_per_second": steps["sync"],
-        "times_sync": steps["native"] / steps["sync"],
-    }
-    for env in [env for envs in (*vectors.values(), learning) for env in envs.values()]:
-        env.close()
+        native, sync = (seconds[f"{name} {kind}"] for kind in envs)
+        env = envs["native"].unwrapped
+        evaluations = ENVIRONMENTS * int(getattr(env, "population_size", 1)) * int(getattr(env, "every", 1))
+        if name == "fit_learning":
+            steps = ENVIRONMENTS * EPISODE
+            figures[name] = {"steps_per_second": steps / native, "sync_steps_per_second": steps / sync}
+        else:
+            native_us = 1e6 * native / evaluations
+            figures[name] = {"kernel_us": kernel_us, "us_per_proposal": native_us, "overhead_us": native_us - kernel_us}
+            figures[name]["sync_us_per_proposal"] = 1e6 * sync / evaluations
+        figures[name]["times_sync"] = sync / native
+        for one in envs.values():
+            one.close()
     return figures
 
 
@@ -81,19 +78,3 @@ def _steps(env: Any, count: int) -> Callable[[], None]:
             env.step(action)
 
     return job
-
-
-def _kernel() -> Callable[[], object]:
-    """Return what evaluates as many proposals as there are environments, through the library."""
-    import gymnasium
-
-    env: Any = gymnasium.make_vec("posefit_envs:posefit/FitImage-v0", 1).unwrapped
-    env.reset(seed=0)
-    problem = env.problems[0]
-    proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (ENVIRONMENTS, problem.space.dimensions))
-    return lambda: problem.evaluate(proposals)
-
-
-def _evaluations(env: Any) -> int:
-    """Return how many proposals one environment evaluates in a step."""
-    return int(getattr(env, "population_size", 1)) * int(getattr(env, "every", 1))

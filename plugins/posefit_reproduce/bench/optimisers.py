@@ -1,16 +1,14 @@
 """How long optimisers take to propose and to learn, without the costs."""
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, cast, final
+from typing import Any, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from posefit.arrays import Array
-from posefit.fitting.optimiser import Filter, Optimiser, minimise
+from posefit.fitting.optimiser import Filter, Optimiser
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
 from posefit.registry import Offer, registry
@@ -42,63 +40,44 @@ def optimiser_us(space: SearchSpace, names: Sequence[str] = ()) -> dict[str, flo
         return {name: 1e6 * _ask_and_tell(space, registry().offer("optimiser", name)) for name in names}
 
 
-@final
-class Stopwatch:
-    """An optimiser that is timed, and that ends after so many populations; without a number, by itself."""
-
-    def __init__(self, optimiser: Optimiser, populations: int | None = None) -> None:
-        self._optimiser, self._left = optimiser, populations
-        self.seconds, self.proposals = 0.0, 0
-
-    def ask(self) -> Array:
-        """Return what the optimiser proposes."""
-        if self._left == 0:
-            return np.empty((0, 0))
-        began = time.perf_counter()
-        proposals = self._optimiser.ask()
-        self.seconds += time.perf_counter() - began
-        self.proposals += len(proposals)
-        return proposals
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        """Tell the optimiser what its proposals cost."""
-        began = time.perf_counter()
-        self._optimiser.tell(proposals, costs)
-        self.seconds += time.perf_counter() - began
-        if self._left is not None:
-            self._left -= 1
-
-    def advance(self, space: SearchSpace) -> None:
-        """Go on to a filter's next frame."""
-        began = time.perf_counter()
-        cast(Filter, self._optimiser).advance(space)
-        self.seconds += time.perf_counter() - began
-
-
 def _ask_and_tell(space: SearchSpace, offer: Offer) -> float:
     """Return the seconds of a proposal."""
     known = {setting.name for setting in offer.settings}
-    populations = POPULATIONS if "layers" not in known else POPULATIONS // 10
+    carries = offer.next_frame == "carry"
+    turns = POPULATIONS if "layers" not in known else POPULATIONS // 10  # populations, or a filter's frames
     sizes: dict[str, Any] = {"population_size": PARTICLES} if "population_size" in known else {}
-    budget = PARTICLES * (10 if "layers" in known else 1 if offer.next_frame == "carry" else POPULATIONS + 1)
+    budget = PARTICLES * (10 if "layers" in known else 1 if carries else POPULATIONS + 1)
     fastest = np.inf
     began = time.perf_counter()
     for seed in range(SEARCHES):
         optimiser = offer.factory(space, np.random.default_rng(seed), **planned(offer.factory, sizes, budget))
-        if offer.next_frame == "carry":
-            watch = Stopwatch(optimiser)
-            for _ in range(populations):
-                minimise(_distance, watch, sys.maxsize, budget_known=True)
-                watch.advance(space)
-        else:
-            watch = Stopwatch(optimiser, populations)
-            minimise(_distance, watch, sys.maxsize, budget_known=True)
-        fastest = min(fastest, watch.seconds / watch.proposals)
+        fastest = min(fastest, timed_search(optimiser, turns, space if carries else None))
         if time.perf_counter() - began > PATIENCE:
             break
-    return float(fastest)
+    return fastest
 
 
-def _distance(proposals: Array) -> Array:
-    """Return costs (n,) of proposals (n, d) that take no time to speak of."""
-    return np.asarray(50.0 * (proposals**2).mean(axis=1))
+def timed_search(optimiser: Optimiser, turns: int, space: SearchSpace | None = None) -> float:
+    """Return the seconds that an optimiser takes for a proposal, over so many populations.
+
+    With a space it is a filter, and goes on to so many next frames of that space. Costs take no time to speak of.
+    """
+    clock, seconds, count = time.perf_counter, 0.0, 0
+    while turns:
+        began = clock()
+        proposals = optimiser.ask()
+        seconds += clock() - began
+        count += len(proposals)
+        if len(proposals):
+            costs = 50.0 * (proposals**2).mean(axis=1)
+            began = clock()
+            optimiser.tell(proposals, costs)
+            turns -= space is None
+        elif space is not None:
+            began = clock()
+            cast(Filter, optimiser).advance(space)
+            turns -= 1
+        else:
+            break
+        seconds += clock() - began
+    return seconds / count
