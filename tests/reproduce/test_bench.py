@@ -50,16 +50,6 @@ def test_the_wide_space_has_28_dimensions() -> None:
     assert wide_space(bench_problem().space).dimensions == 28
 
 
-@pytest.mark.slow
-def test_following_is_timed_and_weighed() -> None:
-    found = CliRunner().invoke(main, ["bench", "--follow", "3", "--json"])
-    assert found.exit_code == 0, found.output
-    told = json.loads(found.stdout)
-    assert told["frames"] == 3
-    assert 0.0 < told["ms"] <= told["slowest_ms"]
-    assert 0.0 < told["mb"] <= told["mb_end"]
-
-
 @each("stretch", [(1.0, 1.0), (0.6, 1.2), (1.2, 0.6)])
 def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tuple[float, float]) -> None:
     usual = bench_problem()
@@ -103,12 +93,9 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_mistakes_are_one_line_before_anything_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for words in ("--follow 9 --threads 2", "--device cuda --threads 2", "--device cuda --follow 1"):
+    for words in ("--device cuda --threads 2", "--threads 0", "--device tpu"):
         done = CliRunner().invoke(main, ["bench", *words.split()])
         assert (done.exit_code, done.stdout) == (2, ""), words
-        assert "must have one of --threads, --follow and --device, got" in done.stderr
-    for words in ("--threads 0", "--follow 0", "--device tpu"):
-        assert CliRunner().invoke(main, ["bench", *words.split()]).exit_code == 2, words
     if platform.machine() in ("x86_64", "AMD64"):
         for name in ("nonsense", "pentium3"):  # the other is LLVM's, and has 32 bits
             monkeypatch.setenv("NUMBA_CPU_NAME", name)

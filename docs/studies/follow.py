@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
+import click
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -14,6 +15,7 @@ from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
+from posefit_reproduce.bench.processor import check_named
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
 SETTLED = 100  # frames after which memory should grow no more
@@ -67,3 +69,16 @@ def _peak_mb() -> float:
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6
+
+
+@click.command(help=__doc__)
+@click.argument("frames", type=click.IntRange(1))
+def main(frames: int) -> None:
+    """Print the figures; a thousand frames take one or two minutes."""
+    check_named()
+    for name, value in follow_figures(frames).items():
+        click.echo(f"{name:12} {round(value, 3):,g}")
+
+
+if __name__ == "__main__":
+    main()
