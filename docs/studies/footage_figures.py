@@ -37,7 +37,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
-from posefit_reproduce.commands.papers import CLIPS
+from posefit_reproduce.commands import CLIPS
 from posefit_reproduce.sapso.experiment import estimate_images
 from posefit_reproduce.sapso.motions import paper_motions
 from posefit_reproduce.sapso.paper import FRAMES as FRAMES_OF_THE_PAPER

@@ -7,7 +7,7 @@
 Each has `--help`, and `--json` for one JSON object on stdout. Other measurements are scripts in the repository's
 folder `docs/studies`.
 
-    commands/       the command lines
+    commands.py     the command lines
     sapso/, vsmm/   the experiments
     bench/          the benchmark
     jobs.py         runs jobs in processes, by the engine of `posefit sweep`

@@ -13,8 +13,18 @@ from posefit.fitting.tracker import Frame
 from posefit.motion import built_in
 from posefit_reproduce.vsmm import activities
 from posefit_reproduce.vsmm.activities import film_of
-from posefit_reproduce.vsmm.experiment import HAND, METHODS, PatentTrack, change, detected_cm, follow_film
-from posefit_reproduce.vsmm.switches import State, activity_figures, model_states, switching_figures
+from posefit_reproduce.vsmm.experiment import (
+    HAND,
+    METHODS,
+    PatentTrack,
+    State,
+    activity_figures,
+    change,
+    detected_cm,
+    follow_film,
+    model_states,
+    switching_figures,
+)
 from posefit_vsmm.state import AT
 
 WORDS = ("walk", "arms-out", "jacks", "squat")  # the labels of the film's activities

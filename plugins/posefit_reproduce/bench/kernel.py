@@ -40,12 +40,17 @@ def fastest(jobs: dict[str, Callable[[], object]]) -> dict[str, float]:
 SIZE = (320, 240)
 
 
+def walking_angles() -> Array:
+    """Return the joint angles (T, 63) of the other built-in walks, which priors learn from."""
+    styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
+    return np.concatenate([style.poses[:, 3:] for style in styles])
+
+
 def bench_problem(threads: int = 1) -> PoseProblem:
     """Return the benchmark's problem: one frame of the built-in walk that fills a 320 x 240 image, a PCA prior."""
     motion = built_in.motion("walk", frames=1, fps=30.0)
     body = Body.of(motion.skeleton)
-    styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
-    prior = PCA().fit(np.concatenate([style.poses[:, 3:] for style in styles]))
+    prior = PCA().fit(walking_angles())
     joints = motion.skeleton.joints(motion.poses, motion.translations)[0]
     camera = Camera.framing(joints, body.joint_radii(), motion.poses[0, 0] + np.radians(45.0), SIZE)
     space = SearchSpace(

@@ -10,10 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from posefit.fitting.optimiser import Filter, Optimiser
 from posefit.fitting.space import SearchSpace
-from posefit.motion import built_in
 from posefit.registry import Offer, registry
 from posefit.settings import planned
 from posefit_priors.loose import Loose
+from posefit_reproduce.bench.kernel import walking_angles
 
 PARTICLES = 40
 POPULATIONS, SEARCHES = 30, 10  # of each optimiser
@@ -24,8 +24,7 @@ COMPONENTS = 9  # of the prior `loose`, which makes 28 dimensions with the root'
 
 def wide_space(space: SearchSpace) -> SearchSpace:
     """Return a space with the prior `loose` instead of its own, of 28 dimensions."""
-    styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
-    return replace(space, prior=Loose(components=COMPONENTS).fit(np.concatenate([one.poses[:, 3:] for one in styles])))
+    return replace(space, prior=Loose(components=COMPONENTS).fit(walking_angles()))
 
 
 def optimiser_us(space: SearchSpace, names: Sequence[str] = ()) -> dict[str, float]:

@@ -204,19 +204,18 @@ def baseline_poses(motion: PaperMotion, view: float) -> dict[str, Array]:
 def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array:
     """Return the lowest cost after each iteration (swarms, iterations + 1) in the first frame, for each N."""
     scene = paper_scene(motion, view, (0, 1), scale.first_yaw)
-    tracks = [
-        track(
-            scene,
-            train=motion.training,
-            method=OURS,
-            population_size=count,
-            iterations=scale.iterations,
-            settings=DRIVEN,
-            seed=seed,
-        )
-        for count in scale.swarms
-    ]
-    return np.array([one.estimates[0].history for one in tracks])
+    return np.array([_first_frame(scene, motion, scale, count, seed, method=OURS).history for count in scale.swarms])
+
+
+def _first_frame(scene: Scene, motion: PaperMotion, scale: Scale, particles: int, seed: int, **method: Any) -> Frame:
+    """Return what a method makes of a scene of one frame."""
+    settings: dict[str, Any] = {
+        "population_size": particles,
+        "iterations": scale.iterations,
+        "settings": DRIVEN,
+        "seed": seed,
+    }
+    return track(scene, train=motion.training, **settings, **method).estimates[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,16 +249,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
             super().tell(proposals, costs)
 
     searches: list[Watched] = []
-    result = track(
-        scene,
-        optimiser=Watched,
-        method="@pca",
-        train=motion.training,
-        population_size=particles,
-        iterations=scale.iterations,
-        settings=DRIVEN,
-        seed=seed,
-    )
+    frame = _first_frame(scene, motion, scale, particles, seed, optimiser=Watched, method="@pca")
     search = searches[-1]  # the one before it only compiles
     poses, translations = zip(*search.decoded, strict=True)
-    return WatchedSwarm(scene, poses, translations, search.cheapest, result.estimates[0].history)
+    return WatchedSwarm(scene, poses, translations, search.cheapest, frame.history)

@@ -209,14 +209,13 @@ def _label(name: str) -> str:
 
 
 def _lines_claims(report: dict[str, Any]) -> Iterator[str]:
-    yield "What the paper says. Pairs are views and seeds of one clip, of single images of all; p-values are of these."
-    for one in report["claims"]:
-        if one["source"]:
-            yield f"  {one['verdict']}: {one['text']} ({one['source']}): {one['evidence']}"
-    yield "What it does not ask"
-    for one in report["claims"]:
-        if not one["source"]:
-            yield f"  {one['verdict']}: {one['text']}: {one['evidence']}"
+    says = "What the paper says. Pairs are views and seeds of one clip, of single images of all; p-values are of these."
+    for heading, asked in ((says, True), ("What it does not ask", False)):
+        yield heading
+        for one in report["claims"]:
+            if bool(one["source"]) == asked:
+                source = f" ({one['source']})" if asked else ""
+                yield f"  {one['verdict']}: {one['text']}{source}: {one['evidence']}"
 
 
 def _lines_given(report: dict[str, Any]) -> Iterator[str]:

@@ -15,8 +15,7 @@ from posefit.geometry.skeleton import PARENTS
 from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
-from posefit_reproduce.vsmm.experiment import ELBOW, HAND, both_joints, detected_cm, projected_cm
-from posefit_reproduce.vsmm.switches import State, model_states
+from posefit_reproduce.vsmm.experiment import ELBOW, HAND, State, both_joints, detected_cm, model_states, projected_cm
 
 STILLS = (10, 60, 110, 140, 180, 235, 258, 290, 340, 380, 405, 430)
 PATENT_CM = (2.7, 5.2)  # between these lie the patent's own mean errors
@@ -105,36 +104,26 @@ def film_stills(film: Film, frames: Sequence[Frame], states: Sequence[State]) ->
 def _still(film: Film, frame: Frame, state: State, k: int) -> Image:
     mask = film.observations[k].silhouettes[0].mask
     grey = np.where(mask, 150, 28).astype(np.uint8)
-    blank = cv2.cvtColor(
-        cv2.resize(grey, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR
-    )
-    marked = np.asarray(blank, dtype=np.uint8).copy()
+    marked = np.repeat(np.kron(grey, np.ones((LARGER, LARGER), dtype=np.uint8))[..., None], 3, axis=2)
     for point, sure in zip(state["joints"][0], state["confidence"][0], strict=True):
         cv2.circle(marked, _pixel(point), 4, _JOINT if sure > 0.0 else _HIDDEN, -1 if sure > 0.0 else 1, cv2.LINE_AA)
     drawn = np.repeat(grey[..., None], 3, axis=2)
     draw_body(drawn, film.body, film.camera, frame.pose, frame.translation)
     drawn = np.asarray(cv2.resize(drawn, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
     true = film.body.skeleton.joints(film.truth.poses[k], film.truth.translations[k])
-    _bones(drawn, film.camera.project(true)[0])
+    pixels = film.camera.project(true)[0]
+    for joint, parent in enumerate(PARENTS):
+        if parent >= 0:
+            cv2.line(drawn, _pixel(pixels[parent]), _pixel(pixels[joint]), (90, 255, 90), 1, cv2.LINE_AA)
     side = side_view(film.body, film.camera, frame.pose, frame.translation, drawn.shape[0])
     middle = slice(drawn.shape[1] // 5, -drawn.shape[1] // 5)
     cv2.putText(marked, f"{k}", (marked.shape[1] // 5 + 8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (240, 240, 240), 1)
     parts = (marked[:, middle], drawn[:, middle], side)
     height = drawn.shape[0] // 2
     small = [cv2.resize(p, (round(p.shape[1] / 2), height), interpolation=cv2.INTER_AREA) for p in parts]
-    return np.asarray(np.vstack([np.pad(p, ((0, 0), (0, _widest(small) - p.shape[1]), (0, 0))) for p in small]))
-
-
-def _widest(parts: Sequence[Any]) -> int:
-    return max(int(part.shape[1]) for part in parts)
+    widest = max(int(part.shape[1]) for part in small)
+    return np.asarray(np.vstack([np.pad(p, ((0, 0), (0, widest - p.shape[1]), (0, 0))) for p in small]))
 
 
 def _pixel(point: Array) -> tuple[int, int]:
     return round(LARGER * float(point[0])), round(LARGER * float(point[1]))
-
-
-def _bones(image: Image, pixels: Array) -> None:
-    """Draw the true bones as thin lines."""
-    for joint, parent in enumerate(PARENTS):
-        if parent >= 0:
-            cv2.line(image, _pixel(pixels[parent]), _pixel(pixels[joint]), (90, 255, 90), 1, cv2.LINE_AA)

@@ -71,53 +71,45 @@ def patent_report(
         if folder is not None:
             from posefit_reproduce.vsmm.figures import patent_figures
 
-            patent_figures(film_of(SHOWN), shown.frames, folder)
+            patent_figures(film_of(SHOWN), shown, folder)
             (folder / "report.json").write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     return figures
 
 
 def patent_text(figures: Mapping[str, Any]) -> str:
     """Return the figures as tables: means over seeds, the models' predictions, and the labels of activities."""
+
+    def cell(row: Mapping[str, Any], key: str, digits: int) -> str:
+        return f"{row[key]:.{digits}f}" if key in row else "-"
+
     methods = figures["methods"]
     compared = {name: row for name, row in methods.items() if "worse_mm" not in row}
+    rows = {label: [cell(row, key, digits) for row in compared.values()] for key, label, digits in _FIGURES}
     parts = [
-        _table(
-            f"seeds: {figures['seeds']}",
-            list(compared),
-            {label: [_cell(row, key, digits) for row in compared.values()] for key, label, digits in _FIGURES},
-        ),
+        _table(f"seeds: {figures['seeds']}", list(compared), rows),
         "the patent: elbow and hand to the detected 2.7 to 5.2 cm, filter 100 ms, detection 1000 ms",
     ]
-    changed = {
-        name: [_cell(row, key, digits) for key, _, digits in _CHANGES]
-        for name, row in methods.items()
-        if name not in compared
-    }
+    changed = {name: row for name, row in methods.items() if name not in compared}
     if changed:
-        parts.append(_table("against default", [label for _, label, _ in _CHANGES], changed))
+        rows = {name: [cell(row, key, digits) for key, _, digits in _CHANGES] for name, row in changed.items()}
+        parts.append(_table("against default", [label for _, label, _ in _CHANGES], rows))
     rows = {name: [f"{report[key]:.2f}" for key in _KEYS] for name, report in figures["prediction_degrees"].items()}
     labels = ["still, 1", "default, 1", "patent, 1", "still, 10", "default, 10", "patent, 10"]
     parts.append(_table("degrees ahead", labels, rows))
+    labels = [activity.label for activity in ACTIVITIES]
     for preset in ("default", "patent"):
         counts = np.sum([row["confusion"] for row in methods[preset]["per_seed"]], axis=0)
         shares = counts / counts.sum(axis=1, keepdims=True)
-        rows = {
-            activity.label: [f"{share:.2f}" for share in row] for activity, row in zip(ACTIVITIES, shares, strict=True)
-        }
-        parts.append(_table(f"labels, {preset}", [*(activity.label for activity in ACTIVITIES), "a jump"], rows))
+        rows = {label: [f"{share:.2f}" for share in row] for label, row in zip(labels, shares, strict=True)}
+        parts.append(_table(f"labels, {preset}", [*labels, "a jump"], rows))
     return "\n\n".join(parts)
-
-
-def _cell(row: Mapping[str, Any], key: str, digits: int) -> str:
-    return f"{row[key]:.{digits}f}" if key in row else "-"
 
 
 def _table(corner: str, labels: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
     """Return rows of cells below a line of labels."""
     first = max(len(name) for name in (corner, *rows))
     widths = [max(len(label), 6) + 2 for label in labels]
-    lines = [(corner, labels), *rows.items()]
     return "\n".join(
         name.ljust(first) + "".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
-        for name, cells in lines
+        for name, cells in {corner: labels, **rows}.items()
     )

@@ -1,18 +1,30 @@
-"""`posefit reproduce sapso` and `posefit reproduce vsmm`."""
+"""`posefit reproduce` and `posefit bench`.
 
+`posefit --help` imports this module, so it imports click and posefit's own output only; a command imports the rest when
+it runs.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import click
 
+from posefit import hookimpl
 from posefit.cli.options import JSON
-from posefit.cli.output import json_line, progress
+from posefit.cli.output import json_line, progress, say
+from posefit.errors import InputError
 
 NEIGHBOURS = "Processes. Seconds of a frame are those beside so many neighbours."
 
 
-@click.command("vsmm")
+@click.group("reproduce")
+def reproduce_group() -> None:
+    """Repeat the experiments of the two publications."""
+
+
+@reproduce_group.command("vsmm")
 @click.option("--seeds", type=int, default=5, show_default=True, help="Films, each in other phases and views.")
 @click.option("--searches", is_flag=True, help="Compare with SAPSO and with the joined tracker too; minutes more.")
 @click.option("--alternatives", is_flag=True, help="Compare with the other value of every setting; minutes more.")
@@ -37,7 +49,7 @@ CLIPS = click.option(
 )
 
 
-@click.command("sapso")
+@reproduce_group.command("sapso")
 @CLIPS
 @click.option("--seeds", type=int, default=5, show_default=True, help="Tracks of each method, motion and view.")
 @click.option("--quick", is_flag=True, help="30 frames from one view, a sixth of the time.")
@@ -69,3 +81,51 @@ def sapso_command(
     click.echo(json_line(report) if as_json else paper_text(report))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(report['figures'])}")
+
+
+@click.command("bench")
+@click.option("--threads", type=click.IntRange(1), help="Threads of the multi-threaded figures; by default every core.")
+@click.option("--device", type=click.Choice(["cuda"]), help="Time a GPU beside the CPU instead, and compare counts.")
+@JSON
+def bench_command(threads: int | None, device: str | None, as_json: bool) -> None:
+    """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
+
+    `cpu` names the processor that the loops are compiled for and the instructions it has. It is this machine's, or the
+    one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
+    """
+    from posefit.silhouette.cuda.device import check_device
+    from posefit_reproduce.bench.processor import check_named
+
+    if None not in (threads, device):
+        raise InputError("bench must have --threads or --device, got both")
+    check_named()
+    if device is None:
+        from posefit_reproduce.bench.experiment import loop_figures
+
+        say("timing; this takes half a minute ...")
+        figures = loop_figures(threads)
+        lines = _named_lines(figures)
+    else:
+        from posefit_reproduce.bench.device import device_figures, device_lines
+
+        check_device(device)
+        say("timing the GPU beside the CPU; this takes a minute or more ...")
+        figures = device_figures(device)
+        lines = device_lines(figures)
+    click.echo(json_line(figures) if as_json else "\n".join(lines))
+
+
+def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
+    """Yield every figure with its name, those of a group as `group.name`."""
+    for name, value in figures.items():
+        if isinstance(value, Mapping):
+            yield from _named_lines(value, f"{group}{name}.")
+        else:
+            yield f"{group + name:38} " + (f"{value:.4g}" if isinstance(value, float) else str(value))
+
+
+@hookimpl
+def posefit_register_commands(register: Callable[[click.Command], None]) -> None:
+    """Register `reproduce` and `bench`."""
+    register(reproduce_group)
+    register(bench_command)
