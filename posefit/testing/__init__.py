@@ -17,6 +17,7 @@ attribute `baseline = True` is chance itself, and need not beat it.
 """
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from posefit.testing.results import Check, Report, Result, parametrize, run_checks
@@ -45,51 +46,46 @@ def optimiser_checks(
     factory: Callable[..., Any], *, next_frame: "NextFrame" = "start", settings: dict[str, Any] | None = None
 ) -> list[Check]:
     """Return the checks of an optimiser's factory; `next_frame` as it is registered."""
-    from posefit.testing.optimiser_rules import OptimiserCase, checklist
-
-    return checklist.of(OptimiserCase(factory, settings or {}, next_frame))
+    return _checks("optimiser", factory, settings, next_frame)
 
 
 def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a prior's factory."""
-    from posefit.testing.prior_rules import PriorCase, checklist
-
-    return checklist.of(PriorCase(factory, settings or {}))
+    return _checks("prior", factory, settings)
 
 
 def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a tracker's factory."""
-    from posefit.testing.tracker_rules import TrackerCase, checklist
-
-    return checklist.of(TrackerCase(factory, settings or {}))
+    return _checks("tracker", factory, settings)
 
 
 def segmenter_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
     """Return the checks of a segmenter's factory."""
-    from posefit.testing.segmenter_rules import SegmenterCase, checklist
+    return _checks("segmenter", factory, settings)
 
-    return checklist.of(SegmenterCase(factory, settings or {}))
+
+def _checks(kind: str, factory: Callable[..., Any], settings: dict[str, Any] | None, *more: Any) -> list[Check]:
+    """Return the checks of a kind of plugin, whose rules are loaded when they are needed."""
+    rules = import_module(f"posefit.testing.{kind}_rules")
+    checks: list[Check] = rules.checklist.of(rules.Case(factory, settings or {}, *more))
+    return checks
 
 
 def check_optimiser(factory: Callable[..., Any], **options: Any) -> Report:
     """Return the report on an optimiser's factory, true where no check failed; options as for `optimiser_checks`."""
-    return run_checks(_name(factory), optimiser_checks(factory, **options))
+    return run_checks(factory, optimiser_checks(factory, **options))
 
 
 def check_prior(factory: Callable[..., Any], **options: Any) -> Report:
     """Return the report on a prior's factory, true where no check failed; options as for `prior_checks`."""
-    return run_checks(_name(factory), prior_checks(factory, **options))
+    return run_checks(factory, prior_checks(factory, **options))
 
 
 def check_tracker(factory: Callable[..., Any], **options: Any) -> Report:
     """Return the report on a tracker's factory, true where no check failed; options as for `tracker_checks`."""
-    return run_checks(_name(factory), tracker_checks(factory, **options))
+    return run_checks(factory, tracker_checks(factory, **options))
 
 
 def check_segmenter(factory: Callable[..., Any], **options: Any) -> Report:
     """Return the report on a segmenter's factory, true where no check failed; options as for `segmenter_checks`."""
-    return run_checks(_name(factory), segmenter_checks(factory, **options))
-
-
-def _name(factory: Callable[..., Any]) -> str:
-    return str(getattr(getattr(factory, "func", factory), "__name__", repr(factory)))
+    return run_checks(factory, segmenter_checks(factory, **options))

@@ -1,13 +1,14 @@
-"""What the rules of several kinds of plugins share: signatures, settings that make no sense, global randomness."""
+"""The rules that plugins of several kinds share, and what their other rules are made of."""
 
 import copy
 import inspect
 import pickle
 import random
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_origin
+from typing import Any, ClassVar, Literal, get_origin
 
 import numpy as np
 
@@ -19,8 +20,71 @@ from posefit.testing.results import BrokenError, SkippedError, expect
 class PluginCase:
     """A factory with its settings."""
 
+    arguments: ClassVar[tuple[str, ...]] = ()  # that a factory of the kind takes by position
+
     factory: Callable[..., Any]
     settings: dict[str, Any] = field(default_factory=dict)
+
+    def build(self, **more: Any) -> Any:
+        """Return a new plugin, with more settings or others."""
+        return self.factory(**{**self.settings, **more})
+
+    def use(self, **more: Any) -> None:
+        """Build a plugin, and use it where a setting that makes no sense may show only then."""
+        self.build(**more)
+
+
+def construction(case: PluginCase) -> None:
+    """A factory takes what its kind is given, and keyword-only settings."""
+    kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
+    by_position = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
+    expect(
+        len(by_position) == len(case.arguments),
+        f"a factory must take ({', '.join(case.arguments)}) and keyword-only settings, got {len(by_position)} others",
+    )
+    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
+    case.build()
+
+
+def unknown_setting(case: PluginCase) -> None:
+    """A setting that does not exist is refused."""
+    try:
+        case.build(no_such_setting=1)
+    except TypeError:
+        return
+    raise BrokenError("an unknown setting must raise TypeError, got none")
+
+
+def nonsense_settings(case: PluginCase, *, harmless: bool = False) -> str:
+    """Nonsense in a setting is refused."""
+    tried, refused = 0, list[str]()
+    for setting in settings_of(case.factory):
+        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
+        choice = get_origin(kind) is Literal or setting.name == "variant"
+        if not choice and kind not in (int, float):
+            continue
+        nonsense: object = "no such choice" if choice else -1 if kind is int else float("nan")
+        tried += 1
+        try:
+            case.use(**{setting.name: nonsense})
+        except ValueError:
+            refused.append(setting.name)
+        else:
+            expect(harmless, f"{setting.name}={nonsense} must raise ValueError, got none")
+    if not tried:
+        raise SkippedError("it has no settings that could be nonsense")
+    return f"refused: {', '.join(refused) or 'none'}"
+
+
+def check_speed(what: str, limit: float, work: Callable[[int], int]) -> str:
+    """Check that one of what `work` makes takes less than so many seconds; it returns how many it made in a turn."""
+    seconds = np.inf
+    for turn in range(3):
+        began = time.perf_counter()
+        count = work(turn)
+        seconds = min(seconds, (time.perf_counter() - began) / max(count, 1))
+    expect(seconds < limit, f"{what} must take less than {1e3 * limit:g} ms, got {1e3 * seconds:.3g}")
+    return f"{1e6 * seconds:.1f} us {what}"
 
 
 def duplicates(plugin: Any) -> dict[str, Any]:
@@ -36,46 +100,6 @@ def duplicates(plugin: Any) -> dict[str, Any]:
         except Exception as error:
             raise BrokenError(f"{what} of it must be possible, got {type(error).__name__}: {error}") from None
     return made
-
-
-def check_signature(factory: Callable[..., Any], *arguments: str) -> None:
-    """Check that a factory takes these arguments by position, and only named keyword-only settings beside them."""
-    kinds = [one.kind for one in inspect.signature(factory).parameters.values()]
-    by_position = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
-    expect(
-        len(by_position) == len(arguments),
-        f"a factory must take ({', '.join(arguments)}) and keyword-only settings, got {len(by_position)} others",
-    )
-    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
-
-
-def check_unknown_setting(build: Callable[..., Any]) -> None:
-    """Check that a setting which does not exist raises TypeError."""
-    try:
-        build(no_such_setting=1)
-    except TypeError:
-        return
-    expect(False, "an unknown setting must raise TypeError, got none")
-
-
-def check_nonsense(factory: Callable[..., Any], build: Callable[..., Any], *, harmless: bool = False) -> str:
-    """Check that `build` raises ValueError for nonsense in each setting, or is harmless; return which did."""
-    refused: list[str] = []
-    for setting in settings_of(factory):
-        kind = setting.annotation if setting.annotation is not inspect.Parameter.empty else type(setting.default)
-        choice = get_origin(kind) is Literal or setting.name == "variant"
-        if not choice and kind not in (int, float):
-            continue
-        nonsense: object = "no such choice" if choice else -1 if kind is int else float("nan")
-        try:
-            build(**{setting.name: nonsense})
-        except ValueError:
-            refused.append(setting.name)
-        else:
-            expect(harmless, f"{setting.name}={nonsense} must raise ValueError, got none")
-    if not refused and not harmless:
-        raise SkippedError("it has no settings that could be nonsense")
-    return f"refused: {', '.join(refused) or 'none'}"
 
 
 def global_random_state() -> tuple[object, ...]:

@@ -3,7 +3,6 @@
 import pickle
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, cast
@@ -13,16 +12,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.optimiser import Filter, NextFrame, Niching, Optimiser, populations
-from posefit.settings import planned, settings_of
-from posefit.testing.common import (
-    PluginCase,
-    check_nonsense,
-    check_signature,
-    check_unknown_setting,
-    duplicates,
-    left_alone,
-    seeded,
-)
+from posefit.settings import planned
+from posefit.testing import common
+from posefit.testing.common import PluginCase, check_speed, duplicates, left_alone, seeded
 from posefit.testing.problem import pose_problem
 from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
 from posefit.testing.toy import Toy, ball, shell, sphere
@@ -33,23 +25,30 @@ SEEDS = range(5)
 MAX_SHARE_OF_CHANCE = 0.95  # a cost below so much of chance's beats it
 MAX_SECONDS = 0.05  # a proposal: twenty thousand times what a pose costs
 TURNS = 24  # populations after which costs that are right have to show
-SPACE = Toy(5, ball)
+SPACE, BOX = Toy(5, ball), Toy(9)
 
 Evaluate = Callable[[Array], Array]
 checklist = Checklist()
 
 
 @dataclass(frozen=True)
-class OptimiserCase(PluginCase):
+class Case(PluginCase):
     """An optimiser's factory with its settings, and what it is registered to do when the next frame comes."""
+
+    arguments = "space", "rng"
 
     next_frame: NextFrame = "start"
 
-    def build(self, space: Space, seed: int = 0, evaluations: int = EVALUATIONS, **more: Any) -> Optimiser:
+    def build(self, space: Space = BOX, seed: int = 0, evaluations: int = EVALUATIONS, **more: Any) -> Optimiser:
         """Return a new optimiser of the space."""
         filled = planned(self.factory, {**self.settings, **more}, evaluations)
         optimiser: Optimiser = self.factory(space, np.random.default_rng(seed), **filled)
         return optimiser
+
+    def use(self, **more: Any) -> None:
+        """Check a few populations of an optimiser."""
+        for proposals, _ in self.steps(self.build(Toy(5), **more), Toy(5), sphere, 3):
+            check_population(proposals, Toy(5))
 
     def steps(
         self, optimiser: Optimiser, space: Space, evaluate: Evaluate, count: int
@@ -106,17 +105,13 @@ def same(first: list[Array], second: list[Array]) -> bool:
     return len(first) == len(second) and all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-@checklist
-def construction(case: OptimiserCase) -> None:
-    """A factory takes the space, the generator and keyword-only settings."""
-    check_signature(case.factory, "space", "rng")
-    case.build(Toy(9))
+checklist(common.construction)
 
 
 @checklist
-def shape(case: OptimiserCase) -> str:
+def shape(case: Case) -> str:
     """The method ask returns an array (n, d)."""
-    proposals = case.build(Toy(9)).ask()
+    proposals = case.build().ask()
     expect(isinstance(proposals, np.ndarray), f"ask must return an array, got {type(proposals).__name__}")
     expect(proposals.ndim == 2 and proposals.shape[1] == 9, f"ask must return (n, 9), got {proposals.shape}")
     expect(len(proposals), "the first population must not be empty, got (0, 9)")
@@ -124,41 +119,41 @@ def shape(case: OptimiserCase) -> str:
 
 
 @checklist
-def dtype(case: OptimiserCase) -> None:
+def dtype(case: Case) -> None:
     """The method ask returns float64."""
-    for proposals, _ in case.steps(case.build(Toy(9)), Toy(9), sphere, 4):
+    for proposals, _ in case.steps(case.build(), BOX, sphere, 4):
         expect(proposals.dtype == np.float64, f"ask must return float64, got {proposals.dtype}")
 
 
 @checklist
-def box(case: OptimiserCase) -> str:
+def box(case: Case) -> str:
     """Every proposal lies in [-1, 1]^d, with coordinates that wrap around and from a start on the edge too."""
     case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
     case.valid(Toy(5, start=Start(np.ones(5), np.full(5, 0.5), np.full(5, 0.3))), sphere)
-    return case.valid(Toy(9), lambda x: -np.abs(x).sum(axis=1), 12)
+    return case.valid(BOX, lambda x: -np.abs(x).sum(axis=1), 12)
 
 
 @checklist
-def feasible(case: OptimiserCase) -> str:
+def feasible(case: Case) -> str:
     """Every proposal is feasible where a third of the box is."""
     return case.valid(Toy(4, ball), lambda x: -x.sum(axis=1), 12)
 
 
 @checklist
-def hardly_feasible(case: OptimiserCase) -> str:
+def hardly_feasible(case: Case) -> str:
     """Every proposal is feasible, and the search goes on, where a few in a thousand are feasible."""
     return case.valid(Toy(3, shell), sphere)
 
 
 @checklist
-def dimensions(case: OptimiserCase) -> None:
+def dimensions(case: Case) -> None:
     """Spaces of one dimension and of 66 are searched."""
     for d in (1, 66):
         case.valid(Toy(d), sphere)
 
 
 @checklist
-def costs(case: OptimiserCase) -> None:
+def costs(case: Case) -> None:
     """Costs that are nan, infinite, equal or as large as 1e300 do no harm, one or all."""
     kinds: dict[str, Evaluate] = {
         "some nan": lambda x: np.where(np.arange(len(x)) % 2, np.nan, sphere(x)),
@@ -176,9 +171,9 @@ def costs(case: OptimiserCase) -> None:
 
 
 @checklist
-def budget(case: OptimiserCase) -> str:
+def budget(case: Case) -> str:
     """A search uses its budget, in whole populations."""
-    used, optimiser = 0, case.build(Toy(9))
+    used, optimiser = 0, case.build()
     while len(proposals := optimiser.ask()) and used + len(proposals) <= EVALUATIONS:
         optimiser.tell(proposals, sphere(proposals))
         used += len(proposals)
@@ -187,7 +182,7 @@ def budget(case: OptimiserCase) -> str:
 
 
 @checklist
-def order(case: OptimiserCase) -> str:
+def order(case: Case) -> str:
     """The cost of row i belongs to proposal i."""
     rng = np.random.default_rng(1)
 
@@ -209,34 +204,24 @@ def order(case: OptimiserCase) -> str:
     return f"mean cost {np.median(good):.3g}, shuffled {np.median(bad):.3g}"
 
 
-@checklist
-def unknown_setting(case: OptimiserCase) -> None:
-    """A setting that does not exist is refused."""
-    check_unknown_setting(lambda **more: case.build(Toy(9), **more))
+checklist(common.unknown_setting)
 
 
 @checklist
-def nonsense_settings(case: OptimiserCase) -> str:
+def nonsense_settings(case: Case) -> str:
     """Nonsense in a setting is refused or harmless."""
-    if not settings_of(case.factory):
-        raise SkippedError("it has no settings")
-
-    def search(**nonsense: Any) -> None:
-        for proposals, _ in case.steps(case.build(Toy(5), **nonsense), Toy(5), sphere, 3):
-            check_population(proposals, Toy(5))
-
-    return check_nonsense(case.factory, search, harmless=True)
+    return common.nonsense_settings(case, harmless=True)
 
 
 @checklist
-def seeds(case: OptimiserCase) -> None:
+def seeds(case: Case) -> None:
     """The same seed gives the same proposals, another seed gives others."""
     expect(same(case.trace(), case.trace()), "one seed must give one trace, got two")
     expect(not same(case.trace(), case.trace(seed=1)), "two seeds must give two traces, got the same")
 
 
 @checklist
-def new_process(case: OptimiserCase) -> None:
+def new_process(case: Case) -> None:
     """The same seed gives the same proposals in a new process."""
     try:
         payload = pickle.dumps((sys.path, pickle.dumps(case)))
@@ -245,13 +230,13 @@ def new_process(case: OptimiserCase) -> None:
     ran = subprocess.run([sys.executable, "-m", "posefit.testing.process", "trace"], input=payload, capture_output=True)
     if ran.returncode == 3:
         raise SkippedError("the factory cannot be imported in another process")
-    expect(not ran.returncode, f"it must work in a new process, got {ran.stderr.decode()[-300:]}")
-    expect(ran.stdout, "it must work in a new process, got one that ended in the middle")
+    whole = not ran.returncode and ran.stdout
+    expect(whole, f"it must work in a new process, got one that ended in the middle {ran.stderr.decode()[-300:]}")
     expect(same(case.trace(), pickle.loads(ran.stdout)), "one seed must give one trace in every process, got two")
 
 
 @checklist
-def global_randomness(case: OptimiserCase) -> None:
+def global_randomness(case: Case) -> None:
     """The global random generators are neither used nor changed."""
     traces = []
     for seed in (1, 2):
@@ -261,7 +246,7 @@ def global_randomness(case: OptimiserCase) -> None:
 
 
 @checklist
-def inputs(case: OptimiserCase) -> None:
+def inputs(case: Case) -> None:
     """The method tell leaves its arguments as they were."""
     optimiser = case.build(SPACE)
     for _ in range(4):
@@ -276,7 +261,7 @@ def inputs(case: OptimiserCase) -> None:
 
 
 @checklist
-def copies(case: OptimiserCase) -> None:
+def copies(case: Case) -> None:
     """A deep copy, and what comes out of a pickle, go on as the original does, each on its own."""
 
     def rest(optimiser: Optimiser) -> list[Array]:
@@ -293,7 +278,7 @@ def copies(case: OptimiserCase) -> None:
 
 
 @checklist
-def start(case: OptimiserCase) -> str:
+def start(case: Case) -> str:
     """The first population comes from the start that the space gives."""
     if case.next_frame == "forget":
         raise SkippedError("it is registered to forget")
@@ -305,7 +290,7 @@ def start(case: OptimiserCase) -> str:
 
 
 @checklist
-def next_frame(case: OptimiserCase) -> str:
+def next_frame(case: Case) -> str:
     """A filter carries its particles into the next frame."""
     if case.next_frame != "carry":
         raise SkippedError(f"it is registered to {case.next_frame}, not to carry")
@@ -327,7 +312,7 @@ def next_frame(case: OptimiserCase) -> str:
 
 
 @checklist
-def modes(case: OptimiserCase) -> str:
+def modes(case: Case) -> str:
     """The method modes returns proposals that were passed to tell, the best first."""
     space = Toy(3, ball)
     optimiser = case.build(space)
@@ -348,45 +333,38 @@ def modes(case: OptimiserCase) -> str:
 
 
 @checklist
-def sphere_problem(case: OptimiserCase) -> str:
+def sphere_problem(case: Case) -> str:
     """A sphere is solved better than by chance."""
     return _beats_chance(case, Toy(6), sphere)
 
 
 @checklist
-def real_problem(case: OptimiserCase) -> str:
+def real_problem(case: Case) -> str:
     """A real pose problem is solved better than by chance."""
     problem = pose_problem()
     return _beats_chance(case, problem.space, problem.evaluate)
 
 
-def _beats_chance(case: OptimiserCase, space: Space, evaluate: Evaluate) -> str:
+def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     if getattr(getattr(case.factory, "func", case.factory), "baseline", False):
         raise SkippedError("it is the baseline itself")
     draws = [draw_population(space, np.random.default_rng(seed), BUDGET) for seed in SEEDS]
     chance = float(np.median([float(evaluate(drawn).min()) for drawn in draws]))
-    lowest: list[float] = []
+    below, lowest = MAX_SHARE_OF_CHANCE * chance, list[float]()
     for seed in SEEDS:
         lowest.append(case.best(space, evaluate, seed, BUDGET))
-        if sum(cost < MAX_SHARE_OF_CHANCE * chance for cost in lowest) > len(SEEDS) // 2:
+        if sum(cost < below for cost in lowest) > len(SEEDS) // 2:
             break  # whatever the other seeds give, the median is below, too
     best = float(np.median(lowest))
-    expect(
-        best < MAX_SHARE_OF_CHANCE * chance,
-        f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}",
-    )
+    expect(best < below, f"the median cost after {BUDGET} must beat chance's {chance:.4g}, got {best:.4g}")
     return f"cost {best:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
 
 
 @checklist
-def speed(case: OptimiserCase) -> str:
+def speed(case: Case) -> str:
     """A proposal takes less than 50 ms to make."""
-    space, seconds = Toy(9), np.inf
-    for seed in range(3):
-        optimiser, count = case.build(space, seed), 0
-        began = time.perf_counter()
-        for proposals, _ in case.steps(optimiser, space, sphere, 10):
-            count += len(proposals)
-        seconds = min(seconds, (time.perf_counter() - began) / max(count, 1))
-    expect(seconds < MAX_SECONDS, f"a proposal must take less than {1e3 * MAX_SECONDS:g} ms, got {1e3 * seconds:.3g}")
-    return f"{1e6 * seconds:.1f} us a proposal"
+
+    def search(seed: int) -> int:
+        return sum(len(proposals) for proposals, _ in case.steps(case.build(BOX, seed), BOX, sphere, 10))
+
+    return check_speed("a proposal", MAX_SECONDS, search)

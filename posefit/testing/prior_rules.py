@@ -1,7 +1,6 @@
 """Is a prior right: shapes, ranges, the same bits for a row whatever stands beside it, and does it learn anything?"""
 
 import tempfile
-import time
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,18 +12,13 @@ from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
-from posefit.testing.common import (
-    PluginCase,
-    check_nonsense,
-    check_signature,
-    duplicates,
-    global_random_state,
-    left_alone,
-)
+from posefit.testing import common
+from posefit.testing.common import PluginCase, check_speed, duplicates, global_random_state, left_alone
 from posefit.testing.problem import walking_angles
 from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
 
 ROWS = 100
+MAX_SECONDS = 5e-3  # to recover a pose
 checklist = Checklist()
 
 
@@ -38,17 +32,16 @@ class Fitting:
     random_unchanged: bool
 
 
-class PriorCase(PluginCase):
+class Case(PluginCase):
     """A prior's factory with its settings."""
 
     @cached_property
     def first(self) -> Fitting:
         """The prior after it has learned the built-in walks: once for all rules, as that may take minutes."""
-        prior: Prior = self.factory(**self.settings)
-        angles, skeleton = walking_angles(), built_in.average_skeleton()
-        before = angles.copy()
-        random = global_random_state()
-        returned = prior.fit(angles, skeleton)
+        prior: Prior = self.build()
+        angles = walking_angles()
+        before, random = angles.copy(), global_random_state()
+        returned = prior.fit(angles, built_in.average_skeleton())
         return Fitting(prior, returned, np.array_equal(angles, before), random == global_random_state())
 
     @property
@@ -58,13 +51,20 @@ class PriorCase(PluginCase):
 
     def fitted_again(self) -> Prior:
         """Return another prior that has learned the same."""
-        prior: Prior = self.factory(**self.settings)
+        prior: Prior = self.build()
         return prior.fit(walking_angles(), built_in.average_skeleton())
 
-    def latents(self, prior: Prior) -> Array:
-        """Return some latents (ROWS, m) within the range."""
-        low, high = np.asarray(prior.low), np.asarray(prior.high)
+    @property
+    def latents(self) -> Array:
+        """Some latents (ROWS, m) within the range."""
+        low, high = np.asarray(self.fitted.low), np.asarray(self.fitted.high)
         return np.random.default_rng(0).uniform(low, high, (ROWS, len(low)))
+
+
+def _same(first: Prior, second: Prior, latents: Array) -> bool:
+    """Return whether two priors make the same of latents."""
+    angles = np.array_equal(first.inverse_transform(latents), second.inverse_transform(latents))
+    return angles and np.array_equal(first.feasible(latents), second.feasible(latents))
 
 
 def _check_array(method: str, values: Array, shape: tuple[int, int]) -> None:
@@ -73,20 +73,17 @@ def _check_array(method: str, values: Array, shape: tuple[int, int]) -> None:
     expect(np.isfinite(values).all(), f"{method} must return finite values, got nan or infinity")
 
 
-@checklist
-def construction(case: PriorCase) -> None:
-    """A factory takes keyword-only settings and nothing else."""
-    check_signature(case.factory)
+checklist(common.construction)
 
 
 @checklist
-def fit(case: PriorCase) -> None:
+def fit(case: Case) -> None:
     """The method fit returns the prior itself."""
     expect(case.first.returned is case.first.prior, "fit must return self, got another object")
 
 
 @checklist
-def ranges(case: PriorCase) -> str:
+def ranges(case: Case) -> str:
     """The range of the latents is finite and not reversed."""
     prior = case.fitted
     low, high = np.asarray(prior.low), np.asarray(prior.high)
@@ -97,7 +94,7 @@ def ranges(case: PriorCase) -> str:
 
 
 @checklist
-def transform(case: PriorCase) -> None:
+def transform(case: Case) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted
     for rows in (1, 7):
@@ -105,16 +102,16 @@ def transform(case: PriorCase) -> None:
 
 
 @checklist
-def inverse(case: PriorCase) -> None:
+def inverse(case: Case) -> None:
     """Latents (n, m) become finite joint angles (n, 63), in every corner of the range too."""
     prior = case.fitted
     corners = np.where(np.random.default_rng(1).random((64, len(prior.low))) < 0.5, prior.low, prior.high)
-    for latents in (corners, case.latents(prior), case.latents(prior)[:1]):
+    for latents in (corners, case.latents, case.latents[:1]):
         _check_array("inverse_transform", np.asarray(prior.inverse_transform(latents)), (len(latents), 63))
 
 
 @checklist
-def training_in_range(case: PriorCase) -> None:
+def training_in_range(case: Case) -> None:
     """The training poses lie within the range."""
     prior = case.fitted
     latents = np.asarray(prior.transform(walking_angles()))
@@ -124,7 +121,7 @@ def training_in_range(case: PriorCase) -> None:
 
 
 @checklist
-def training_feasible(case: PriorCase) -> str:
+def training_feasible(case: Case) -> str:
     """Nine of ten training poses are feasible."""
     prior = case.fitted
     feasible = np.asarray(prior.feasible(prior.transform(walking_angles())))
@@ -135,10 +132,9 @@ def training_feasible(case: PriorCase) -> str:
 
 
 @checklist
-def same_bits(case: PriorCase) -> None:
+def same_bits(case: Case) -> None:
     """A row has the same bits whatever rows stand beside it."""
-    prior = case.fitted
-    latents = case.latents(prior)
+    prior, latents = case.fitted, case.latents
     whole, feasible = prior.inverse_transform(latents), prior.feasible(latents)
     for rows in (slice(0, 1), slice(3, 10), slice(None, None, -1)):
         same = np.array_equal(prior.inverse_transform(latents[rows]), whole[rows])
@@ -147,69 +143,55 @@ def same_bits(case: PriorCase) -> None:
 
 
 @checklist
-def same_again(case: PriorCase) -> None:
+def same_again(case: Case) -> None:
     """Learning the same poses again gives the same space."""
-    first, second = case.fitted, case.fitted_again()
-    latents = case.latents(first)
-    same = np.array_equal(first.low, second.low) and np.array_equal(
-        first.inverse_transform(latents), second.inverse_transform(latents)
-    )
+    again = case.fitted_again()
+    same = np.array_equal(case.fitted.low, again.low) and _same(case.fitted, again, case.latents)
     expect(same, "fitting twice must give the same space, got two")
 
 
 @checklist
-def inputs(case: PriorCase) -> None:
+def inputs(case: Case) -> None:
     """Methods leave their arguments as they were."""
-    prior, angles = case.fitted, walking_angles()
-    before = angles.copy()
-    latents = case.latents(prior)
-    kept = latents.copy()
+    prior, angles, latents = case.fitted, walking_angles(), case.latents
     prior.transform(angles), prior.inverse_transform(latents), prior.feasible(latents)
-    same = case.first.inputs_unchanged and np.array_equal(angles, before)
+    same = case.first.inputs_unchanged and np.array_equal(angles, walking_angles())
     expect(same, "joint angles must stay as they are, got others")
-    expect(np.array_equal(latents, kept), "latents must stay as they are, got others")
+    expect(np.array_equal(latents, case.latents), "latents must stay as they are, got others")
 
 
 @checklist
-def global_randomness(case: PriorCase) -> None:
+def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
         with left_alone():
             case.fitted_again()
     with left_alone():
-        case.fitted.inverse_transform(case.latents(case.fitted))
+        case.fitted.inverse_transform(case.latents)
 
 
 @checklist
-def copies(case: PriorCase) -> None:
+def copies(case: Case) -> None:
     """A deep copy and what comes out of a pickle are the same space."""
-    prior = case.fitted
-    latents = case.latents(prior)
-    for what, twin in duplicates(prior).items():
-        same = np.array_equal(twin.inverse_transform(latents), prior.inverse_transform(latents))
-        expect(same, f"{what} must be the same space, got another")
+    for what, twin in duplicates(case.fitted).items():
+        expect(_same(twin, case.fitted, case.latents), f"{what} must be the same space, got another")
 
 
 @checklist
-def file(case: PriorCase) -> None:
+def file(case: Case) -> None:
     """The saved file is loaded again as the same space."""
-    prior = case.fitted
-    load = getattr(type(prior), "load", None)
+    load = getattr(type(case.fitted), "load", None)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "prior.npz"
-        prior.save(path)
+        case.fitted.save(path)
         expect(path.is_file(), "save must write the file it is given, got none")
         if load is None:
             raise SkippedError("it has no load; save wrote its file")
-        latents = case.latents(prior)
-        again = load(path)
-        same = np.array_equal(again.inverse_transform(latents), prior.inverse_transform(latents))
-        same &= np.array_equal(again.feasible(latents), prior.feasible(latents))
-        expect(same, "load must give the same space, got another")
+        expect(_same(load(path), case.fitted, case.latents), "load must give the same space, got another")
 
 
 @checklist
-def learns(case: PriorCase) -> str:
+def learns(case: Case) -> str:
     """Training poses come back nearer than their mean is."""
     prior, angles = case.fitted, walking_angles()
     back = prior.inverse_transform(prior.transform(angles))
@@ -219,27 +201,24 @@ def learns(case: PriorCase) -> str:
 
 
 @checklist
-def bad_input(case: PriorCase) -> None:
+def bad_input(case: Case) -> None:
     """Joint angles of a wrong shape, with nan, or too few are refused."""
     angles = walking_angles()
     with_nan = angles.copy()
     with_nan[3, 3] = np.nan
     for what, value in (("60 columns", angles[:, :60]), ("nan", with_nan), ("no frames", angles[:0])):
         try:
-            case.factory(**case.settings).fit(value, built_in.average_skeleton())
+            case.build().fit(value, built_in.average_skeleton())
         except ValueError:
             continue
         raise BrokenError(f"fit must raise ValueError for {what}, got a prior")
 
 
-@checklist
-def nonsense_settings(case: PriorCase) -> str:
-    """Nonsense in a setting is refused."""
-    return check_nonsense(case.factory, lambda **nonsense: case.factory(**{**case.settings, **nonsense}))
+checklist(common.nonsense_settings)
 
 
 @checklist
-def searchable(case: PriorCase) -> str:
+def searchable(case: Case) -> str:
     """A search space on it can be drawn from."""
     prior = case.fitted
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
@@ -250,14 +229,7 @@ def searchable(case: PriorCase) -> str:
 
 
 @checklist
-def speed(case: PriorCase) -> str:
+def speed(case: Case) -> str:
     """A pose is recovered in less than 5 ms."""
-    prior = case.fitted
-    latents = case.latents(prior)
-    seconds = np.inf
-    for _ in range(3):
-        began = time.perf_counter()
-        prior.inverse_transform(latents)
-        seconds = min(seconds, (time.perf_counter() - began) / ROWS)
-    expect(seconds < 5e-3, f"a pose must be recovered in less than 5 ms, got {1e3 * seconds:.3g}")
-    return f"{1e6 * seconds:.2f} us a pose"
+    prior, latents = case.fitted, case.latents
+    return check_speed("a pose", MAX_SECONDS, lambda _: len(prior.inverse_transform(latents)))

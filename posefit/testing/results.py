@@ -4,6 +4,7 @@ import re
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -49,21 +50,18 @@ class Check:
         """Return the result of the check; nothing that a plugin raises escapes."""
         try:
             with limits.timed(SECONDS):
-                detail = self.body()
+                return Result(self.name, "passed", self.body() or "")
         except SkippedError as reason:
             return Result(self.name, "skipped", str(reason))
         except BrokenError as broken:
             return Result(self.name, "failed", str(broken))
-        except TimeoutError as error:
-            late = f"it must end within {SECONDS:g} s, and did not"
-            return Result(self.name, "failed", late, _plugin_traceback(error.__cause__ or error))
-        except SystemExit as error:
-            ended = f"it must not end the program, got SystemExit: {error.code}"
-            return Result(self.name, "failed", ended, _plugin_traceback(error))
-        except Exception as error:  # a plugin may raise anything
-            raised = f"it must not fail, got {type(error).__name__}: {error}"
-            return Result(self.name, "failed", raised, _plugin_traceback(error))
-        return Result(self.name, "passed", detail or "")
+        except TimeoutError as late:
+            detail, error = f"it must end within {SECONDS:g} s, and did not", late.__cause__ or late
+        except SystemExit as end:
+            detail, error = f"it must not end the program, got SystemExit: {end.code}", end
+        except Exception as raised:  # a plugin may raise anything
+            detail, error = f"it must not fail, got {type(raised).__name__}: {raised}", raised
+        return Result(self.name, "failed", detail, _plugin_traceback(error))
 
     def __call__(self) -> None:
         """Raise BrokenError where the rule is broken; skip the test where it does not apply."""
@@ -107,12 +105,16 @@ class Report:
         return f"{passed + failed} checks ran, {failed} failed, {skipped} skipped"
 
 
-def run_checks(plugin: str, checks: Iterable[Check]) -> Report:
-    """Return the results of the checks; once two failed for one cause, the others are not run."""
+def run_checks(plugin: str | Callable[..., Any], checks: Iterable[Check]) -> Report:
+    """Return the results of the checks of a plugin, under its name or its factory's.
+
+    Once two failed for one cause, the others are not run.
+    """
+    function = getattr(plugin, "func", plugin)
     results: list[Result] = []
     for check in checks:
         results.append(not_run(check.name, results) or check.run())
-    return Report(plugin, tuple(results))
+    return Report(plugin if isinstance(plugin, str) else getattr(function, "__name__", repr(plugin)), tuple(results))
 
 
 def not_run(name: str, earlier: Sequence[Result]) -> Result | None:
@@ -133,13 +135,12 @@ def _cause(detail: str) -> str:
 def _plugin_traceback(error: BaseException) -> str:
     """Return an error's traceback without the frames of the kit that called the plugin."""
     rest = error.__traceback__
-    while rest is not None and _of_kit(rest.tb_frame.f_code.co_filename):
+    while rest is not None:
+        file = rest.tb_frame.f_code.co_filename
+        if file != limits.__file__ and Path(file).parent != Path(__file__).parent:
+            return "".join(traceback.format_exception(type(error), error, rest)).strip()
         rest = rest.tb_next
-    return "".join(traceback.format_exception(type(error), error, rest)).strip() if rest is not None else ""
-
-
-def _of_kit(file: str) -> bool:
-    return Path(file).parent == Path(__file__).parent or file == limits.__file__
+    return ""
 
 
 def parametrize(checks: Sequence[Check]) -> Any:
@@ -149,25 +150,20 @@ def parametrize(checks: Sequence[Check]) -> Any:
     return pytest.mark.parametrize("check", checks, ids=[check.name for check in checks])
 
 
-Body = Callable[..., str | None]
-
-
 class Checklist:
     """Collects the checks of a kind of plugin, in the order in which they are written."""
 
     def __init__(self) -> None:
-        self._bodies: list[Body] = []
+        self._bodies: list[Callable[[Any], str | None]] = []
 
-    def __call__(self, body: Body) -> Body:
+    def __call__(self, body: Callable[[Any], str | None]) -> Callable[[Any], str | None]:
         """Add a function to the list; its name is the check's, the first line of its docstring the rule."""
         self._bodies.append(body)
         return body
 
     def of(self, case: object) -> list[Check]:
         """Return all checks, bound to one plugin."""
-
-        def bound(body: Body) -> Check:
-            rule = (body.__doc__ or "").strip().split("\n")[0].rstrip(".")
-            return Check(body.__name__, rule, lambda: body(case))
-
-        return [bound(body) for body in self._bodies]
+        return [
+            Check(body.__name__, (body.__doc__ or "").strip().split("\n")[0].rstrip("."), partial(body, case))
+            for body in self._bodies
+        ]

@@ -1,6 +1,5 @@
 """Is a segmenter right: two masks of the image's size, the same again, and do they show the person?"""
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -8,7 +7,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -16,13 +14,14 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, Segmenter
 from posefit.silhouette.mask import Mask
-from posefit.testing.common import PluginCase, check_nonsense, check_signature, left_alone
+from posefit.testing import common
+from posefit.testing.common import PluginCase, check_speed, left_alone
 from posefit.testing.results import Checklist, SkippedError, expect
 
 SIZE = (320, 240)
 EMPTY, FRAMES = 8, 40  # frames of an empty scene, then frames of a person who walks through
 OVERLAP = 0.3  # of the person and the mask: half of what a poor background model reaches
-SECONDS = 1.0  # for a picture of that size
+MAX_SECONDS = 1.0  # for a picture of that size
 SKIN, SHIRT, TROUSERS = (150.0, 175.0, 225.0), (235.0, 235.0, 235.0), (200.0, 150.0, 130.0)  # blue, green, red
 checklist = Checklist()
 
@@ -72,18 +71,26 @@ def painted() -> tuple[PaintedFilm, list[Mask]]:
     return PaintedFilm(images), masks
 
 
-class SegmenterCase(PluginCase):
+class Case(PluginCase):
     """A segmenter's factory with its settings."""
 
-    def build(self) -> Segmenter:
+    arguments = ("film",)
+
+    def build(self, **more: Any) -> Segmenter:
         """Return a segmenter that has looked at the painted film."""
-        segmenter: Segmenter = self.factory(painted()[0], **self.settings)
+        segmenter: Segmenter = self.factory(painted()[0], **{**self.settings, **more})
         return segmenter
 
     def segment(self) -> list[tuple[Mask, Mask]]:
         """Return the masks and shadows of every fourth frame, in order."""
-        segmenter = self.build()
-        return [_pair(segmenter.segment(image)) for image in painted()[0].frames(step=4)]
+        segmenter, pairs = self.build(), list[tuple[Mask, Mask]]()
+        for image in painted()[0].frames(step=4):
+            pair = segmenter.segment(image)
+            expect(
+                isinstance(pair, tuple) and len(pair) == 2, f"segment must return two masks, got {type(pair).__name__}"
+            )
+            pairs.append((np.asarray(pair[0]), np.asarray(pair[1])))
+        return pairs
 
     @cached_property
     def masks(self) -> list[tuple[Mask, Mask]]:
@@ -91,21 +98,11 @@ class SegmenterCase(PluginCase):
         return self.segment()
 
 
-def _pair(masks: object) -> tuple[NDArray[Any], NDArray[Any]]:
-    expect(isinstance(masks, tuple) and len(masks) == 2, f"segment must return two masks, got {type(masks).__name__}")
-    assert isinstance(masks, tuple)
-    return np.asarray(masks[0]), np.asarray(masks[1])
+checklist(common.construction)
 
 
 @checklist
-def construction(case: SegmenterCase) -> None:
-    """A factory takes the film and keyword-only settings."""
-    check_signature(case.factory, "film")
-    case.build()
-
-
-@checklist
-def masks(case: SegmenterCase) -> None:
+def masks(case: Case) -> None:
     """The method segment returns two boolean masks of the picture's size."""
     for mask in (mask for pair in case.masks for mask in pair):
         expect(mask.shape == SIZE[::-1], f"a mask must have shape {SIZE[::-1]}, got {mask.shape}")
@@ -113,7 +110,7 @@ def masks(case: SegmenterCase) -> None:
 
 
 @checklist
-def overlap(case: SegmenterCase) -> str:
+def overlap(case: Case) -> str:
     """The mask shows the person in half of the frames at least."""
     true = painted()[1][::4]
     overlaps = [
@@ -127,15 +124,14 @@ def overlap(case: SegmenterCase) -> str:
 
 
 @checklist
-def same_again(case: SegmenterCase) -> None:
+def same_again(case: Case) -> None:
     """The same film gives the same masks."""
-    expect(
-        np.array_equal(case.masks, case.segment()), "two segmenters of one film must give the same masks, got others"
-    )
+    same = np.array_equal(case.masks, case.segment())
+    expect(same, "two segmenters of one film must give the same masks, got others")
 
 
 @checklist
-def inputs(case: SegmenterCase) -> None:
+def inputs(case: Case) -> None:
     """The image stays as it was."""
     image = painted()[0].images[20].copy()
     case.build().segment(image)
@@ -143,7 +139,7 @@ def inputs(case: SegmenterCase) -> None:
 
 
 @checklist
-def background(case: SegmenterCase) -> str:
+def background(case: Case) -> str:
     """A background that is shown is a picture of the film's size."""
     shown = getattr(case.build(), "background", None)
     if shown is None:
@@ -154,27 +150,18 @@ def background(case: SegmenterCase) -> str:
 
 
 @checklist
-def global_randomness(case: SegmenterCase) -> None:
+def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     segmenter = case.build()
     with left_alone():
         segmenter.segment(painted()[0].images[20])
 
 
-@checklist
-def nonsense_settings(case: SegmenterCase) -> str:
-    """Nonsense in a setting is refused."""
-    film = painted()[0]
-    return check_nonsense(case.factory, lambda **nonsense: case.factory(film, **{**case.settings, **nonsense}))
+checklist(common.nonsense_settings)
 
 
 @checklist
-def speed(case: SegmenterCase) -> str:
+def speed(case: Case) -> str:
     """A picture of 320 x 240 takes less than a second."""
-    segmenter = case.build()
-    began = time.perf_counter()
-    for image in painted()[0].images[16:20]:
-        segmenter.segment(image)
-    seconds = (time.perf_counter() - began) / 4
-    expect(seconds < SECONDS, f"a picture must take less than {SECONDS:g} s, got {seconds:.3g}")
-    return f"{1e3 * seconds:.1f} ms a picture"
+    segmenter, images = case.build(), painted()[0].images[16:20]
+    return check_speed("a picture", MAX_SECONDS, lambda _: len([segmenter.segment(image) for image in images]))

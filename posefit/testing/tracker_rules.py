@@ -16,7 +16,8 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, project
 from posefit.silhouette.mask import Silhouette
-from posefit.testing.common import PluginCase, check_signature, check_unknown_setting, global_random_state, left_alone
+from posefit.testing import common
+from posefit.testing.common import PluginCase, global_random_state, left_alone
 from posefit.testing.problem import SIZE
 from posefit.testing.results import BrokenError, Checklist, expect
 
@@ -52,12 +53,14 @@ class Tracked:
     random_unchanged: bool
 
 
-class TrackerCase(PluginCase):
+class Case(PluginCase):
     """A tracker's factory with its settings."""
 
-    def build(self) -> Tracker:
+    arguments = ("task",)
+
+    def build(self, **more: Any) -> Tracker:
         """Return a new tracker of the scene."""
-        tracker: Tracker = self.factory(scene()[0], **self.settings)
+        tracker: Tracker = self.factory(scene()[0], **{**self.settings, **more})
         return tracker
 
     @cached_property
@@ -87,21 +90,17 @@ class TrackerCase(PluginCase):
         return Tracked(tracker, frames, taken, audit.warnings, unchanged, random == global_random_state())
 
 
-@checklist
-def construction(case: TrackerCase) -> None:
-    """A factory takes the task and keyword-only settings."""
-    check_signature(case.factory, "task")
-    case.build()
+checklist(common.construction)
 
 
 @checklist
-def one_frame_each(case: TrackerCase) -> str:
+def one_frame_each(case: Case) -> str:
     """Every observation gives one frame: a pose (66,), a translation (3,), evaluations and seconds."""
     return f"{len(case.first.frames)} frames"
 
 
 @checklist
-def as_they_come(case: TrackerCase) -> None:
+def as_they_come(case: Case) -> None:
     """A frame is given before the observation after the next is taken; or as much later as the tracker's `lag` says."""
     lag = getattr(case.first.tracker, "lag", 1)
     for given, taken in enumerate(case.first.taken, 1):
@@ -109,14 +108,14 @@ def as_they_come(case: TrackerCase) -> None:
 
 
 @checklist
-def no_observation(case: TrackerCase) -> None:
+def no_observation(case: Case) -> None:
     """No observation gives no frame."""
     frames = list(case.build().track([], np.random.default_rng(0)))
     expect(not frames, f"no observation must give no frame, got {len(frames)}")
 
 
 @checklist
-def audit(case: TrackerCase) -> str:
+def audit(case: Case) -> str:
     """Cost and areas of a frame are those of its pose; it counts every pose it draws, and keeps the budget."""
     expect(not case.first.warnings, "; ".join(case.first.warnings))
     return f"at most {max(frame.evaluations for frame in case.first.frames)} of {EVALUATIONS} evaluations"
@@ -127,21 +126,21 @@ def _poses(frames: list[Frame]) -> Any:
 
 
 @checklist
-def same_seed(case: TrackerCase) -> None:
+def same_seed(case: Case) -> None:
     """The same seed gives the same poses."""
     again = list(case.build().track(scene()[2], np.random.default_rng(0)))
     expect(np.array_equal(_poses(case.first.frames), _poses(again)), "one seed must give one track, got two")
 
 
 @checklist
-def used_twice(case: TrackerCase) -> None:
+def used_twice(case: Case) -> None:
     """A tracker that has tracked before does the same again."""
     again = list(case.first.tracker.track(scene()[2], np.random.default_rng(0)))
     expect(np.array_equal(_poses(case.first.frames), _poses(again)), "a second track must be as the first, got another")
 
 
 @checklist
-def global_randomness(case: TrackerCase) -> None:
+def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
         with left_alone():
@@ -149,13 +148,13 @@ def global_randomness(case: TrackerCase) -> None:
 
 
 @checklist
-def inputs(case: TrackerCase) -> None:
+def inputs(case: Case) -> None:
     """Observations and task stay as they were."""
     expect(case.first.inputs_unchanged, "observations and task must stay as they are, got others")
 
 
 @checklist
-def follows(case: TrackerCase) -> str:
+def follows(case: Case) -> str:
     """The track is nearer to the truth than a body lying on the floor: its MPJPE is below 400 mm."""
     task, motion, _ = scene()
     frames = case.first.frames
@@ -166,7 +165,4 @@ def follows(case: TrackerCase) -> str:
     return f"MPJPE {error:.0f} mm"
 
 
-@checklist
-def unknown_setting(case: TrackerCase) -> None:
-    """A setting that does not exist is refused."""
-    check_unknown_setting(lambda **more: case.factory(scene()[0], **case.settings, **more))
+checklist(common.unknown_setting)
