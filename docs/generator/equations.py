@@ -21,8 +21,6 @@ SOURCES = {
     "MAREE2018": "Maree et al., Real-valued multi-modal optimization driven by hill-valley clustering, 2018",
     "DAU2022": "Dau and Chopin, Waste-free sequential Monte Carlo, 2022",
     "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
-    "DUNN2023": "Dunn, Wasserman and Ramdas, Distribution-free prediction sets for two-layer hierarchical models, 2023",
-    "GUO2017": "Guo, Pleiss, Sun and Weinberger, On calibration of modern neural networks, 2017",
     "BRIER1950": "Brier, Verification of forecasts expressed in terms of probability, 1950",
     "GROOD1983": "Grood and Suntay, A joint coordinate system for the clinical description of motions: the knee, 1983",
     "WU2002": "Wu et al., ISB recommendation on definitions of joint coordinate systems: ankle, hip and spine, 2002",

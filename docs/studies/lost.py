@@ -29,10 +29,9 @@ from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.evaluation import LOST
-from posefit.uncertainty.calibration import calibration_error
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.jobs import Progress, each
-from scores import auroc, false_alarms, kept_errors
+from scores import auroc, calibration_error, false_alarms, kept_errors
 from table import WORKERS, bar, markdown, percent
 
 RNG_STREAM = 2026  # part of every seed

@@ -27,18 +27,12 @@ from posefit.motion import recorded
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.modes import MIN_COST
-from posefit.uncertainty.calibration import (
-    LEVELS,
-    Recalibration,
-    calibration_error,
-    conformal_factor,
-    reliability,
-)
+from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of, nearer_mirrored, poses_apart, second_side
 from posefit_exemplars.calibration import Calibration, evidence, none_features
 from posefit_reproduce.jobs import Progress, each
-from scores import auroc
+from scores import auroc, calibration_error, conformal_factor
 from table import WORKERS, bar, markdown
 
 FRAMES, QUICK_FRAMES = 50, 12

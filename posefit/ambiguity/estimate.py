@@ -20,24 +20,25 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.alignment import align
 from posefit.fitting.check import at_least, between, finite_number, one_of, positive, whole
+from posefit.fitting.prior import Components
+from posefit.fitting.problem import PoseProblem
 from posefit.fitting.shape import NAMES, shaped
+from posefit.fitting.space import SearchSpace
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
 from posefit.footage.source import HEIGHTS, Source, kind_of, scene_of, useless_for
 from posefit.footage.training import training_clips, training_motions
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import JOINTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import parsed_json, read_text
-from posefit.silhouette.cost import pose_costs, project
+from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
 from posefit.tracking.options import TrackOptions
 from posefit.uncertainty.modes import Posterior, modes_of, poses_apart
 from posefit.uncertainty.searches import boltzmann_weights
@@ -98,42 +99,27 @@ BATCH = 4096  # poses evaluated at a time
 MAX_STATES = 20_000  # poses and yaws that can be compared with each other
 
 
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """The silhouettes of a person in one frame, from one camera or several."""
+def problem_of(
+    body: Body,
+    cameras: Sequence[Camera],
+    silhouettes: Sequence[Silhouette],
+    anchor: Array,
+    known: bool,
+    threads: int = 1,
+) -> PoseProblem:
+    """Return the problem of one frame, whose root is known to be at its anchor (3,), or else aligned from there.
 
-    body: Body
-    cameras: Sequence[Camera]
-    silhouettes: Sequence[Silhouette] = field(repr=False)
-    anchor: Array  # (3,) metres: where the root is, exactly or about
-    known: bool  # whether the root is known to be there; else poses are aligned to the silhouettes' borders
-    threads: int = 1
+    Its space has no latents: poses are the library's.
+    """
+    none = Components(np.zeros(ANGLES - 3), np.empty((0, ANGLES - 3)), np.empty(0), np.empty(0))
+    space = SearchSpace(none, np.zeros(3), np.zeros(3), anchor, "known" if known else "aligned")
+    return PoseProblem(body, cameras, silhouettes, space, threads=threads)
 
-    @property
-    def factor(self) -> int:
-        """The factor by which the images may be shrunk."""
-        fewest = min(silhouette.pixels for silhouette in self.silhouettes if silhouette.known)
-        return next((factor for factor in SHRINK_FACTORS if fewest >= factor**2 * MIN_PIXELS), 1)
 
-    def coarser(self, factor: int) -> Self:
-        """Return the same frame in smaller images."""
-        cameras = [coarser_camera(camera, factor) for camera in self.cameras]
-        silhouettes = [coarser_silhouette(silhouette, factor) for silhouette in self.silhouettes]
-        return replace(self, cameras=cameras, silhouettes=silhouettes)
-
-    def view(self, v: int) -> Self:
-        """Return the same frame from one of the cameras."""
-        return replace(self, cameras=[self.cameras[v]], silhouettes=[self.silhouettes[v]])
-
-    def placed(self, poses: Array) -> Array:
-        """Return the translations (n, 3) of poses (n, 66)."""
-        anchors = np.repeat(self.anchor[None], len(poses), axis=0)
-        return anchors if self.known else align(self.body, self.cameras, self.silhouettes, poses, anchors)
-
-    def costs(self, poses: Array) -> Array:
-        """Return the costs (n,) of poses (n, 66) where they are placed: means over the cameras."""
-        scene = self.body, self.cameras, self.silhouettes
-        return pose_costs(*scene, poses, self.placed(poses), threads=self.threads)[0]
+def shrink_factor(problem: PoseProblem) -> int:
+    """Return the factor by which the images may be shrunk."""
+    fewest = min(silhouette.pixels for silhouette in problem.silhouettes if silhouette.known)
+    return next((factor for factor in SHRINK_FACTORS if fewest >= factor**2 * MIN_PIXELS), 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,24 +139,24 @@ class States:
         return Posterior(self.poses, self.translations, boltzmann_weights(self.costs, temperature))
 
 
-def states_within(moment: Moment, poses: Array, within: float) -> States:
+def states_within(problem: PoseProblem, poses: Array, within: float) -> States:
     """Return those of poses (K, 66), at any of 72 yaws, whose cost is at most `within` above the least.
 
     Raises ValueError where they are too many to compare with each other.
     """
-    small = moment.coarser(moment.factor)
+    small = problem.coarser(shrink_factor(problem))
     rows, yaws = np.tile(np.arange(len(poses)), YAWS // EVERY), np.repeat(np.arange(0, YAWS, EVERY), len(poses))
     rows, yaws, _ = _best(small, poses, rows, yaws, within + MARGIN)
     beside = [np.mod(yaws + step, YAWS) for step in range(-(EVERY // 2), EVERY // 2 + 1)]
     rows, yaws, _ = _best(small, poses, np.tile(rows, EVERY), np.concatenate(beside), within + BLUR)
-    rows, yaws, costs = _best(moment, poses, rows, yaws, within)
+    rows, yaws, costs = _best(problem, poses, rows, yaws, within)
     if len(rows) > MAX_STATES:
         raise InputError(
             f"within must be so little that at most {MAX_STATES:,} poses and yaws are left, got {within:g}, "
             f"which leaves {len(rows):,}"
         )
     turned = turned_to(poses[rows], yaws)
-    return States(rows, turned, moment.placed(turned), costs)
+    return States(rows, turned, problem.placed(turned), costs)
 
 
 def turned_to(poses: Array, yaws: Rows) -> Array:
@@ -181,12 +167,13 @@ def turned_to(poses: Array, yaws: Rows) -> Array:
     return turned
 
 
-def _best(moment: Moment, poses: Array, rows: Rows, yaws: Rows, within: float) -> tuple[Rows, Rows, Array]:
+def _best(problem: PoseProblem, poses: Array, rows: Rows, yaws: Rows, within: float) -> tuple[Rows, Rows, Array]:
     """Return the rows (n,) and yaws (n,) whose cost is at most `within` above the least, and their costs."""
     costs = np.empty(len(rows))
     for start in range(0, len(rows), BATCH):
         part = slice(start, start + BATCH)
-        costs[part] = moment.costs(turned_to(poses[rows[part]], yaws[part]))
+        turned = turned_to(poses[rows[part]], yaws[part])
+        costs[part] = problem.cost(turned, problem.placed(turned))
     best = costs <= costs.min() + within
     return rows[best], yaws[best], costs[best]
 
@@ -207,9 +194,9 @@ class PoseCluster:
     image: str  # of the first cluster: mirrored, turned or reflected, see posefit.geometry.symmetry; or ""
 
 
-def clusters_of(moment: Moment, states: States, posterior: Posterior) -> list[PoseCluster]:
+def clusters_of(problem: PoseProblem, states: States, posterior: Posterior) -> list[PoseCluster]:
     """Return clusters of states by their joints relative to the root, the heaviest first."""
-    skeleton, weights = moment.body.skeleton, posterior.weights
+    skeleton, weights = problem.body.skeleton, posterior.weights
     # a random sample, as a regular stride could pick similar poses
     some = np.sort(np.random.default_rng(0).permutation(len(states))[:MAX_COMPARED])
     modes = modes_of(skeleton, Posterior(states.poses[some], states.translations[some], weights[some]))
@@ -217,7 +204,7 @@ def clusters_of(moment: Moment, states: States, posterior: Posterior) -> list[Po
     groups = [rows for k in range(len(modes)) if len(rows := np.flatnonzero(nearest == k))]
     groups.sort(key=lambda rows: -weights[rows].sum())
     best = [int(rows[states.costs[rows].argmin()]) for rows in groups]
-    first, towards = states.poses[best[:1]], facing(moment.cameras[0], moment.anchor)
+    first, towards = states.poses[best[:1]], facing(problem.cameras[0], problem.space.anchor)
     images = {
         "mirrored": mirrored_poses(skeleton, first),
         "turned": turned_poses(first),
@@ -249,7 +236,6 @@ def body_spread(spreads_mm: Array) -> float:
     return float(np.sqrt((spreads_mm**2).mean()))
 
 
-SUMMARY = "summary.json"
 MAX_SUMMARY_BYTES = 10_000_000
 BUILD_RANGE = (0.1, 10.0)  # of factors on the average build
 
@@ -259,27 +245,24 @@ def body_of(folder: str | Path, body: Body) -> Body:
 
     Raises ValueError where the folder holds no valid build.
     """
-    path = Path(folder) / SUMMARY
+    path = Path(folder) / "summary.json"
     if not path.is_file():
-        raise InputError(f"{folder}: expected the folder of a track with its {SUMMARY}, got none")
-    text = read_text(path, MAX_SUMMARY_BYTES)
+        raise InputError(f"{folder}: expected the folder of a track with its {path.name}, got none")
     try:
-        summary = parsed_json(text)
-    except ValueError as error:
-        raise InputError(f"{path}: expected a JSON object, got {error}") from None
-    try:
+        summary = parsed_json(read_text(path, MAX_SUMMARY_BYTES))
         build = summary["body"] if isinstance(summary, Mapping) else None
         if not isinstance(build, Mapping):
             raise InputError("expected the build of a person, got none: it was not fitted")
-        factors_by_name = build["factors"]
-        factors = np.array([finite_number(name, factors_by_name[name]) for name in NAMES])
+        factors = np.array([finite_number(name, build["factors"][name]) for name in NAMES])
         stature = finite_number("stature", build["stature"])
         for name, factor in zip(NAMES, factors, strict=True):
             between(name, factor, *BUILD_RANGE)
         between("stature", stature, *HEIGHTS)
         return shaped(body, factors, stature)
-    except (ValueError, KeyError, TypeError) as error:
-        message = f"expected {error.args[0]} in it, got none" if isinstance(error, KeyError) else str(error)
+    except KeyError as error:
+        raise InputError(f"{path}: expected {error.args[0]} in it, got none") from None
+    except (ValueError, TypeError) as error:
+        message = error if isinstance(error, InputError) else f"expected a JSON object, got {error}"
         raise InputError(f"{path}: {message}") from None
 
 
@@ -309,7 +292,7 @@ class Ambiguity:
     frame: int
     within: float
     temperature: float
-    moment: Moment = field(repr=False)
+    problem: PoseProblem = field(repr=False)
     library: LibraryPoses = field(repr=False)
     states: States = field(repr=False)  # of all cameras together
     clusters: Sequence[PoseCluster]  # the heaviest first
@@ -360,26 +343,26 @@ def ambiguity_of(
     scene = scene_of(sources, progress, **viewing.view)
     if build is not None:
         scene = replace(scene, body=body_of(build, scene.body))
-    moment = _moment(scene, frame if motion else 0, frame, translation, threads)
+    problem = _problem(scene, frame if motion else 0, frame, translation, threads)
     for warning in scene.warnings:
         progress.warn(warning)
     began = time.perf_counter()
     library = LibraryPoses.of(training_motions(clips, FPS), scene.body.skeleton)
-    states = states_within(moment, library.poses, within)
-    clusters = clusters_of(moment, states, states.posterior(temperature))
+    states = states_within(problem, library.poses, within)
+    clusters = clusters_of(problem, states, states.posterior(temperature))
     truth = None
     if scene.truth is not None:
         best = states.poses[[cluster.best for cluster in clusters]]
         truth = (1e3 * poses_apart(scene.body.skeleton, best, scene.truth.poses[frame : frame + 1])[:, 0]).tolist()
-    views = {1: "one camera", 2: "both cameras"}.get(len(moment.cameras), f"all {len(moment.cameras)} cameras")
-    floors = [_floor(views, moment, states, temperature)]
-    for name, other in _others(scene, moment, frame):
+    views = {1: "one camera", 2: "both cameras"}.get(len(problem.cameras), f"all {len(problem.cameras)} cameras")
+    floors = [_floor(views, problem, states, temperature)]
+    for name, other in _others(scene, problem, frame):
         floors.append(_floor(name, other, states_within(other, library.poses, within), temperature))
     seconds = time.perf_counter() - began
-    return Ambiguity(scene, frame, within, temperature, moment, library, states, clusters, floors, truth, seconds)
+    return Ambiguity(scene, frame, within, temperature, problem, library, states, clusters, floors, truth, seconds)
 
 
-def _moment(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> Moment:
+def _problem(scene: Scene, k: int, frame: int, translation: str | None, threads: int) -> PoseProblem:
     """Return frame k of a scene, which users call `frame`. Raises ValueError where it shows no person."""
     if not k < scene.count:
         raise InputError(f"frame must lie in 0 to {scene.count - 1} of {scene.name}, got {frame}")
@@ -390,20 +373,24 @@ def _moment(scene: Scene, k: int, frame: int, translation: str | None, threads: 
         raise InputError(f"frame must show the person, got {came} in frame {frame} of {scene.name}")
     known = scene.truth is not None and translation != "aligned"
     anchor = scene.anchor if observation.translation is None else np.asarray(observation.translation)
-    return Moment(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)
+    return problem_of(scene.body, scene.cameras, observation.silhouettes, anchor, known, threads)
 
 
-def _others(scene: Scene, moment: Moment, frame: int) -> list[tuple[str, Moment]]:
+def _others(scene: Scene, problem: PoseProblem, frame: int) -> list[tuple[str, PoseProblem]]:
     """Return the camera sets to compare with, by name: each camera alone, or the only one with a second."""
-    if len(moment.cameras) > 1:
-        visible = [v for v, silhouette in enumerate(moment.silhouettes) if silhouette.mask.any()]
-        return [(f"camera {v + 1}", moment.view(v)) for v in visible]
+    views = list(zip(problem.cameras, problem.silhouettes, strict=True))
+    if len(views) > 1:
+        return [
+            (f"camera {k}", replace(problem, cameras=[camera], silhouettes=[silhouette]))
+            for k, (camera, silhouette) in enumerate(views, 1)
+            if silhouette.mask.any()
+        ]
     if scene.truth is None:
         return []
     pose, place = scene.truth.poses[frame], scene.truth.translations[frame]
-    camera = camera_about(moment.cameras[0], place, RIGHT_ANGLE)
-    silhouette = Silhouette.of(project(moment.body, camera, pose, place))
-    both = replace(moment, cameras=[*moment.cameras, camera], silhouettes=[*moment.silhouettes, silhouette])
+    camera = camera_about(problem.cameras[0], place, RIGHT_ANGLE)
+    silhouette = Silhouette.of(project(problem.body, camera, pose, place))
+    both = replace(problem, cameras=[*problem.cameras, camera], silhouettes=[*problem.silhouettes, silhouette])
     return [("two cameras, the second at right angles", both)]
 
 
@@ -413,9 +400,9 @@ def camera_about(camera: Camera, place: Array, angle: float) -> Camera:
     turn = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
     rotation = camera.rotation @ turn.T
     translation = camera.rotation @ place + camera.translation - rotation @ place
-    return Camera(camera.width, camera.height, camera.focal, camera.centre, rotation, translation)
+    return replace(camera, rotation=rotation, translation=translation)
 
 
-def _floor(views: str, moment: Moment, states: States, temperature: float) -> Floor:
-    spreads = spread_mm(moment.body.skeleton, states.poses, states.posterior(temperature).weights)
+def _floor(views: str, problem: PoseProblem, states: States, temperature: float) -> Floor:
+    spreads = spread_mm(problem.body.skeleton, states.poses, states.posterior(temperature).weights)
     return Floor(views, len(states), float(states.costs.min()), spreads)

@@ -34,8 +34,8 @@ def summary_of(result: Ambiguity) -> dict[str, Any]:
         "frame": result.frame,
         "within": result.within,
         "temperature": result.temperature,
-        "translation": "known" if result.moment.known else "aligned",
-        "views": len(result.moment.cameras),
+        "translation": result.problem.space.translation,
+        "views": len(result.problem.cameras),
         "library": {"clips": len(result.library.names), "poses": len(result.library), "yaws": YAWS},
         "similar": len(result.states),
         "least_cost": float(result.states.costs.min()),
@@ -106,7 +106,7 @@ def _mode(result: Ambiguity, k: int) -> dict[str, Any]:
     """Return the summary of a cluster."""
     cluster, states, library = result.clusters[k], result.states, result.library
     row, yaw = int(states.rows[cluster.best]), float(states.poses[cluster.best, 0])
-    towards = facing(result.moment.cameras[0], states.translations[cluster.best])
+    towards = facing(result.problem.cameras[0], states.translations[cluster.best])
     return {
         "weight": cluster.weight,
         "poses": len(cluster.members),
@@ -137,7 +137,7 @@ NUMBERED = 4  # floors whose numbers are written beside their bars
 def picture_of(result: Ambiguity) -> Image:
     """Return the picture (height, width, 3)."""
     count = min(len(result.clusters), MAX_COLUMNS)
-    camera, silhouette = nearer(result.moment.cameras[0], result.moment.silhouettes[0])
+    camera, silhouette = nearer(result.problem.cameras[0], result.problem.silhouettes[0])
     columns = [_column(result, k, camera, silhouette) for k in range(count)]
     columns += [_blank(len(columns[0]), WIDTH)] * (MIN_COLUMNS - count)
     bodies = np.hstack(columns)
@@ -162,7 +162,7 @@ def nearer(camera: Camera, silhouette: Silhouette) -> tuple[Camera, Image]:
 
 def _column(result: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Image:
     """Return the column of a cluster: text, body before the silhouette, body from the side."""
-    cluster, body = result.clusters[k], result.moment.body
+    cluster, body = result.clusters[k], result.problem.body
     pose, place = result.states.poses[cluster.best], result.states.translations[cluster.best]
     head = _blank(BAND, WIDTH)
     write(head, f"{cluster.weight:.2f}", (12, 26), scale=0.75)
@@ -176,7 +176,7 @@ def _column(result: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Ima
     front = np.asarray(cv2.addWeighted(drawn, SOLID, front, 1.0 - SOLID, 0.0), np.uint8)
     edges, _ = cv2.findContours(silhouette, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(front, edges, -1, TEXT, 1, cv2.LINE_AA)
-    side = side_view(body, result.moment.cameras[0], pose, place, WIDTH)
+    side = side_view(body, result.problem.cameras[0], pose, place, WIDTH)
     write(front, "from the camera", (8, HEIGHT - 10), scale=0.4)
     write(side, "from its right", (8, WIDTH - 10), scale=0.4)
     column = np.vstack([head, front, side])

@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
+from posefit.arrays import Array, frozen, writeable
 from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR, SIDES, Skeleton, joint_distances, root_centred
 from posefit.uncertainty.calibration import Recalibration
@@ -53,19 +53,11 @@ class Posterior:
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.weights))
         for name, shape in (("poses", (count, ANGLES)), ("translations", (count, 3)), ("weights", (count,))):
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            if value.shape != shape or not count:
-                raise InputError(f"{name} of a posterior must have shape {shape}, got {value.shape}")
-            if not np.isfinite(value).all():
-                raise InputError(
-                    f"{name} of a posterior must be finite, got {np.isfinite(value).sum()} of {value.size}"
-                )
-            object.__setattr__(self, name, value)
-        total, least = float(self.weights.sum()), float(self.weights.min())
+            object.__setattr__(self, name, frozen(f"{name} of a posterior", getattr(self, name), shape))
+        total, least = float(self.weights.sum()), float(self.weights.min(initial=0.0))
         if least < 0.0 or not total > 0.0:
-            raise InputError(
-                f"weights of a posterior must be 0 or more, with a sum above 0, got {least:g}, sum {total:g}"
-            )
+            came = f"{least:g}, sum {total:g}"
+            raise InputError(f"weights of a posterior must be 0 or more, with a sum above 0, got {came}")
         object.__setattr__(self, "weights", self.weights / total)
 
     def __len__(self) -> int:

@@ -43,7 +43,6 @@ class Weighed:
     costs: Array  # (n,)
     groups: NDArray[np.int64]  # (n,) the mode of each, a row of `modes`
     modes: Array  # (k, d) the lowest proposals of the valleys, the deepest first
-    mode_weights: Array  # (k,), which sum to 1
     evaluations: int  # beyond those of the searches
 
     def even(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -79,9 +78,8 @@ def weighed(
     particles = max(int(left / (CHAIN + ROUNDS * (CHAIN - 1))), 2) * CHAIN
     sample = tempered(landscape, start, temperature, rng, particles=particles, chain=CHAIN, evaluations=left)
     groups = start.nearest(landscape.box, sample.proposals) % len(modes)
-    shares: Array = np.bincount(groups, sample.weights, len(modes)).astype(np.float64)
     used = landscape.evaluations - before
-    return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, shares, used)
+    return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, used)
 
 
 def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) -> Searched:
@@ -109,7 +107,7 @@ def boltzmann_weights(costs: Array, temperature: float) -> Array:
     rises = np.where(np.isfinite(costs), -costs / temperature, -np.inf)
     if rises.max() == -np.inf:
         return np.full(len(costs), 1.0 / len(costs))
-    return reweighed(rises, 1.0)[0]
+    return reweighed(rises, 1.0)
 
 
 def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, temperature: float) -> Array:

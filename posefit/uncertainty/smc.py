@@ -5,8 +5,7 @@ Constants of our own are marked.
 """
 
 import math
-from dataclasses import dataclass, field
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +30,12 @@ WIDEST = 0.5  # ours: a wrapped normal of this deviation is its three nearest im
 class NormalMixture:
     """The start of a sampler: normal distributions around `centres`, cut off at the box, and a uniform share `broad`.
 
-    They wrap around where a coordinate is periodic. Without centres all is uniform.
+    They wrap around where a coordinate is periodic.
     """
 
     centres: Array  # (k, d)
     spreads: Array  # (k, d) standard deviations, at most 0.5
-    broad: float  # between 0 and 1; 1 without centres
-
-    @classmethod
-    def anywhere(cls, dimensions: int) -> Self:
-        """Return the uniform distribution over the box."""
-        return cls(np.empty((0, dimensions)), np.empty((0, dimensions)), 1.0)
+    broad: float  # between 0 and 1
 
     def __post_init__(self) -> None:
         for name in ("centres", "spreads"):
@@ -49,8 +43,8 @@ class NormalMixture:
         if not ((self.spreads > 0.0) & (self.spreads <= WIDEST)).all():
             raise InputError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
 
-    def draw(self, box: Box, rng: np.random.Generator, count: int) -> tuple[Array, float]:
-        """Return feasible proposals (count, d), and the share of all draws that was feasible.
+    def draw(self, box: Box, rng: np.random.Generator, count: int) -> Array:
+        """Return feasible proposals (count, d).
 
         Where 100 attempts give too few, those are repeated. Raises ValueError where they give none.
         """
@@ -65,19 +59,15 @@ class NormalMixture:
         if not total:
             raise InputError(f"the box must be feasible somewhere, got nothing in {REDRAWS} x {count} draws")
         drawn = np.concatenate(accepted)
-        return (drawn if total >= count else drawn[rng.integers(0, total, count)])[:count], total / tried
+        return (drawn if total >= count else drawn[rng.integers(0, total, count)])[:count]
 
     def log_density(self, box: Box, proposals: Array) -> Array:
         """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""
-        if not len(self.centres):
-            return np.zeros(len(proposals))
         each = math.log((1.0 - self.broad) / len(self.centres))
         return np.asarray(kernels.log_sums(self._log_parts(box, proposals), each, math.log(self.broad)))
 
     def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
-        """Return the densest normal distribution (n,) at each of proposals (n, d); 0 without centres."""
-        if not len(self.centres):
-            return np.zeros(len(proposals), dtype=np.int64)
+        """Return the densest normal distribution (n,) at each of proposals (n, d)."""
         return np.asarray(self._log_parts(box, proposals).argmax(axis=1))
 
     def _log_parts(self, box: Box, proposals: Array) -> Array:
@@ -86,8 +76,6 @@ class NormalMixture:
     def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
         drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))
         near = np.flatnonzero(rng.random(count) >= self.broad)
-        if not len(near):
-            return drawn
         which = rng.integers(0, len(self.centres), len(near))
         means, spreads = self.centres[which], self.spreads[which]
         mine = wrap(box, means + spreads * rng.standard_normal(means.shape))
@@ -108,8 +96,6 @@ class Sampled:
     proposals: Array  # (n, d)
     weights: Array  # (n,), which sum to 1
     costs: Array  # (n,)
-    log_evidence: float  # the logarithm of the mean of exp(-cost / temperature) over the box, 0 where infeasible
-    exponents: Array = field(repr=False)  # (t,) the inverse temperature after each step, as a share of the last
 
 
 def tempered(
@@ -120,13 +106,12 @@ def tempered(
     *,
     particles: int = PARTICLES,
     chain: int = CHAIN,
-    survival: float = SURVIVAL,
     evaluations: int | None = None,
 ) -> Sampled:
     """Return weighted proposals of the density that exp(-cost / temperature) has in the feasible box.
 
     The particles begin at `start` and go in steps to that density, on the geometric path between both: each step
-    leaves a share `survival` of them, by effective sample size. Some survive, and each becomes a chain of `chain`
+    leaves the half of them, by effective sample size. Some survive, and each becomes a chain of `chain`
     random-walk moves, all of which are particles. With a budget of `evaluations`, steps are long enough to end within
     it, and the last particles are weighed by the rest. Raises ValueError where a setting makes no sense, or where
     nothing is feasible.
@@ -135,27 +120,22 @@ def tempered(
         raise InputError(f"temperature must be above 0, got {temperature}")
     if not (chain >= 2 and particles >= 2 * chain):
         raise InputError(f"particles must be at least 2 chains of 2 or more, got {particles} and chains of {chain}")
-    if not 0.0 < survival < 1.0:
-        raise InputError(f"survival must lie between 0 and 1, got {survival}")
     before, moved = landscape.evaluations, particles // chain * (chain - 1)
-    proposals, share = start.draw(landscape.box, rng, particles)
+    proposals = start.draw(landscape.box, rng, particles)
     costs, starts = landscape.costs(proposals), start.log_density(landscape.box, proposals)
-    log_evidence, exponent, factor = float(np.log(share)), 0.0, 1.0
-    exponents: list[float] = []
-    while True:
+    exponent, factor = 0.0, 1.0
+    for number in range(STEPS):
         rises = -costs / temperature - starts
         rounds = np.inf  # of moves within what is left of the budget
         if evaluations is not None:
             rounds = max(evaluations - (landscape.evaluations - before), 0) // moved
         step = left = 1.0 - exponent
-        if rounds and len(exponents) < STEPS - 1:
-            step = max(next_step(rises, left, survival), left / (1 + rounds))
-        weights, mean = reweighed(rises, step)
-        log_evidence += mean  # DAU2022 (normalising constant)
+        if rounds and number < STEPS - 1:
+            step = max(next_step(rises, left, SURVIVAL), left / (1 + rounds))
+        weights = reweighed(rises, step)
         exponent = 1.0 if step >= left else exponent + step
-        exponents.append(exponent)
         if exponent == 1.0:
-            return Sampled(proposals, weights, costs, log_evidence, np.array(exponents))
+            break
         rows = systematic_rows(weights, rng.random(), particles // chain)
         walk = factor * _walk(start, landscape, proposals, weights)
         state = (proposals[rows], costs[rows], starts[rows])
@@ -166,6 +146,7 @@ def tempered(
             moves += share / (chain - 1)
         factor = float(np.clip(factor * np.exp(2.0 * (moves - ACCEPTANCE)), 0.01, 1.0))
         proposals, costs, starts = (np.concatenate(part) for part in zip(*states, strict=True))  # DAU2022 (waste-free)
+    return Sampled(proposals, weights, costs)
 
 
 def next_step(rises: Array, left: float, survival: float) -> float:
@@ -180,8 +161,8 @@ def next_step(rises: Array, left: float, survival: float) -> float:
     return float(kernels.longest_step(alive, left, survival * len(alive), HALVINGS))  # DAU2022 (exponent)
 
 
-def reweighed(rises: Array, step: float) -> tuple[Array, float]:
-    """Return weights (n,) exp(step rise), which sum to 1, and the logarithm of their mean before they did.
+def reweighed(rises: Array, step: float) -> Array:
+    """Return weights (n,) exp(step rise), which sum to 1.
 
     Raises ValueError where all weigh nothing.
     """
@@ -189,7 +170,7 @@ def reweighed(rises: Array, step: float) -> tuple[Array, float]:
     if highest == -np.inf:
         raise InputError(f"costs must be finite somewhere, got infinite ones for all {len(rises)} proposals")
     weights = np.exp(step * (rises - highest))
-    return np.asarray(weights / weights.sum()), float(step * highest + np.log(weights.mean()))
+    return np.asarray(weights / weights.sum())
 
 
 def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
@@ -202,14 +183,10 @@ def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
 
 
 def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
-    """Return the root (d, d) of a random walk's covariance, in proportion to that of the particles.
-
-    The covariance is that within the modes of the start, or else about the heaviest particle.
-    """
+    """Return the root (d, d) of a random walk's covariance, in proportion to that within the modes of the start."""
     box, dimensions = landscape.box, proposals.shape[1]
     groups = start.nearest(box, proposals)
-    centres = start.centres if len(start.centres) else proposals[[weights.argmax()]]
-    covariance = kernels.covariance_within(writeable(proposals), weights, groups, centres, box.periodic)
+    covariance = kernels.covariance_within(writeable(proposals), weights, groups, start.centres, box.periodic)
     covariance += 1e-12 * np.eye(dimensions)
     return np.asarray(2.38 / np.sqrt(dimensions) * np.linalg.cholesky(covariance))  # DAU2022 (random walk)
 

@@ -9,17 +9,19 @@ from posefit.ambiguity.estimate import (
     RIGHT_ANGLE,
     YAWS,
     LibraryPoses,
-    Moment,
     States,
     body_spread,
     camera_about,
     clusters_of,
+    problem_of,
+    shrink_factor,
     spaced_frames,
     spread_mm,
     states_within,
     turned_to,
 )
 from posefit.arrays import Array
+from posefit.fitting.problem import PoseProblem
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS, angle_index
@@ -44,24 +46,25 @@ STRIDES = Motion("stride", SKELETON, np.array([STRIDE, np.zeros(ANGLES)]), np.ze
 LIBRARY = LibraryPoses.of([STRIDES], SKELETON).poses
 
 
-def moment(pose: Array, *azimuths: float, known: bool = True, side: int = 96) -> Moment:
+def moment(pose: Array, *azimuths: float, known: bool = True, side: int = 96) -> PoseProblem:
     """Return what cameras four metres away show of a pose."""
     cameras = [Camera.around(PLACE, azimuth, 4.0, (side, side)) for azimuth in azimuths or (0.7,)]
     silhouettes = [Silhouette.of(project(BODY, camera, pose, PLACE)) for camera in cameras]
-    return Moment(BODY, cameras, silhouettes, PLACE if known else PLACE + [0.2, 0.1, 0.3], known)
+    return problem_of(BODY, cameras, silhouettes, PLACE if known else PLACE + [0.2, 0.1, 0.3], known)
 
 
-def stride_from(*azimuths: float) -> Moment:
+def stride_from(*azimuths: float) -> PoseProblem:
     """Return what cameras far away show of the stride."""
     cameras = [Camera.around(PLACE, azimuth, FAR, (120, 120), 2.2 / FAR) for azimuth in azimuths]
     body = Body.of(SKELETON)
     silhouettes = [Silhouette.of(project(body, camera, STRIDE, PLACE)) for camera in cameras]
-    return Moment(body, cameras, silhouettes, PLACE, True)
+    return problem_of(body, cameras, silhouettes, PLACE, True)
 
 
-def all_within(moment: Moment, poses: Array, within: float) -> set[tuple[int, int]]:
+def all_within(problem: PoseProblem, poses: Array, within: float) -> set[tuple[int, int]]:
     """Return the rows and yaws that cost at most `within` more than the least, all compared at full size."""
-    costs = np.array([moment.costs(turned_to(poses, np.full(len(poses), yaw))) for yaw in range(YAWS)])
+    turned = [turned_to(poses, np.full(len(poses), yaw)) for yaw in range(YAWS)]
+    costs = np.array([problem.cost(some, problem.placed(some)) for some in turned])
     return {(int(row), int(yaw)) for yaw, row in np.argwhere(costs <= costs.min() + within)}
 
 
@@ -77,11 +80,12 @@ def test_no_pose_that_fits_is_missed(known: bool, azimuths: tuple[float, ...]) -
 
 
 def test_images_are_shrunk_where_the_person_is_large_in_the_known_ones() -> None:
-    assert moment(WALK.poses[0], side=32).factor == 1
+    assert shrink_factor(moment(WALK.poses[0], side=32)) == 1
     two = moment(WALK.poses[0], 0.0, 1.0, side=480)
-    assert two.factor > 1
+    assert shrink_factor(two) > 1
     unknown = Silhouette.of(np.zeros((480, 480)), np.zeros((480, 480)))
-    assert replace(two, silhouettes=[two.silhouettes[0], unknown]).factor == two.view(0).factor
+    partly = replace(two, silhouettes=[two.silhouettes[0], unknown])
+    assert shrink_factor(partly) == shrink_factor(moment(WALK.poses[0], 0.0, side=480))
 
 
 def test_the_true_pose_costs_nothing_and_stands_in_its_place() -> None:

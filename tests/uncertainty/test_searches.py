@@ -42,10 +42,11 @@ def test_modes_have_their_weights(dimensions: int, off: float) -> None:
         landscape = Landscape(Toy(dimensions), mixture)
         sample = weighed(landscape, searches(dimensions, rng), 1.0, rng)
         assert landscape.evaluations == sample.evaluations
-        assert sample.mode_weights.sum() == pytest.approx(1.0)
+        weights = np.bincount(sample.groups, sample.weights, len(sample.modes))
+        assert weights.sum() == pytest.approx(1.0)
         nearest = ((sample.modes[:, None] - means(dimensions)) ** 2).sum(axis=2).argmin(axis=1)
         assert set(nearest) == {0, 1, 2}
-        wrong.append(0.5 * np.abs(np.bincount(nearest, sample.mode_weights, 3) - WEIGHTS).sum())
+        wrong.append(0.5 * np.abs(np.bincount(nearest, weights, 3) - WEIGHTS).sum())
     assert np.mean(wrong) < off
 
 
@@ -56,7 +57,7 @@ def test_even_rows_have_the_shares_of_the_modes() -> None:
     np.testing.assert_array_equal(weights, 0.01)
     near = np.array([((rows - mode) ** 2).sum(axis=1) for mode in sample.modes]).argmin(axis=0)
     shares = np.bincount(near, minlength=len(sample.modes)) / 100.0
-    np.testing.assert_allclose(shares, sample.mode_weights, atol=0.03)
+    np.testing.assert_allclose(shares, np.bincount(sample.groups, sample.weights), atol=0.03)
 
 
 def test_the_width_of_a_valley_is_its_standard_deviation() -> None:
