@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from posefit.fitting.optimiser import NextFrame, OptimiserFactory
     from posefit.fitting.prior import PriorFactory
-    from posefit.fitting.tracker import TrackerFactory
 
 LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
 
@@ -128,11 +127,6 @@ class Registry:
         factory: PriorFactory = self.offer("prior", name).factory
         return factory
 
-    def tracker(self, name: str) -> "TrackerFactory":
-        """Return the tracker factory of a name. Raises ValueError listing the known names."""
-        factory: TrackerFactory = self.offer("tracker", name).factory
-        return factory
-
     def offer(self, kind: Kind, name: str) -> Offer:
         """Return what is offered under a name; `family:NAME` is the family with its setting `variant`.
 
@@ -163,7 +157,7 @@ def registry() -> Registry:
     """Return the methods of all installed plugins; they are loaded once a process."""
     import numpy  # noqa: F401  # before a plugin that may change it
 
-    return registry_of(_installed("methods"))
+    return Registry(load("methods", _installed("methods")))
 
 
 @lru_cache(maxsize=1)
@@ -191,11 +185,6 @@ def optimiser(name: str) -> "OptimiserFactory":
 def prior(name: str) -> "PriorFactory":
     """Return the factory of an installed prior. Raises ValueError listing the known names."""
     return registry().prior(name)
-
-
-def registry_of(points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ) -> Registry:
-    """Return what the plugins behind these entry points offer; see `load`."""
-    return Registry(load("methods", points, variables))
 
 
 def load(

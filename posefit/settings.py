@@ -2,16 +2,18 @@
 
 import inspect
 import re
+import textwrap
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 from posefit.errors import InputError
 from posefit.reading import quoted, suggestion
 
-HEADING = "Settings:"  # of a docstring's list of them
-_ENTRY = re.compile(r"(?P<name>[A-Za-z_]\w*)(?: \((?P<symbol>[^()]*)\))?: (?P<meaning>.*)")
+# a docstring's list of settings: an indented line for each, which may go on in lines that are indented more
+_LIST = re.compile(r"^( *)Settings:\n((?:\1 +.*(?:\n|$)|\s*\n)*)", re.MULTILINE)
+_ENTRY = re.compile(r"^([A-Za-z_]\w*)(?: \(([^()]*)\))?: (.*(?:\n[ \n].*)*)", re.MULTILINE)
 POPULATION_SIZE = 40  # where none is chosen: N of the SAPSO paper, section 5.2
 
 
@@ -29,13 +31,6 @@ class Setting:
         return _shown(self.annotation, self.default)
 
 
-class Entry(NamedTuple):
-    """What a docstring's list of settings says of one of them."""
-
-    symbol: str  # the source's letter; "" where it has none
-    meaning: str
-
-
 def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     """Return the settings that a factory takes, in the order of its signature."""
     try:
@@ -49,32 +44,20 @@ def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     )
 
 
-def settings_in(text: str) -> dict[str, Entry]:
+def settings_in(text: str) -> dict[str, tuple[str, str]]:
     """Return what the list of settings of a docstring says, by the settings' names; empty where it has no list.
 
-    Such a list is a line `Settings:`, then an indented line `name (symbol): meaning` for each, which may go on in lines
-    that are indented more.
+    That is the source's letter, "" where it has none, and the meaning. Such a list is a line `Settings:`, then an
+    indented line `name (symbol): meaning` for each, which may go on in lines that are indented more.
     """
-    lines = text.splitlines()
-    start, stop = _section(lines)
-    entries: dict[str, Entry] = {}
-    indents = [len(line) - len(line.lstrip()) for line in lines[start + 1 : stop] if line.strip()]
-    name = ""
-    for line in lines[start + 1 : stop]:
-        entry = _ENTRY.fullmatch(line.strip())
-        if entry is not None and len(line) - len(line.lstrip()) == min(indents):
-            name = entry["name"]
-            entries[name] = Entry(entry["symbol"] or "", entry["meaning"])
-        elif name and line.strip():
-            entries[name] = entries[name]._replace(meaning=f"{entries[name].meaning} {line.strip()}")
-    return entries
+    listed = _LIST.search(text)
+    entries = _ENTRY.findall(textwrap.dedent(listed[2])) if listed else []
+    return {name: (symbol, " ".join(meaning.split())) for name, symbol, meaning in entries}
 
 
 def without_settings(text: str) -> str:
     """Return a docstring without its list of settings."""
-    lines = text.splitlines()
-    start, stop = _section(lines)
-    return "\n".join([*lines[:start], *lines[stop:]]).strip()
+    return _LIST.sub("", text).strip()
 
 
 def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> None:
@@ -167,18 +150,6 @@ def accepts(annotation: Any, value: Any) -> bool:
     if annotation is int:
         return isinstance(value, int) and not isinstance(value, bool)
     return not (annotation in (bool, str) and not isinstance(value, annotation))
-
-
-def _section(lines: list[str]) -> tuple[int, int]:
-    """Return where the list of settings begins and ends, both the end of the lines where there is none."""
-    start = next((k for k, line in enumerate(lines) if line.strip() == HEADING), len(lines))
-    if start == len(lines):
-        return start, start
-    base = len(lines[start]) - len(lines[start].lstrip())
-    stop = start + 1
-    while stop < len(lines) and (not lines[stop].strip() or len(lines[stop]) - len(lines[stop].lstrip()) > base):
-        stop += 1
-    return start, stop
 
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:

@@ -7,6 +7,7 @@ The commands stand in `tracking`, `ambiguity`, `sweeping`, `motions`, `suite` an
 import os
 import sys
 import threading
+from itertools import chain
 from typing import Any
 
 import click
@@ -21,24 +22,10 @@ from posefit.version import __version__
 
 THREAD_SECONDS = 1.0  # that threads have to end after a command
 MISTAKE = 2  # the exit status of a mistake, which is shown in one line
-BUILT_IN = (
-    tracking.track,
-    tracking.fit,
-    tracking.extract,
-    ambiguity,
-    sweeping.sweep,
-    sweeping.report,
-    motions,
-    suite.suite,
-    plugins.plugins,
-    plugins.check,
-)
-
-
-GROUPS = {
-    "Follow a person": "track fit extract ambiguity",
-    "Compare methods": "sweep report suite",
-    "Look around": "motions plugins check",
+GROUPS: dict[str, tuple[click.Command, ...]] = {
+    "Follow a person": (tracking.track, tracking.fit, tracking.extract, ambiguity),
+    "Compare methods": (sweeping.sweep, sweeping.report, suite.suite),
+    "Look around": (motions, plugins.plugins, plugins.check),
 }
 
 
@@ -53,14 +40,11 @@ class _Commands(click.Group):
         """Return the names of all commands: those of plugins come last."""
         return [*self.commands, *_added()]
 
-    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_commands(self, _context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands by what they are for, each with its whole first sentence; those of plugins last."""
-        names = [name for group in GROUPS.values() for name in group.split()]
-        groups = GROUPS | {"From plugins": " ".join(name for name in self.list_commands(context) if name not in names)}
-        for heading, group in groups.items():
-            commands = {name: self.get_command(context, name) for name in group.split()}
+        for heading, commands in (GROUPS | {"From plugins": tuple(_added().values())}).items():
             with formatter.section(heading):
-                formatter.write_dl([(name, _sentence(one)) for name, one in commands.items() if one is not None])
+                formatter.write_dl([(command.name or "", _sentence(command)) for command in commands])
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
         """Return a command; plugins are looked at for those alone that posefit does not have itself."""
@@ -100,7 +84,7 @@ def main(debug: bool) -> None:
     """  # noqa: D301
 
 
-for _command in BUILT_IN:
+for _command in chain.from_iterable(GROUPS.values()):
     main.add_command(_command)
 
 

@@ -3,14 +3,13 @@
 import os
 import shutil
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from inspect import Parameter, getdoc
 from typing import Any
 
 import click
 
 from posefit.errors import InputError
-from posefit.hooks import ClaimedOrder
 from posefit.reading import quoted, suggestion
 from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
@@ -80,38 +79,31 @@ def _wrapped(text: str, first: str, other: str) -> list[str]:
     return textwrap.wrap(text, width, initial_indent=first, subsequent_indent=other)
 
 
-def diagnosis(
-    registry: Registry,
-    added: Sequence[Plugin[click.Command]] = (),
-    claiming: Sequence[Plugin[ClaimedOrder]] = (),
-    verbose: bool = False,
-) -> tuple[list[str], bool]:
+def diagnosis(plugins: Iterable[Plugin[Any]], verbose: bool = False) -> tuple[list[str], bool]:
     """Return the lines of `posefit plugins doctor`, and whether all is well.
 
-    `added` are the plugins with commands, and `claiming` those with claims of publications. Where it is to be
-    `verbose`, the traceback of what could not be loaded follows its line.
+    Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
     """
-    lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
-    for plugin in registry.plugins:
-        lines += _state(plugin, ", ".join(f"{offer.kind} {offer.name}" for offer in plugin.offers), verbose)
+    lines, broken = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ], False
+    for plugin in plugins:
+        offers = ", ".join(f"{_kind(offer)} {offer.name}" for offer in plugin.offers)
+        cause = (
+            " ".join(plugin.cause.split()) or f"offers {offers or 'nothing'}"
+        )  # on one line, whatever the error says
+        lines.append(f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}")
+        lines += [f"          {traced}" for traced in plugin.traceback.splitlines() if verbose]
+        broken |= plugin.state == "broken"
         for offer in plugin.offers:
-            if offer.missing:
+            if isinstance(offer, Offer) and offer.missing:
                 lines.append(f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'")
-            if not offer.summary:
+            if isinstance(offer, Offer) and not offer.summary:
                 lines.append(f"          {offer.name} has no docstring to be listed with")
-    for with_commands in added:
-        lines += _state(with_commands, ", ".join(f"command {offer.name}" for offer in with_commands.offers), verbose)
-    for with_claims in claiming:
-        lines += _state(with_claims, "; ".join(f"claim {offer.name}" for offer in with_claims.offers), verbose)
-    groups: tuple[Sequence[Plugin[Any]], ...] = (registry.plugins, added, claiming)
-    well = all(plugin.state != "broken" for group in groups for plugin in group)
     hint = "" if verbose else "; -v shows where they fail"
-    lines.append("all plugins work" if well else f"broken plugins are left out; the others work{hint}")
-    return lines, well
+    lines.append(f"broken plugins are left out; the others work{hint}" if broken else "all plugins work")
+    return lines, not broken
 
 
-def _state(plugin: Plugin[Any], offers: str, verbose: bool) -> list[str]:
-    """Return a plugin's line, and its traceback."""
-    cause = " ".join(plugin.cause.split()) or f"offers {offers or 'nothing'}"  # on one line, whatever the error says
-    line = f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}"
-    return [line, *(f"          {traced}" for traced in plugin.traceback.splitlines() if verbose)]
+def _kind(offer: Any) -> str:
+    if isinstance(offer, Offer):
+        return offer.kind
+    return "command" if isinstance(offer, click.Command) else "claim"

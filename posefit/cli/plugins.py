@@ -53,7 +53,8 @@ def doctor(context: click.Context, verbose: bool) -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the report below says the same
-        lines, well = diagnosis(registry(), command_plugins(_own(context)), claim_plugins(), verbose)
+        every = *registry().plugins, *command_plugins(_own(context)), *claim_plugins()
+        lines, well = diagnosis(every, verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

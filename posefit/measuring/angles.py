@@ -24,6 +24,13 @@ MEANINGS = {
     },
     "elbow": {"flexion": "hand to the shoulder", "adduction": "forearm inwards", "pronation": "palm backwards"},
 }
+BETWEEN = {  # the segments of each, the proximal first
+    "hip": ("pelvis", "thigh"),  # WU2002 (hip)
+    "knee": ("thigh", "shank"),  # GROOD1983 (knee)
+    "ankle": ("shank", "foot"),  # WU2002 (ankle)
+    "shoulder": ("thorax", "upper_arm"),
+    "elbow": ("upper_arm", "forearm"),  # WU2005 (elbow)
+}
 COLUMNS = tuple(
     f"{side}_{joint}_{angle}" for joint, angles in MEANINGS.items() for side in SIDES for angle in angles
 )  # of angles.csv, in its order
@@ -42,19 +49,11 @@ def joint_coordinates(proximal: Array, distal: Array) -> Array:
     return angles_about((2, 0, 1), relative)  # GROOD1983 (joint coordinate system)
 
 
-def hip_angles(pelvis: Array, thigh: Array) -> Array:
-    """Return flexion, adduction and internal rotation (..., 3) of the right hip, in radians."""
-    return joint_coordinates(pelvis, thigh)  # WU2002 (hip)
-
-
-def knee_angles(thigh: Array, shank: Array) -> Array:
-    """Return flexion, adduction and internal rotation (..., 3) of the right knee, in radians."""
-    return joint_coordinates(thigh, shank) * [-1.0, 1.0, 1.0]  # GROOD1983 (knee)
-
-
-def ankle_angles(shank: Array, foot: Array) -> Array:
-    """Return dorsiflexion, inversion and internal rotation (..., 3) of the right ankle, in radians."""
-    return joint_coordinates(shank, foot)  # WU2002 (ankle)
+def joint_angles(joint: str, proximal: Array, distal: Array) -> Array:
+    """Return the angles (..., 3) of a joint of the right side, in the order of `MEANINGS`, in radians."""
+    if joint == "shoulder":
+        return shoulder_angles(proximal, distal)
+    return joint_coordinates(proximal, distal) * ([-1.0, 1.0, 1.0] if joint == "knee" else 1.0)
 
 
 def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
@@ -73,11 +72,6 @@ def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
     return np.stack([plane, elevation, rotation], axis=-1)
 
 
-def elbow_angles(upper_arm: Array, forearm: Array) -> Array:
-    """Return flexion, adduction and pronation (..., 3) of the right elbow, in radians."""
-    return joint_coordinates(upper_arm, forearm)  # WU2005 (elbow)
-
-
 def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     """Return the angles (T,) in degrees of poses (T, 66), by the names of `COLUMNS`.
 
@@ -91,13 +85,7 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
             name.removeprefix(f"{side}_"): _ACROSS @ rotation @ _ACROSS if side == "left" else rotation
             for name, rotation in segments.items()
         }
-        by_joint = {
-            "hip": hip_angles(axes["pelvis"], axes["thigh"]),
-            "knee": knee_angles(axes["thigh"], axes["shank"]),
-            "ankle": ankle_angles(axes["shank"], axes["foot"]),
-            "shoulder": shoulder_angles(axes["thorax"], axes["upper_arm"]),
-            "elbow": elbow_angles(axes["upper_arm"], axes["forearm"]),
-        }
+        by_joint = {joint: joint_angles(joint, *(axes[one] for one in pair)) for joint, pair in BETWEEN.items()}
         near_pole = np.sin(by_joint["shoulder"][:, 1]) < np.sin(np.radians(NEAR_POLE))
         by_joint["shoulder"][near_pole] *= [np.nan, 1.0, np.nan]
         for joint, values in by_joint.items():

@@ -79,35 +79,16 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     seconds, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
     assert seconds is not None
     assert length is not None
+    cadence = 60.0 / seconds  # WHITTLE2007 (cadence)
     return Gait(
         steps=steps,
-        cadence=cadence(seconds),
-        speed=walking_speed(length, cadence(seconds)),
+        cadence=cadence,
+        speed=length * cadence / 60.0,  # WHITTLE2007 (speed)
         step_length=length,
         stride_length=_mean(steps, "stride_length"),
         step_width=_mean(steps, "step_width"),
         stance_share=_mean(steps, "stance_share"),
     )
-
-
-def cadence(step_seconds: float) -> float:
-    """Return how many steps there are in a minute."""
-    return 60.0 / step_seconds  # WHITTLE2007 (cadence)
-
-
-def walking_speed(step_length: float, cadence: float) -> float:
-    """Return metres a second, of the length of a step in metres and steps a minute."""
-    return step_length * cadence / 60.0  # WHITTLE2007 (speed)
-
-
-def stance_share(strike: float, toe_off: float, next_strike: float) -> float:
-    """Return for which share of its stride a foot is on the ground."""
-    return (toe_off - strike) / (next_strike - strike)  # WHITTLE2007 (stance)
-
-
-def froude_number(speed: float, leg: float) -> float:
-    """Return the Froude number of a speed in metres a second and a leg's length in metres: people run above a half."""
-    return speed**2 / (GRAVITY * leg)  # ALEXANDER1989 (Froude number)
 
 
 def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
@@ -137,7 +118,7 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
             measures["stride_seconds"] = (end - time) / fps
             measures["stride_length"] = float(np.linalg.norm(moved))
             if offs:
-                measures["stance_share"] = stance_share(time, offs[0], end)
+                measures["stance_share"] = (offs[0] - time) / (end - time)  # WHITTLE2007 (stance)
         yield Step(foot=foot, strike_seconds=time / fps, **measures)
 
 
@@ -163,8 +144,11 @@ def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float
     speed = float(((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum(axis=1).mean() * motion.fps)
     if speed < MIN_SPEED:
         return f"the person moves {'forwards' if speed > -MIN_SPEED else 'backwards'} at {abs(speed):.2f} m/s"
-    stance = _values(steps, "stance_share")
-    if froude_number(speed, _leg(motion)) > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
+    stance, froude = (
+        _values(steps, "stance_share"),
+        speed**2 / (GRAVITY * _leg(motion)),
+    )  # ALEXANDER1989 (Froude number)
+    if froude > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
         return f"the person runs, at {speed:.1f} m/s"
     timed = _values(steps, "step_seconds")
     if len(timed) < MIN_STEPS:

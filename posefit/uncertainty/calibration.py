@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
-from posefit.fitting.check import between
 from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
@@ -38,9 +37,9 @@ class Recalibration:
             if value.min() < 0.0:
                 raise InputError(f"{name} must be 0 or more, got {value.min():g}")
             object.__setattr__(self, name, value)
-        between("second_side", self.second_side, 0.0, 1.0)
-        between("sharpness", self.sharpness, 1e-9, 1e9)
-        between("none", self.none, 0.0, 1.0)
+        for name, low, high in (("second_side", 0.0, 1.0), ("sharpness", 1e-9, 1e9), ("none", 0.0, 1.0)):
+            if not low <= getattr(self, name) <= high:
+                raise InputError(f"{name} must lie in {low:g} to {high:g}, got {getattr(self, name)}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON holds it; its names are those that it is made from."""

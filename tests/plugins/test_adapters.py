@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.registry import Registry, registry, registry_of
+from posefit.registry import Registry, load, registry
 from posefit.testing.toy import Toy
 from tests.cases import each
 
@@ -27,7 +27,7 @@ LIBRARIES = {
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
     for name, library in LIBRARIES.items():
-        (plugin,) = registry_of([EntryPoint(name, f"posefit_{name}", "posefit")]).plugins
+        (plugin,) = load("methods", [EntryPoint(name, f"posefit_{name}", "posefit")])
         assert [offer.needs for offer in plugin.offers] == [(library, f"posefit[{name}]")]
         absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{name}]")) for offer in plugin.offers)
         kind = plugin.offers[0].kind

@@ -13,7 +13,7 @@ import pytest
 
 from posefit import hookimpl
 from posefit.hooks import ClaimedOrder
-from posefit.registry import Offer, claimed_orders, load, registry, registry_of
+from posefit.registry import Offer, Registry, claimed_orders, load, registry
 from posefit.version import source_digest
 from posefit_priors.pca import PCA
 from tests.cases import each
@@ -67,7 +67,7 @@ def test_the_built_ins_are_registered_like_a_third_partys() -> None:
     assert {next_frames[name] for name in ("sapso", "pso", "cma", "scipy")} == {"start"}
     assert {next_frames[name] for name in ("particle", "annealed")} == {"carry"}
     assert next_frames["random"] == "forget"
-    assert registry_of([point("mine", offering("mine"))]).optimiser("mine") is PCA
+    assert Registry(load("methods", [point("mine", offering("mine"))])).optimiser("mine") is PCA
     # section 4 of the paper: a particle filter, SAPSO in the full space, SAPSO in the compact one
     assert [claim.methods for claim in claimed_orders()] == [("particle@full", "sapso@full", "sapso@pca")]
 
@@ -116,7 +116,7 @@ def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(what: An
 def test_what_a_plugin_changes_when_it_is_loaded_is_undone() -> None:
     before = np.dot, np.linalg.norm, sys.getrecursionlimit()
     with pytest.warns(UserWarning, match="to load it must leave NumPy and Python as they are"):
-        registry_of([point("bad", patches)])
+        Registry(load("methods", [point("bad", patches)]))
     assert (np.dot, np.linalg.norm, sys.getrecursionlimit()) == before
 
 
@@ -134,7 +134,7 @@ def test_commands_and_claims_are_those_that_were_registered() -> None:
 def test_a_taken_name_is_refused_and_its_plugin_left_out_whole() -> None:
     points = [point("a", offering("one")), point("b", registering(("new", PCA), ("one", PCA)))]
     with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
-        offers = registry_of(points).offers["optimiser"]
+        offers = Registry(load("methods", points)).offers["optimiser"]
     assert {name: offer.distribution for name, offer in offers.items()} == {"one": "posefit-a"}
 
 
@@ -148,7 +148,7 @@ def test_variables_choose_what_is_loaded() -> None:
         ({"POSEFIT_BLOCK_PLUGINS": "Posefit-A,b"}, set()),
         ({"POSEFIT_LOAD_PLUGINS": "a,b", "POSEFIT_BLOCK_PLUGINS": "a"}, {"posefit-b"}),
     ):
-        methods = registry_of([point("a", offering("one")), point("b", offering("two"))], variables)
+        methods = Registry(load("methods", [point("a", offering("one")), point("b", offering("two"))], variables))
         assert {plugin.distribution for plugin in methods.plugins if plugin.state == "loaded"} == loaded, variables
         assert {offer.distribution for offer in methods.offers["optimiser"].values()} == loaded, variables
         left_out = [plugin.cause for plugin in methods.plugins if plugin.state != "loaded"]
