@@ -25,6 +25,17 @@ SEEDS = range(5)
 MAX_SHARE_OF_CHANCE = 0.95  # a cost below so much of chance's beats it
 MAX_SECONDS = 0.05  # a proposal: twenty thousand times what a pose costs
 TURNS = 24  # populations after which costs that are right have to show
+LOADED = b"loaded"
+# what the new process runs: what it prints goes to standard error
+TRACING = f"""
+import os, pickle, sys
+out = os.fdopen(os.dup(1), "wb", 0)
+os.dup2(2, 1)
+sys.path[:], case = pickle.load(sys.stdin.buffer)
+case = pickle.loads(case)
+out.write({LOADED!r})
+out.write(pickle.dumps(case.trace()))
+"""
 SPACE, BOX = Toy(5, ball), Toy(9)
 
 Evaluate = Callable[[Array], Array]
@@ -227,12 +238,12 @@ def new_process(case: Case) -> None:
         payload = pickle.dumps((sys.path, pickle.dumps(case)))
     except Exception as error:
         raise SkippedError(f"the factory cannot be sent to another process: {error}") from None
-    ran = subprocess.run([sys.executable, "-m", "posefit.testing.process", "trace"], input=payload, capture_output=True)
-    if ran.returncode == 3:
+    ran = subprocess.run([sys.executable, "-c", TRACING], input=payload, capture_output=True)
+    _, loaded, trace = ran.stdout.partition(LOADED)
+    if not loaded:
         raise SkippedError("the factory cannot be imported in another process")
-    whole = not ran.returncode and ran.stdout
-    expect(whole, f"it must work in a new process, got one that ended in the middle {ran.stderr.decode()[-300:]}")
-    expect(same(case.trace(), pickle.loads(ran.stdout)), "one seed must give one trace in every process, got two")
+    expect(trace, f"it must work in a new process, got one that ended in the middle {ran.stderr.decode()[-300:]}")
+    expect(same(case.trace(), pickle.loads(trace)), "one seed must give one trace in every process, got two")
 
 
 @checklist

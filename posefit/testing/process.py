@@ -2,14 +2,12 @@
 
 `python -m posefit.testing.process` is that process: it reads what to check as JSON, and writes a line of JSON before
 and after each check. What the plugin prints goes to standard error. A check in which the process ends or hangs has
-failed, and another process goes on with the next one. `python -m posefit.testing.process trace` reads a pickled
-optimiser case and writes its trace.
+failed, and another process goes on with the next one.
 """
 
 import faulthandler
 import json
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -39,16 +37,16 @@ def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: S
     task |= {"parent": os.getpid(), "path": sys.path, "seconds": results.SECONDS, "overrun": OVERRUN_SECONDS}
     done: list[Result] = []
     while True:
-        messages, end = _messages(task)
-        plugin, last = messages[0] if messages else end, (messages or [end])[-1]
+        messages, blame = _messages(task)
+        plugin = messages[0] if messages else {}
         if "mistake" in plugin:
             raise InputError(plugin["mistake"])
         if "checks" not in plugin:
-            raise InputError(f"{kind} {name!r}: it must load in a process of its own; {_blame(last, end)}")
+            raise InputError(f"{kind} {name!r}: it must load in a process of its own; {blame}")
         done += [Result(**message) for message in messages if "outcome" in message]
-        if "outcome" not in last:
-            done.append(Result(last.get("begins", plugin["checks"][0]), "failed", _blame(last, end)))
-        wanted = [rule for rule in plugin["checks"] if rule not in {result.name for result in done}]
+        if "outcome" not in messages[-1]:
+            done.append(Result(messages[-1].get("begins", plugin["checks"][0]), "failed", blame))
+        wanted = plugin["checks"][plugin["checks"].index(done[-1].name) + 1 :]
         while wanted and (skipped := not_run(wanted[0], done)):
             done.append(skipped)
             wanted.pop(0)
@@ -57,8 +55,8 @@ def check_in_process(kind: Any, name: str, settings: Sequence[str] = (), only: S
         task["only"] = wanted
 
 
-def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Return what a process writes that checks a plugin, and how and when it ends; nothing that it starts is left."""
+def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], str]:
+    """Return what a process writes that checks a plugin, and why it ended; nothing that it starts is left."""
     with tempfile.TemporaryFile() as written:
         process = subprocess.Popen(
             [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=written, start_new_session=True
@@ -68,25 +66,21 @@ def _messages(task: dict[str, Any]) -> tuple[list[dict[str, Any]], dict[str, Any
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            status = process.wait()
+        ended = time.monotonic()
         written.seek(0)
         messages = [json.loads(line) for line in written]
-    return messages, {"status": process.returncode, "at": time.monotonic()}
-
-
-def _blame(last: dict[str, Any], end: dict[str, Any]) -> str:
-    """Return why a process ended after its last message."""
-    if end["at"] - last.get("at", end["at"]) > results.SECONDS:
-        return f"it must end within {results.SECONDS:g} s, and did not"
-    status = end["status"]
+    if messages and ended - messages[-1].get("at", ended) > results.SECONDS:
+        return messages, f"it must end within {results.SECONDS:g} s, and did not"
     how = f"exit status {status}" if status >= 0 else signal.Signals(-status).name
-    return f"it must not end the program, got {how}"
+    return messages, f"it must not end the program, got {how}"
 
 
-def _check() -> int:
-    """Check what standard input asks for, and end this process; return 0 where there is nothing to check."""
+def _check() -> None:
+    """Check what standard input asks for, and end this process."""
     faulthandler.enable()
-    out = os.fdopen(_stdout_kept_apart(), "w", encoding="utf-8")
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what the plugin prints is no message
     task = json.load(sys.stdin)
     end_with_parent(task["parent"])
 
@@ -100,7 +94,7 @@ def _check() -> int:
         label, checks = _checks(task["kind"], task["name"], task["settings"], task["only"])
     except (ValueError, ImportError) as mistake:
         send(mistake=str(mistake))
-        return 0
+        return
     send(checks=[check.name for check in checks], label=label)
     done: list[Result] = []
     with memory(GIGABYTES):
@@ -131,27 +125,5 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     return offer.label, [check for check in checks if not only or check.name in only]
 
 
-def _trace() -> int:
-    """Write the trace of a pickled optimiser case; return 0, or 3 where its factory cannot be imported here."""
-    out = _stdout_kept_apart()
-    path, payload = pickle.load(sys.stdin.buffer)
-    sys.path[:] = path
-    try:
-        case = pickle.loads(payload)
-    except Exception:
-        return 3
-    trace = case.trace()
-    with os.fdopen(out, "wb") as stream:
-        stream.write(pickle.dumps(trace))
-    return 0
-
-
-def _stdout_kept_apart() -> int:
-    """Return a file descriptor of what was standard output; whatever is printed from now on goes to standard error."""
-    out = os.dup(1)
-    os.dup2(2, 1)
-    return out
-
-
 if __name__ == "__main__":
-    sys.exit(_trace() if sys.argv[1:] == ["trace"] else _check())
+    _check()

@@ -1,9 +1,8 @@
 """Is a tracker right: a frame for each observation as it comes, whole and honest frames, the same again, no leaks?"""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,8 +40,7 @@ def scene() -> tuple[Task, Motion, Sequence[Observation]]:
     return Task(body, [camera], EVALUATIONS, 0.0, anchor, fps=motion.fps, training=training), motion, observations
 
 
-@dataclass(frozen=True)
-class Tracked:
+class Tracked(NamedTuple):
     """The frames of a tracker, and how it came to them."""
 
     tracker: Tracker
@@ -62,6 +60,11 @@ class Case(PluginCase):
         """Return a new tracker of the scene."""
         tracker: Tracker = self.factory(scene()[0], **{**self.settings, **more})
         return tracker
+
+    def same(self, tracker: Tracker) -> bool:
+        """Return whether a tracker gives the first track's poses."""
+        again = tracker.track(scene()[2], np.random.default_rng(0))
+        return np.array_equal([frame.pose for frame in again], [frame.pose for frame in self.first.frames])
 
     @cached_property
     def first(self) -> Tracked:
@@ -121,22 +124,16 @@ def audit(case: Case) -> str:
     return f"at most {max(frame.evaluations for frame in case.first.frames)} of {EVALUATIONS} evaluations"
 
 
-def _poses(frames: list[Frame]) -> Any:
-    return np.array([frame.pose for frame in frames])
-
-
 @checklist
 def same_seed(case: Case) -> None:
     """The same seed gives the same poses."""
-    again = list(case.build().track(scene()[2], np.random.default_rng(0)))
-    expect(np.array_equal(_poses(case.first.frames), _poses(again)), "one seed must give one track, got two")
+    expect(case.same(case.build()), "one seed must give one track, got two")
 
 
 @checklist
 def used_twice(case: Case) -> None:
     """A tracker that has tracked before does the same again."""
-    again = list(case.first.tracker.track(scene()[2], np.random.default_rng(0)))
-    expect(np.array_equal(_poses(case.first.frames), _poses(again)), "a second track must be as the first, got another")
+    expect(case.same(case.first.tracker), "a second track must be as the first, got another")
 
 
 @checklist
@@ -144,7 +141,7 @@ def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
         with left_alone():
-            list(case.build().track(scene()[2], np.random.default_rng(0)))
+            case.same(case.build())
 
 
 @checklist
@@ -157,10 +154,10 @@ def inputs(case: Case) -> None:
 def follows(case: Case) -> str:
     """The track is nearer to the truth than a body lying on the floor: its MPJPE is below 400 mm."""
     task, motion, _ = scene()
-    frames = case.first.frames
-    places = np.array([frame.translation for frame in frames])
-    joints = task.body.skeleton.joints
-    error = metrics.mpjpe_mm(joints(motion.poses, motion.translations), joints(_poses(frames), places)).mean()
+    poses, places = (
+        np.array([getattr(frame, name) for frame in case.first.frames]) for name in ("pose", "translation")
+    )
+    error = metrics.mpjpe_mm(motion.joints, task.body.skeleton.joints(poses, places)).mean()
     expect(error < 400.0, f"the MPJPE must be below 400 mm, got {error:.0f}")
     return f"MPJPE {error:.0f} mm"
 
