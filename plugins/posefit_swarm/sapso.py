@@ -99,6 +99,6 @@ class SAPSO:
         else:
             accepted, _ = swarm.accept(proposals, costs, *how)
         if self._iteration > 0:
-            # SAPSO A1.2e, Interpretation S6
+            # SAPSO A1.2e
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
         self._iteration += 1
