@@ -1,39 +1,33 @@
 """A plugin package's docstring is its manual page, and the example on it runs."""
 
+import ast
 import doctest
 from importlib import import_module
-from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
-PACKAGES = (
-    "posefit_background",
-    "posefit_evolution",
-    "posefit_filters",
-    "posefit_vsmm.imm",
-    "posefit_mediapipe",
-    "posefit_nevergrad",
-    "posefit_optuna",
-    "posefit_priors",
-    "posefit_pycma",
-    "posefit_pymoo",
-    "posefit_scipy",
-    "posefit_swarm",
-    "posefit_vsmm",
-)
-LIBRARIES = {
-    "posefit_nevergrad": "nevergrad",
-    "posefit_optuna": "optuna",
-    "posefit_pycma": "cma",
-    "posefit_pymoo": "pymoo",
+ROOT = Path(__file__).parents[2] / "plugins"
+PAGES = {
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): ast.get_docstring(tree) or ""
+    for path in sorted(ROOT.rglob("*.py"))
+    if (tree := ast.parse(path.read_text("utf-8"))).body
 }
+SECONDS = ("posefit_nevergrad", "posefit_ribs")  # that take some
 
 
-@pytest.mark.parametrize("name", PACKAGES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name in SECONDS else name
+        for name, text in PAGES.items()
+        if ">>> " in text
+    ],
+)
 def test_the_example_of_a_manual_page_runs(name: str) -> None:
-    library = LIBRARIES.get(name)
-    if library and not find_spec(library):
-        pytest.skip(f"without {library}")
-    result = doctest.testmod(import_module(name))
+    try:
+        result = doctest.testmod(import_module(name))
+    except ModuleNotFoundError as error:
+        pytest.skip(f"without {error.name}")
     assert result.attempted >= 3
     assert result.failed == 0

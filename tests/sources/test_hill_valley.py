@@ -78,17 +78,13 @@ def test_a_hill_is_only_seen_where_it_is_probed() -> None:
     assert seen == [True, False]
 
 
-def test_a_hill_lower_than_the_tolerance_is_none() -> None:
+def test_a_hill_lower_than_the_tolerance_is_none_and_what_is_not_feasible_is_one() -> None:
     points, pairs, probes = np.array([[-0.5], [0.5]]), np.array([[0, 1]]), np.array([1])
     for tolerance, one in ((0.9, False), (1.1, True)):
         landscape = Landscape(Toy(1), two_holes)
         assert same_valley(landscape, points, np.zeros(2), pairs, probes, tolerance)[0] == one
-
-
-def test_what_is_not_feasible_is_a_hill() -> None:
     flat = Landscape(Toy(1, lambda x: np.abs(x[:, 0]) > 0.1), lambda x: np.zeros(len(x)))
-    points = np.array([[-0.5], [0.5]])
-    assert not same_valley(flat, points, np.zeros(2), np.array([[0, 1]]), np.array([1]))[0]
+    assert not same_valley(flat, points, np.zeros(2), pairs, probes)[0]
     assert flat.evaluations == 0
 
 
@@ -141,30 +137,10 @@ def test_clusters_are_those_of_one_test_after_the_other() -> None:
             np.testing.assert_array_equal(found.lowest, [min(one, key=lambda i: costs[i]) for one in theirs])
 
 
-def test_known_basins_are_found() -> None:
-    for cost, dimensions, wrapping, count in [
-        (two_holes, 1, 0, 2),
-        (two_holes, 2, 0, 2),
-        (eggs, 1, 0, 3),
-        (eggs, 2, 0, 9),
-        (turning, 1, 1, 2),
-    ]:
-        points = np.random.default_rng(0).uniform(-1.0, 1.0, (400, dimensions))
-        costs = cost(points)
-        good = costs < np.median(costs)
-        found = valleys(Landscape(Toy(dimensions, wrapping=wrapping), cost), points[good], costs[good])
-        assert len(found.lowest) == count
-        # the best of each lies near the bottom: costs are 0 there, and 1 or 2 on the lowest hill
-        assert costs[good][found.lowest].max() < 0.3
-
-
-def test_no_point_and_one_point_have_no_hills() -> None:
+def test_few_points_have_no_hills_and_a_cost_that_is_no_number_is_refused() -> None:
     landscape = Landscape(Toy(2), two_holes)
     assert len(valleys(landscape, np.empty((0, 2)), np.empty(0)).lowest) == 0
     np.testing.assert_array_equal(valleys(landscape, np.zeros((1, 2)), np.ones(1)).labels, [0])
     assert landscape.evaluations == 0
-
-
-def test_a_cost_that_is_no_number_is_refused() -> None:
     with pytest.raises(ValueError, match="costs must be finite, got nan"):
         valleys(Landscape(Toy(1), two_holes), np.zeros((2, 1)), np.array([0.0, np.nan]))
