@@ -20,32 +20,27 @@ MEGABYTES = 1_000  # of a child's memory, with everything that it has imported
 class Tally:
     """What came of inputs."""
 
-    counts: Counter[str] = field(default_factory=Counter)
-    read: Counter[str] = field(default_factory=Counter)  # by reader
-    refused: Counter[str] = field(default_factory=Counter)
+    counts: Counter[tuple[str, str]] = field(default_factory=Counter)  # of each reader, those read and those refused
     largest: int = 0  # MB
     longest: float = 0.0  # seconds
     findings: list[str] = field(default_factory=list)
 
-    def find(self, how: str, finding: str) -> None:
+    def find(self, finding: str) -> None:
         """Take what should not have come, and say so at once."""
-        self.counts[how] += 1
         self.findings.append(finding)
         print(finding, file=sys.stderr, flush=True)
 
     def add(self, number: int, answer: list[object], seconds: float) -> None:
         """Take what a child says of an input."""
         how, reader, megabytes, what = str(answer[0]), str(answer[1]), int(str(answer[2])), answer[3]
-        if how in ("read", "refused"):
-            self.counts[how] += 1
-            getattr(self, how)[reader] += 1
-        else:
-            self.find(how, f"{number} {how} {reader}: {what}")
+        self.counts[reader, how] += 1
         self.largest, self.longest = max(self.largest, megabytes), max(self.longest, seconds)
+        if how not in ("read", "refused"):
+            self.find(f"{number} {how} {reader}: {what}")
         if megabytes > MEGABYTES:
-            self.find("large", f"{number} large {reader}: {megabytes} MB")
+            self.find(f"{number} large {reader}: {megabytes} MB")
         if seconds > SECONDS:
-            self.find("hang", f"{number} hang {reader}: {seconds:.0f} s")
+            self.find(f"{number} hang {reader}: {seconds:.0f} s")
 
 
 def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
@@ -55,28 +50,25 @@ def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
         command = [sys.executable, "-m", "tests.fuzz.worker", str(seed), str(start), str(numbers.stop), kinds]
         with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0) as child:
             assert child.stdout is not None
-            begun, since, patience = start, time.monotonic(), STARTING
-            while True:
-                ready, _, _ = select.select([child.stdout], [], [], patience)
-                line = child.stdout.readline() if ready else None
-                if line is None:
-                    child.kill()
-                    tally.find("hang", f"{begun} hang: more than {SECONDS:g} s")
-                    start = begun + 1
-                    break
+            number, since, patience = start, time.monotonic(), STARTING
+            while ready := select.select([child.stdout], [], [], patience)[0]:
+                line = child.stdout.readline().decode()
                 if not line:
-                    status = child.wait()
-                    if status and patience == STARTING:
-                        raise RuntimeError("a child could not read the valid files")
-                    start = begun + 1 if status else numbers.stop
-                    if status:
-                        tally.find("abort", f"{begun} abort: exit status {status}")
                     break
-                number, _, rest = line.decode().partition(" ")
-                if rest.strip() == "begun":
-                    begun, since, patience = int(number), time.monotonic(), SECONDS
+                if line.endswith("begun\n"):
+                    number, since, patience = int(line.split()[0]), time.monotonic(), SECONDS
                 else:
-                    tally.add(int(number), json.loads(rest), time.monotonic() - since)
+                    tally.add(number, json.loads(line.partition(" ")[2]), time.monotonic() - since)
+            if not ready:
+                child.kill()
+                tally.find(f"{number} hang: more than {SECONDS:g} s")
+            elif status := child.wait():
+                if patience == STARTING:
+                    raise RuntimeError("a child could not read the valid files")
+                tally.find(f"{number} abort: exit status {status}")
+            else:
+                return
+            start = number + 1
 
 
 def main() -> int:
@@ -90,11 +82,10 @@ def main() -> int:
     given = parser.parse_args()
     numbers = range(given.inputs) if given.only is None else range(given.only, given.only + 1)
     tally = run(given.seed, numbers, given.workers, given.readers)
-    for name in ("read", "refused", "unclean", "abort", "hang", "large"):
-        print(f"{name:8} {tally.counts[name]:>8,}")
-    for reader in sorted(tally.read | tally.refused):
-        print(f"  {reader:12} read {tally.read[reader]:>7,}  refused {tally.refused[reader]:>7,}")
-    print(f"largest {tally.largest} MB, longest {tally.longest:.1f} s")
+    for reader in sorted({reader for reader, _ in tally.counts}):
+        read, refused = (tally.counts[reader, how] for how in ("read", "refused"))
+        print(f"{reader:12} read {read:>7,}  refused {refused:>7,}")
+    print(f"{len(tally.findings)} findings, largest {tally.largest} MB, longest {tally.longest:.1f} s")
     return int(bool(tally.findings))
 
 
