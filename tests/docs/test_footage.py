@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 from footage_figures import SINGLE, TALL, Choice, figures, filmed_scene, footage_report
-from footage_sets import POINTS, errors_mm, films_in, recording_of, virtual_points
+from footage_sets import POINTS, errors_mm, films_in, read_c3d, recording_of, virtual_points
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.measuring.c3d import read_c3d, write_c3d
+from posefit.measuring.c3d import write_c3d
 from posefit.measuring.centres import PLACES
 from posefit.motion import built_in
 from posefit.motion.asf import write_asf

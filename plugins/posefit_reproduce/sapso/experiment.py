@@ -209,13 +209,8 @@ def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array
 
 def _first_frame(scene: Scene, motion: PaperMotion, scale: Scale, particles: int, seed: int, **method: Any) -> Frame:
     """Return what a method makes of a scene of one frame."""
-    settings: dict[str, Any] = {
-        "population_size": particles,
-        "iterations": scale.iterations,
-        "settings": DRIVEN,
-        "seed": seed,
-    }
-    return track(scene, train=motion.training, **settings, **method).estimates[0]
+    how: dict[str, Any] = {"population_size": particles, "iterations": scale.iterations, "seed": seed}
+    return track(scene, train=motion.training, settings=DRIVEN, **how, **method).estimates[0]
 
 
 @dataclass(frozen=True, eq=False)
