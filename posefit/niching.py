@@ -338,10 +338,6 @@ def log_score(weights: Array, true: int) -> float:
 
 def _nearest_known(distances: Array, level: float) -> NDArray[np.int64]:
     """Return the nearest known pose of each reported one (n,), -1 where none is within the level."""
-    distances = np.asarray(distances, dtype=np.float64)
-    if distances.ndim != 2 or not distances.shape[1]:
-        raise InputError(f"distances must have shape (n, K), at least one known pose, got {distances.shape}")
     if not len(distances):
         return np.empty(0, dtype=np.int64)
-    nearest = distances.argmin(axis=1)
-    return np.where(distances.min(axis=1) <= level, nearest, -1)
+    return np.where(distances.min(axis=1) <= level, distances.argmin(axis=1), -1)

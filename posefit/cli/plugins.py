@@ -53,8 +53,8 @@ def doctor(context: click.Context, verbose: bool) -> None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the report below says the same
-        every = *registry().plugins, *command_plugins(_own(context)), *claim_plugins()
-        lines, well = diagnosis(every, verbose)
+        mine = command_plugins(_own(context))
+        lines, well = diagnosis([*registry().plugins, *mine, *claim_plugins()], verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

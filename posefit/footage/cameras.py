@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.facing import yaws_of
 from posefit.footage.masks import FPS, PackedMasks, Views, undistorted
 from posefit.footage.quality import disagreement, extent_of, meeting
 from posefit.footage.scene import Scene
@@ -22,6 +22,8 @@ from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
+AROUND = 0.5  # seconds before and after a frame whose facings are averaged
+AGREEMENT = 0.6  # the mean of unit vectors is at least so long: facings may not contradict each other
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
 
@@ -93,6 +95,21 @@ def combined(
     )
 
 
+def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:
+    """Return about which way a person faces in each frame (T,), radians about the vertical; NaN where unknown.
+
+    `facings` (T,) are a segmenter's, as `Segmenter.facing`. Each frame gets the mean direction of the second around it,
+    so that a few wrong ones do not count.
+    """
+    values, reach = np.asarray(facings, dtype=np.float64), max(round(AROUND * fps), 1)
+    towards = np.arctan2(-camera.rotation[2, 0], -camera.rotation[2, 2])
+    known = np.isfinite(values)
+    directions = np.where(known, np.exp(1j * (np.nan_to_num(values) + towards)), 0.0)
+    around = [slice(max(k - reach, 0), k + reach + 1) for k in range(len(values))]
+    total, count = (np.array([each[rows].sum() for rows in around]) for each in (directions, known))
+    return np.where(np.abs(total) >= np.maximum(AGREEMENT * count, 1e-9), np.angle(total), np.nan)
+
+
 def _unequal(views: Sequence[CameraView]) -> list[str]:
     """Return the warning that videos differ in length."""
     lengths = [len(view.masks) for view in views]
@@ -142,18 +159,20 @@ def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
         yield np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR), dtype=np.uint8)
 
 
+def listed(cameras: Sequence[Camera | Calibration | str | Path]) -> list[Camera | Calibration]:
+    """Return cameras, those of files read; a file with several cameras serves for several views, in its order."""
+    each = [[one] if isinstance(one, Camera | Calibration) else read_calibrations(one) for one in cameras]
+    return list(chain.from_iterable(each))
+
+
 def calibrated(
     cameras: Sequence[Camera | Calibration | str | Path], filmed: Sequence[tuple[int, int] | None]
 ) -> list[Camera | Calibration]:
     """Return the cameras of as many views, none for a single view without one; `filmed` are the sizes of videos.
 
-    A file with several cameras serves for several views, in its order. Raises InputError where cameras and views do not
-    fit each other.
+    Raises InputError where cameras and views do not fit each other.
     """
-    known: list[Camera | Calibration] = []
-    for camera in cameras:
-        known += [camera] if isinstance(camera, Camera | Calibration) else read_calibrations(camera)
-    views = len(filmed)
+    known, views = listed(cameras), len(filmed)
     if not known and views > 1:
         raise InputError(f"camera must be given for each of several views, {views}, got none")
     if known and len(known) != views:

@@ -1,7 +1,6 @@
 """Masks from a video of one person before a still background: `posefit extract`."""
 
 import csv
-import os
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -9,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.errors import InputError
-from posefit.files import new_folder
+from posefit.files import check_new, new_folder
 from posefit.footage.masks import PackedMasks, Range
 from posefit.footage.segmentation import Extraction, Progress, Segmentation
 from posefit.footage.video import Video, VideoWriter
@@ -33,8 +31,7 @@ def extract(
     all. Raises InputError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
     """
     target = Path(out)
-    if os.path.lexists(target):
-        raise InputError(f"{target}: expected a new folder, got one that exists")
+    check_new(target)
     video, how = Video.of(source), how or Extraction()
     segmentation = Segmentation(video, how, frames)
     with suppress(OSError):  # reported where the folder is made

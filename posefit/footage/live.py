@@ -17,7 +17,7 @@ from posefit.footage.images import PIXELS
 from posefit.footage.masks import FPS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
-from posefit.footage.video import Video
+from posefit.footage.video import Video, scaled
 from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
@@ -163,7 +163,7 @@ class _FirstFrames:
         return len(self.images)
 
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
-        return (_resized(image, size) for image in self.images[start:stop:step])
+        return (scaled(image, size) for image in self.images[start:stop:step])
 
 
 def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None]) -> Iterator[LiveMask]:
@@ -171,13 +171,10 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
 
     By default each pixel's background is its mean over the first three seconds, which have to show the empty scene.
     """
-    images = iter(stream)
-    if (first := next(images, None)) is None:
-        raise InputError(f"{stream.name}: expected frames, got none")
+    images = _of_one_size(stream)
+    first = next(images)
     if first.image.ndim == 2:
         for live in chain([first], images):
-            if live.image.shape != first.image.shape:
-                raise _other_size(stream, first.image, live.image)
             mask = live.image > MASK_LEVEL
             yield LiveMask(live, mask, np.ones_like(mask), bool(mask.any() and not mask.all()))
         return
@@ -193,17 +190,19 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
     segmenter = segmentation.learned()
     quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))
     for live in images:
-        if live.image.shape != first.image.shape:
-            raise _other_size(stream, first.image, live.image)
-        image = _resized(live.image, segmentation.size)
+        image = scaled(live.image, segmentation.size)
         person, row = segmentation.person(segmenter, image, quality, live.number)
         yield LiveMask(live, person.mask, person.valid, bool(row["usable"]))
 
 
-def _resized(image: Image, size: tuple[int, int]) -> Image:
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
-def _other_size(stream: Stream, first: Image, image: Image) -> InputError:
-    expected, came = ("x".join(map(str, frame.shape[1::-1])) for frame in (first, image))
-    return InputError(f"{stream.name}: expected frames of {expected}, got {came}")
+def _of_one_size(stream: Stream) -> Iterator[LiveImage]:
+    """Yield the frames of a stream. Raises InputError where it has none, or one of another size than the first."""
+    first = None
+    for live in stream:
+        first = first or live
+        if live.image.shape != first.image.shape:
+            expected, came = ("x".join(map(str, frame.image.shape[1::-1])) for frame in (first, live))
+            raise InputError(f"{stream.name}: expected frames of {expected}, got {came}")
+        yield live
+    if first is None:
+        raise InputError(f"{stream.name}: expected frames, got none")

@@ -1,7 +1,7 @@
 """The person in a video, separated from the background frame by frame."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import Parameter
 from pathlib import Path
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
-from posefit.footage.facing import facings_on_the_spot
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span
 from posefit.footage.quality import FrameQuality, Verdict, advice, verdict
-from posefit.footage.video import Video
+from posefit.footage.video import Video, scaled
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
@@ -35,6 +34,8 @@ WIDTH = 640  # pixels; larger videos are scaled down to it
 RIVAL_AREA = 0.4  # of the person's area: something so large may be another person
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
+CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
+STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
 PERIOD = 5  # frames between two that are compared with the first
@@ -124,7 +125,7 @@ class VideoFootage:
         (tall, wide), (width, height) = image.shape[:2], self.video.size
         if (wide, tall) != (width, height):
             raise InputError(f"{path}: background must have the video's size {width}x{height}, got {wide}x{tall}")
-        return self.cut(np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8))
+        return self.cut(scaled(image, self.size))
 
     def cut(self, image: NDArray[T]) -> NDArray[T]:
         """Return the part of a scaled frame or mask (height, width, ...) that a segmenter gets."""
@@ -263,6 +264,24 @@ class Segmentation:
             "in_pieces": sum(row["pieces"] > 1 for row in self.rows),
             "warnings": self.warnings,
         }
+
+
+def facings_on_the_spot(
+    facings: Sequence[float], middles: Sequence[float], sides: Sequence[float], fps: float
+) -> Array:
+    """Return which way a person faces in each frame (T,), NaN where they go across the picture or it is unknown.
+
+    `middles` and `sides` are those of the mask, in pixels. For a person who goes along, the frames themselves show
+    front and back, and a network is no surer.
+    """
+    result, reach = np.array(facings, dtype=np.float64), max(round(STAYING * fps), 1)
+    for k in range(len(result)):
+        rows = slice(max(k - reach, 0), k + reach + 1)
+        known = np.isfinite(middles[rows])
+        across, side = np.asarray(middles[rows])[known], np.asarray(sides[rows])[known]
+        if known.any() and np.ptp(across) > CROSSING * np.median(side):
+            result[k] = np.nan
+    return result
 
 
 class CameraMotion:

@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.footage.cameras import CameraView, calibrated, combined
+from posefit.footage.cameras import CameraView, calibrated, combined, listed
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import FPS, Range, existing
 from posefit.footage.readers import IMAGES, Masks, name_of, read_masks
@@ -18,7 +18,7 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
+from posefit.geometry.calibration import Calibration, Up, upright
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
@@ -89,7 +89,9 @@ def scene_of(
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
-        cameras = [placed for source in camera for placed in _cameras(source, up)]
+        known = listed(camera)
+        world = upright([one for one in known if isinstance(one, Calibration)], up)
+        cameras = [one if isinstance(one, Camera) else one.camera(one.size, world) for one in known]
         motion = load_motion(cast(Source, sources[0]), fps or FPS, asf)
         return synthetic(motion, view_degrees, size or SIZE, cameras, frames)
     if len(view_degrees) > 1:
@@ -198,13 +200,6 @@ def kind_of(source: Footage) -> Kind:
     if path.is_dir() or path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
-
-
-def _cameras(source: Camera | Calibration | str | Path, up: Up | None) -> list[Camera]:
-    if isinstance(source, Camera):
-        return [source]
-    known = [source] if isinstance(source, Calibration) else read_calibrations(source)
-    return [calibration.camera(calibration.size, upright(known, up)) for calibration in known]
 
 
 def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -80,7 +81,7 @@ class Video:
                     if (filmed.shape[1], filmed.shape[0]) != self.size:
                         came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {k}"
                         raise InputError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
-                    image = np.asarray(cv2.resize(filmed, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+                    image = scaled(filmed, size)
                 assert image is not None
                 yield image
         finally:
@@ -109,6 +110,11 @@ class Video:
     def uneven(self) -> bool:
         """Whether its frames come at times so uneven that some are taken twice, or none at all."""
         return bool((np.diff(self._order) != 1).any())
+
+
+def scaled(image: Any, size: tuple[int, int]) -> Image:
+    """Return a picture scaled to a width and a height."""
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def _moments(path: Path) -> Array:

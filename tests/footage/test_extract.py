@@ -165,9 +165,7 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
     ):
         assert message in error_of("extract", tmp_path / name, "--out", tmp_path / "out")
     (tmp_path / "out").mkdir()
-    assert "expected a new folder, got one that exists" in error_of(
-        "extract", tmp_path / "text.mp4", "--out", tmp_path / "out"
-    )
+    assert "got one that exists" in error_of("extract", tmp_path / "text.mp4", "--out", tmp_path / "out")
 
 
 def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.footage.facing import facings_on_the_spot, yaws_of
-from posefit.footage.segmentation import Extraction
+from posefit.footage.cameras import yaws_of
+from posefit.footage.segmentation import Extraction, facings_on_the_spot
 from posefit.footage.source import scene_of
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image
