@@ -74,15 +74,6 @@ def test_a_name_that_is_taken_or_has_no_place_is_refused(tmp_path, opened):
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_a_folder_that_a_killed_run_left_is_neither_in_the_way_nor_removed(tmp_path):
-    (tmp_path / ".out.partial").mkdir()
-    (tmp_path / ".out.partial" / "old").write_text("old")
-    with new_folder(tmp_path / "out") as folder:
-        (folder / "new").write_text("new")
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["new"]
-    assert (tmp_path / ".out.partial" / "old").read_text() == "old"
-
-
 @pytest.mark.parametrize("opened", [new_file, lambda path: replaced_file(path, MARK)])
 @pytest.mark.parametrize("error", [nullcontext(), pytest.raises(RuntimeError)])
 def test_no_link_is_followed_and_none_removed(tmp_path, opened, error):

@@ -8,12 +8,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 
 import posefit
 from posefit.cli import main
@@ -23,6 +22,7 @@ from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
 from tests.cases import each
+from tests.commands import error_of, printed, run
 from tests.files import arrays
 from tests.plugins.test_registry import point
 
@@ -37,30 +37,6 @@ KEYS = TIMES | {
     "motion", "method", "seed", "frames", "error_degrees", "mpjpe_mm", "pa_mpjpe_mm", "iou", "swap_rate", "lost_rate",
     "skill", "prior_floor_degrees", "evaluations",
 }  # fmt: skip
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
-
-
-def summary_of(*words: object) -> dict[str, Any]:
-    """Return what a command prints with --json."""
-    result = run(*words, "--json")
-    assert result.exit_code == 0, result.stderr
-    summary: dict[str, Any] = json.loads(result.stdout)
-    return summary
-
-
-def fails(*words: object) -> str:
-    """Return the one line on stderr of a command that must fail with status 2 and print nothing."""
-    result = run(*words)
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    lines = [line for line in result.stderr.splitlines() if line.startswith("posefit:")]
-    assert len(lines) == 1, result.stderr
-    assert "Usage:" not in result.stderr
-    assert "Traceback" not in result.stderr
-    return lines[0]
 
 
 @pytest.fixture
@@ -84,7 +60,7 @@ def masks(folder: Path, count: int = 3) -> Path:
 
 
 def test_track_prints_one_json_object_with_every_key() -> None:
-    summary = summary_of("track", "walk", "--frames", "0:4", *QUICK)
+    summary = printed("track", "walk", "--frames", "0:4", *QUICK)
     assert set(summary) >= KEYS
     assert set(summary["error_degrees"]) == {"mean", "std", "max"}
     assert set(summary["skill"]) == {"mean_pose", "persistence", "nearest"}
@@ -132,18 +108,18 @@ def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None
 
 
 def test_the_command_is_the_typed_call() -> None:
-    printed = summary_of("track", "walk", "--frames", "0:3", "--seed", "7", *QUICK)
+    summary = printed("track", "walk", "--frames", "0:3", "--seed", "7", *QUICK)
     called = posefit.track("walk", frames=(0, 3), seed=7, population_size=10, iterations=4, size=(120, 90)).summary
     for key in KEYS - TIMES:
-        assert printed[key] == called[key]
+        assert summary[key] == called[key]
 
 
 def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
-    printed = summary_of("fit", "walk", "--frame", "7", "--out", tmp_path / "fit", *QUICK)
-    assert len(printed["pose_degrees"]) == 66
-    assert printed["frames"] == 1
+    summary = printed("fit", "walk", "--frame", "7", "--out", tmp_path / "fit", *QUICK)
+    assert len(summary["pose_degrees"]) == 66
+    assert summary["frames"] == 1
     fit = posefit.fit("walk", frame=7, population_size=10, iterations=4, size=(120, 90))
-    np.testing.assert_allclose(np.degrees(fit.pose), printed["pose_degrees"], atol=1e-5)
+    np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
     assert fit.history.ndim == 1
 
 
@@ -151,7 +127,7 @@ def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     for _ in range(2):
         words = ["track", "walk", "--frames", "0:2", "--out", "walk", "--force"]
-        assert summary_of(*words, *QUICK)["translation"] == "known"
+        assert printed(*words, *QUICK)["translation"] == "known"
 
 
 def test_a_shell_completes_methods_and_motions() -> None:
@@ -171,28 +147,17 @@ def test_a_result_has_three_lines_and_messages_only_where_they_are_wanted() -> N
     assert run("track", "walk", "--frames", "0:5", "--quiet", *QUICK).stderr == ""
 
 
-def test_one_frame_has_a_table_too() -> None:  # the pose held from the first frame has no error to compare with
-    result = run("fit", "walk", "--frame", "3", "--verbose", *QUICK)
-    assert result.exit_code == 0, result.output
-    assert "first true pose, held               0.00       -" in result.stdout
-
-
 def test_an_amc_is_tracked_with_the_asf_beside_it(clip: tuple[Path, Path]) -> None:
-    summary = summary_of("track", clip[1], "--method", "sapso", "--train", "walk-a", "--train", "walk-c", *QUICK)
+    summary = printed("track", clip[1], "--method", "sapso", "--train", "walk-a", "--train", "walk-c", *QUICK)
     assert summary["frames"] == 3  # 12 frames at 120 Hz, at 30
     assert summary["train"] == ["walk-a", "walk-c"]
-
-
-@each("mode", ["known", "searched", "aligned"])
-def test_the_translation_may_be_known_searched_or_aligned(mode: str) -> None:
-    assert summary_of("track", "walk", "--frames", "0:3", "--translation", mode, *QUICK)["translation"] == mode
 
 
 def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> None:
     folder, archive = masks(tmp_path / "masks"), tmp_path / "masks.npz"
     np.savez(archive, masks=np.stack([cv2.imread(str(path), 0) for path in sorted(folder.iterdir())]) > 0)
     words = ["--view-degrees", "45", "--method", "@loose", *FEW]
-    first, second = (summary_of("track", source, *words) for source in (folder, archive))
+    first, second = (printed("track", source, *words) for source in (folder, archive))
     assert first["error_degrees"] is None
     assert first["iou"] == second["iou"] > 0.5
     assert first["translation"] == "aligned"
@@ -202,12 +167,12 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("track", "walk", "--frames", "0:2", "--out", out, *QUICK).exit_code == 0
     before = (out / "summary.json").read_text()
-    assert "expected a new folder" in fails("track", "walk", "--frames", "0:3", "--out", out, *QUICK)
+    assert "expected a new folder" in error_of("track", "walk", "--frames", "0:3", "--out", out, *QUICK)
     assert (out / "summary.json").read_text() == before
     assert run("track", "walk", "--frames", "0:3", "--out", out, "--force", *QUICK).exit_code == 0
     assert json.loads((out / "summary.json").read_text())["frames"] == 3
     (out / "precious.txt").write_text("mine")
-    assert "precious.txt" in fails("track", "walk", "--out", out, "--force", *QUICK)
+    assert "precious.txt" in error_of("track", "walk", "--out", out, "--force", *QUICK)
     assert (out / "precious.txt").read_text() == "mine"
 
 
@@ -241,57 +206,37 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
         (["walk", "--wrong"], "No such option"),
         (["walk", "--seed", "-1"], "seed must be 0 or more, got -1"),
     ]:
-        assert message in fails("track", *words, "--out", tmp_path / "out")
+        assert message in error_of("track", *words, "--out", tmp_path / "out")
         assert list(tmp_path.iterdir()) == []
 
 
-def test_bad_motion_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -> None:
+def test_bad_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -> None:
     asf, amc = clip
     out = ["--out", tmp_path / "out"]
     text = amc.read_text()
-    amc.write_text("")
-    assert "expected a file with content, got an empty one" in fails("track", amc, *out)
-    amc.write_text(text[: len(text) // 2].rpartition("\n")[0] + "\n")
-    assert f"{amc}:" in fails("track", amc, *out)
-    amc.write_text(text.replace("lfemur ", "lfemur nan ", 1).replace("\n", "\n", 1))
-    assert f"{amc}:" in fails("track", amc, *out)
-    amc.write_text(text)
-    skeleton = asf.read_text()
-    asf.write_text("\n".join(line for line in skeleton.splitlines() if "head" not in line))
-    assert str(asf) in fails("track", amc, *out)
+    for bad in (text[: len(text) // 2].rpartition("\n")[0] + "\n", text.replace("lfemur ", "lfemur nan ", 1)):
+        amc.write_text(bad)
+        assert f"{amc}:" in error_of("track", amc, *out)
     asf.unlink()
-    assert "expected --asf or exactly one .asf file beside it, got 0" in fails("track", amc, *out)
-    assert not (tmp_path / "out").exists()
-
-
-def test_bad_masks_are_refused(tmp_path: Path) -> None:
-    folder, out = masks(tmp_path / "masks", 4), tmp_path / "out"
-    good = cv2.imread(str(folder / "0002.png"), 0)
-    cv2.imwrite(str(folder / "0002.png"), good[:, :60])
-    message = "0002.png: mask must have shape (90, 120), got (90, 60)"
-    assert message in fails("track", folder, "--out", out, "--method", "@loose", *FEW)
-    (folder / "0002.png").write_bytes(b"no image")
-    assert "0002.png: expected an image" in fails("track", folder, "--out", out, "--method", "@loose", *FEW)
+    assert "expected --asf or exactly one .asf file beside it, got 0" in error_of("track", amc, *out)
+    folder = masks(tmp_path / "masks", 4)
+    (tmp_path / "wide.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (99, 90)).to_json())
     (tmp_path / "empty").mkdir()
-    assert "expected a folder with mask images" in fails("track", tmp_path / "empty")
     np.savez(tmp_path / "a.npz", other=np.zeros(3))
     np.savez(tmp_path / "b.npz", masks=np.zeros((3, 4)))
     np.savez(tmp_path / "c.npz", masks=np.full((2, 9, 9), np.nan))
-    np.savez(tmp_path / "d.npz", masks=np.array([{}], dtype=object))
-    for name, message in (
-        ("a", "with the key masks"),
-        ("b", "masks must have shape (frames, height, width), got (3, 4)"),
-        ("c", "masks must be finite"),
-        ("d", "with the key masks"),
+    for words, message in (
+        ([folder, "--camera", tmp_path / "wide.json"], "camera 'wide' must be calibrated for 120x90, got 99x90"),
+        ([folder, "--translation", "known"], "translation must be searched or aligned"),
+        ([tmp_path / "empty"], "expected a folder with mask images"),
+        ([tmp_path / "a.npz"], "with the key masks"),
+        ([tmp_path / "b.npz"], "masks must have shape (frames, height, width), got (3, 4)"),
+        ([tmp_path / "c.npz"], "masks must be finite"),
     ):
-        assert message in fails("track", tmp_path / f"{name}.npz")
-    (tmp_path / "wide.json").write_text(posefit.Camera.around(np.zeros(3), 0.0, 4.0, (99, 90)).to_json())
-    (folder / "0002.png").unlink()
-    assert "camera 'wide' must be calibrated for 120x90, got 99x90" in fails(
-        "track", folder, "--camera", tmp_path / "wide.json"
-    )
-    assert "translation must be searched or aligned" in fails("track", folder, "--translation", "known")
-    assert not out.exists()
+        assert message in error_of("track", *words, *out)
+    (folder / "0002.png").write_bytes(b"no image")
+    assert "0002.png: expected an image" in error_of("track", folder, *out)
+    assert not (tmp_path / "out").exists()
 
 
 def test_plugins_are_listed_with_their_origin_and_settings() -> None:
@@ -317,7 +262,7 @@ def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() ->
     assert "Settings:" not in text
     assert all(len(line) <= 120 for line in text.splitlines())
     assert "It has no settings." in run("plugins", "show", "masks").stdout
-    message = fails("plugins", "show", "sapzo")
+    message = error_of("plugins", "show", "sapzo")
     assert "plugin must be one of annealed, " in message
     assert message.endswith("got 'sapzo'; did you mean 'sapso'?")
 
@@ -353,9 +298,9 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     report = json.loads(run("check", "prior", "pca", "--set", "components=4", "--json").stdout)
     passed = {"check": "ranges", "outcome": "passed", "detail": "4 latents", "traceback": ""}
     assert passed in report["results"]
-    assert "optimiser must be one of" in fails("check", "optimiser", "nothing")
-    assert "a setting of pca must be one of" in fails("check", "prior", "pca", "--set", "colour=red")
-    assert "a setting must be SETTING=VALUE" in fails("check", "prior", "pca", "--set", "colour")
+    assert "optimiser must be one of" in error_of("check", "optimiser", "nothing")
+    assert "a setting of pca must be one of" in error_of("check", "prior", "pca", "--set", "colour=red")
+    assert "a setting must be SETTING=VALUE" in error_of("check", "prior", "pca", "--set", "colour")
 
 
 def installed(kind: str, name: str, folder: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
@@ -417,7 +362,7 @@ def test_a_new_plugin_has_names_of_its_own_and_replaces_nothing(tmp_path: Path) 
         (["a", "--kind", "camera"], "kind must be one of optimiser, prior, tracker, segmenter, command, got 'camera'"),
         (["a", "--out", tmp_path / "mine"], "expected a new folder, got one that exists"),
     ]:
-        assert message in fails("plugins", "new", "--out", tmp_path / "x", *words)
+        assert message in error_of("plugins", "new", "--out", tmp_path / "x", *words)
     assert list(tmp_path.iterdir()) == [tmp_path / "mine"]
 
 
@@ -434,7 +379,7 @@ def test_a_new_plugins_class_has_a_name_that_python_and_the_template_leave_free(
 def test_settings_are_given_by_plugin_and_name() -> None:
     given = ["sapso.cooling=0.5", "pca.components=4", "tracker.floor=0.1", "tracker.root_range_degrees=30,10,10"]
     sets = [word for text in given for word in ("--set", text)]
-    settings = summary_of("track", "walk", "--frames", "0:2", *QUICK, *sets)["settings"]
+    settings = printed("track", "walk", "--frames", "0:2", *QUICK, *sets)["settings"]
     assert settings["optimiser"]["cooling"] == 0.5
     assert settings["prior"] == {"components": 4}
     assert settings["tracker"] == {"floor": 0.1, "root_range_degrees": [30, 10, 10]}
@@ -454,13 +399,13 @@ def test_a_setting_that_makes_no_sense_is_one_line() -> None:
         ("sapso.cool=never", "sapso.cool must be iteration | acceptance, got 'never'"),
         ("tracker.floor=0", "floor must be above 0, got 0"),
     ]:
-        assert message in fails("track", "walk", "--frames", "0:2", *QUICK, "--set", text)
+        assert message in error_of("track", "walk", "--frames", "0:2", *QUICK, "--set", text)
 
 
 def test_evaluations_are_the_same_for_every_method() -> None:
     words = ["track", "walk", "--frames", "0:2", "--size", "120x90", "--evaluations"]
     for name in ("sapso", "annealed", "cma"):
-        summary = summary_of(*words, 400, "--method", name)
+        summary = printed(*words, 400, "--method", name)
         assert (summary["evaluations"], summary["evaluations_per_frame"]) == (800, 400), name
     assert "400 of 415 evaluations" in run(*words, 415, "--method", "sapso").stdout
 
@@ -489,12 +434,12 @@ def test_names_from_outside_do_not_steer_the_terminal(capsys: pytest.CaptureFixt
     say("warning: a\x1b]0;b\x07.mp4\nsecond line")
     assert capsys.readouterr().err == "warning: a\\x1b]0;b\\x07.mp4\nsecond line\n"
     for words in (["track", "n" * 3000], ["track", "walk", "--camera", "n" * 3000], ["n" * 3000]):
-        assert len(fails(*words)) < 400
-    assert fails("track", "a\x1b[31m\nb.amc").startswith(r"posefit: a\x1b[31m\nb.amc: expected ")
+        assert len(error_of(*words)) < 400
+    assert error_of("track", "a\x1b[31m\nb.amc").startswith(r"posefit: a\x1b[31m\nb.amc: expected ")
 
 
 def test_a_mistake_is_one_line_and_a_fault_of_the_program_is_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert fails("track", "wlak").startswith("posefit: motion must be")
+    assert error_of("track", "wlak").startswith("posefit: motion must be")
     shown = run("--debug", "track", "wlak")
     assert isinstance(shown.exception, InputError)
 

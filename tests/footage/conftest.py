@@ -9,10 +9,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 import posefit
-from posefit.cli import main
 from posefit.footage import segmentation
 from posefit.motion import built_in
 from posefit.registry import Offer
@@ -21,19 +19,6 @@ from posefit.silhouette.cost import project
 SIZE = (160, 120)
 NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
 EMPTY, FRAMES = 12, 48  # frames without a person, then frames of a walk across
-
-
-def run(*words: object) -> Result:
-    """Return the result of a command."""
-    return CliRunner().invoke(main, [str(word) for word in words])
-
-
-def error_of(*words: object) -> str:
-    """Return the one line with which a command refuses its arguments."""
-    result = run(*words)
-    assert result.exit_code == 2, result.output
-    (line,) = (line for line in result.stderr.splitlines() if line.startswith("posefit:"))
-    return line
 
 
 def iou(first: Any, second: Any) -> float:

@@ -15,8 +15,9 @@ from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from tests.cases import each
+from tests.commands import error_of, run
 from tests.files import arrays
-from tests.footage.conftest import EMPTY, FRAMES, SIZE, error_of, iou, run, truth
+from tests.footage.conftest import EMPTY, FRAMES, SIZE, iou, truth
 
 
 @each(("method", "background"), [("mixture", None), ("median", None), ("mean", f"0:{EMPTY}")])

@@ -24,7 +24,8 @@ from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
 from posefit.progress import Progress
 from tests.cases import each
-from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, error_of, film, iou, run, truth, walk
+from tests.commands import error_of, run
+from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, iou, truth, walk
 
 QUICK: dict[str, Any] = {
     "method": "sapso",

@@ -17,7 +17,8 @@ from posefit.footage.readers import read_masks
 from posefit.footage.source import body_of, scene_of
 from posefit.tracking.front import track
 from tests.cases import each
-from tests.footage.conftest import SIZE, camera, error_of, run, truth
+from tests.commands import error_of, run
+from tests.footage.conftest import SIZE, camera, truth
 
 ALL = (None, None)
 QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]

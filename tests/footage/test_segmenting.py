@@ -19,9 +19,10 @@ from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.silhouette.foreground import Person
 from tests.cases import each
+from tests.commands import error_of, run
 from tests.files import arrays
 from tests.footage.composites import DEMO, Kind, backgrounds, composed
-from tests.footage.conftest import camera, error_of, iou, run, truth
+from tests.footage.conftest import camera, iou, truth
 
 ALWAYS: tuple[Kind, ...] = ("jumping", "waving", "standing")
 mediapipe = pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")

@@ -14,7 +14,7 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
 from tests.cases import each
-from tests.footage.conftest import error_of
+from tests.commands import error_of
 
 
 def test_people_of_the_library_are_all_their_clips_at_any_rate() -> None:

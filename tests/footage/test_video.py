@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from posefit.footage.video import Video
+from tests.commands import run
 from tests.files import arrays
-from tests.footage.conftest import EMPTY, SIZE, run
+from tests.footage.conftest import EMPTY, SIZE
 from tests.footage.matroska import write_matroska
 
 

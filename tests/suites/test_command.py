@@ -9,10 +9,8 @@ from typing import Any
 import iohinspector
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 import posefit
-from posefit.cli import main
 from posefit.suites.running import run_on
 from posefit.suites.tally import suite_scores
 from posefit.sweep.cell import run_cell
@@ -20,6 +18,7 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan, search_cells
 from posefit.sweep.table import search_runs
 from tests.cases import each
+from tests.commands import run
 
 PLAN = """
 suite = "posefit-2026.1"
@@ -29,10 +28,6 @@ dimensions = [9, 24]
 instances = [10000, 3]
 budgets = [10]
 """
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def swept(folder: Path, *plans: str) -> Path:
