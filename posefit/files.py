@@ -12,7 +12,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Self
@@ -22,7 +22,7 @@ from posefit.reading import cut, parsed_json, read_text
 
 MARK = "unfinished.json"  # in a folder that is being written
 MAX_MARK_BYTES = 10_000_000
-_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to a folder's name that is no longer free
+_TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to a name that is no longer free
 
 
 def check_new(path: str | Path) -> None:
@@ -38,43 +38,37 @@ def check_place(path: str | Path) -> None:
         raise InputError(f"{path}: expected a place to write to, got one in {parent}, which is none")
 
 
-@contextmanager
-def new_folder(path: str | Path) -> Iterator[Path]:
+def new_folder(path: str | Path) -> AbstractContextManager[Path]:
     """Yield an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
 
     Raises InputError where `path` exists or cannot be written, a full disk included.
     """
-    target = Path(path)
-    with _as_input_error(target):
-        check_new(target)
-        building = _beside(target)
-        building.mkdir()
-        with _undone(lambda: shutil.rmtree(building)):
-            yield building
-            try:
-                building.rename(target)
-            except OSError as error:  # another writer's folder has come meanwhile
-                if error.errno in _TAKEN:
-                    raise _exists(target) from None
-                raise
+    return _new(Path(path), _created_folder, shutil.rmtree, Path.rename)
 
 
-@contextmanager
-def new_file(path: str | Path) -> Iterator[Path]:
+def new_file(path: str | Path) -> AbstractContextManager[Path]:
     """Yield an empty file to write, which becomes `path` where nothing fails; else nothing is left.
 
     It has the suffix of `path`. Raises InputError where `path` exists or cannot be written, a full disk included.
     """
-    target = Path(path)
+    return _new(Path(path), _created, Path.unlink, _named)
+
+
+@contextmanager
+def _new(
+    target: Path, make: Callable[[Path], Path], remove: Callable[[Path], None], name: Callable[[Path, Path], Any]
+) -> Iterator[Path]:
     with _as_input_error(target):
         check_new(target)
-        building = _created(target)
-        with _undone(building.unlink):
+        building = make(target)
+        with _undone(lambda: remove(building)):
             yield building
             try:
-                _named(building, target)
-            except FileExistsError:  # another writer's file has come meanwhile
-                raise _exists(target) from None
+                name(building, target)
+            except OSError as error:  # another writer's has come meanwhile
+                if error.errno in _TAKEN:
+                    raise _exists(target) from None
+                raise
 
 
 @contextmanager
@@ -120,8 +114,7 @@ class Unfinished:
     def begin(cls, target: Path, info: Mapping[str, Any]) -> Self:
         """Return a new folder, whose mark holds `info`. Raises OSError where there is no room."""
         target.parent.mkdir(parents=True, exist_ok=True)
-        path = _beside(target)
-        path.mkdir()
+        path = _created_folder(target)
         with _undone(lambda: shutil.rmtree(path)):
             file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
             with _undone(lambda: os.close(file)):
@@ -260,6 +253,12 @@ def _exists(target: str | Path) -> InputError:
 def _beside(target: Path) -> Path:
     """Return a random name in the target's folder."""
     return target.with_name(f".{target.name}.{secrets.token_hex(8)}{target.suffix}")
+
+
+def _created_folder(target: Path) -> Path:
+    building = _beside(target)
+    building.mkdir()
+    return building
 
 
 def _created(target: Path) -> Path:

@@ -1,7 +1,7 @@
 """`posefit track`, `fit` and `extract`."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -112,7 +112,7 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
 
-    how = extraction_of(options, video, lambda _: settings)
+    how = extraction_of(options, video, settings)
     result = run(video, out, how, frames=frames, progress=progress)
     for warning in result["warnings"]:
         say(f"warning: {warning}")
@@ -131,25 +131,18 @@ def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     from posefit.tracking.options import TrackOptions
 
     source = options["source"] = options["source"] or ("walk",)
-    texts = options["settings"]
-
-    def of_segmenter(name: str) -> list[str]:
-        mine = [text for text in texts if text.partition(".")[0] == name]
-        options["settings"] = tuple(text for text in texts if text not in mine)
-        return mine
-
-    options["extraction"] = extraction_of(options, source[0], of_segmenter)
+    options["extraction"] = extraction_of(options, source[0])
     if left_out := options.pop("without_subject"):
         chosen = TrackOptions(**{name: options[name] for name in ("method", "settings", "train")})
         options["train"] = without_subjects(resolved(source[0], chosen).train, left_out)
     return options
 
 
-def extraction_of(options: dict[str, Any], source: str, settings: Callable[[str], Sequence[str]] = lambda _: ()) -> Any:
+def extraction_of(options: dict[str, Any], source: str, settings: Sequence[str] | None = None) -> Any:
     """Return how the person is taken out of a video, by options that are taken out of them; None by default.
 
-    `settings` returns the texts of a segmenter's settings by its name. Raises InputError where the options are given
-    for another kind of source.
+    `settings` are texts of the segmenter's settings; without them, those of `options` that begin with its name. Raises
+    InputError where the options are given for another kind of source.
     """
     from posefit.footage.segmentation import Extraction, segmenter_name
     from posefit.footage.source import kind_of, useless_for
@@ -165,8 +158,12 @@ def extraction_of(options: dict[str, Any], source: str, settings: Callable[[str]
     if "extraction" in given:
         given["method"] = given.pop("extraction")
     name = segmenter_name(given.get("method"), given.get("background"))
-    if texts := settings(name):
-        given["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, texts)
+    if settings is None and "settings" in options:
+        texts = options["settings"]
+        settings = [text for text in texts if text.partition(".")[0] == name]
+        options["settings"] = tuple(text for text in texts if text not in settings)
+    if settings:
+        given["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, settings)
     return Extraction(**given) if given else None
 
 

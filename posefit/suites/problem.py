@@ -75,15 +75,15 @@ class Problem:
         infeasible: Infeasible = "repair",
         budget: int | None = None,
         seconds: float | None = None,
-        index: int = 0,
     ) -> None:
         one_of("infeasible", infeasible, INFEASIBLE)
         if budget is not None:
             whole("budget", budget, 1)
         if seconds is not None:
             positive("seconds", seconds)
-        self.suite, self.function, self.made, self.index = suite, function, made, index
+        self.suite, self.function, self.made = suite, function, made
         self.infeasible, self.budget, self._limit = infeasible, budget, seconds
+        self.index = 0  # in a `Suite`
         self.id_function = function.number
         self.instance = self.id_instance = made.number
         self.dimension = self.number_of_variables = d = len(made.truth)
@@ -272,7 +272,8 @@ class Suite:
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
         self.passed_over = tuple(one for one in chosen if not set(dimensions) & set(one.dimensions))
-        self.name, self._infeasible, self._budget, self._seconds = name, infeasible, budget, seconds
+        self.name = name
+        self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget, "seconds": seconds}
         self._addresses = [
             checked_address(name, one.number, instance, dimension)
             for dimension, one, instance in product(dimensions, chosen, instances)
@@ -291,16 +292,9 @@ class Suite:
         return len(self._addresses)
 
     def __getitem__(self, index: int) -> Problem:
-        function, instance, dimension = self._addresses[index]
-        return Problem(
-            self.name,
-            suite_function(function),
-            suite_instance(function, instance, dimension),
-            infeasible=self._infeasible,
-            budget=self._budget,
-            seconds=self._seconds,
-            index=index % len(self),
-        )
+        problem = suite(self.name, *self._addresses[index], **self._options)
+        problem.index = index % len(self)
+        return problem
 
     def __iter__(self) -> Iterator[Problem]:
         return (self[index] for index in range(len(self)))

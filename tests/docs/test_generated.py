@@ -9,12 +9,11 @@ from typing import Any
 import generator
 import pytest
 from click.testing import CliRunner
-from generator import angles, commands, environments, equations, figures, joints, python, settings
+from generator import angles, commands, equations, figures, settings
 from generator.prose import restructured, shortened
 
 from posefit import track
 from posefit.cli import main
-from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
 from posefit.registry import KINDS, registry
@@ -89,11 +88,6 @@ def test_every_equation_has_a_line_and_a_test() -> None:
     assert [name for name, tag in tags.items() if not equations.tests_of(tag)] == []
 
 
-def test_every_joint_is_described() -> None:
-    assert len(re.findall(r"^\| \d+ \| `", joints.page(), re.MULTILINE)) == len(JOINTS)
-    assert "| 2 | `lfemur` | left knee | `left_knee` | `lhipjoint` |" in joints.page()
-
-
 def test_every_angle_is_described(tracked: Path) -> None:
     head = (tracked / "angles.csv").read_text("utf-8").splitlines()[0].split(",")
     assert head == ["frame", "seconds", *COLUMNS]
@@ -109,17 +103,6 @@ def test_what_is_made_from_the_code_is_up_to_date() -> None:
         name for name, text in generator.pages().items() if (DOCS / name).read_text("utf-8").split() != text.split()
     ]
     assert stale == [], "python docs/generator writes them"
-
-
-def test_every_environment_has_a_page() -> None:
-    assert list(environments.pages()) == ["FitImage-v0", "FitState-v0", "Track-v0", "Configure-v0", "Modes-v0"]
-
-
-def test_every_module_with_a_docstring_has_a_page() -> None:
-    pages = python.pages()
-    assert ".. automodule:: posefit.fitting.optimiser\n" in pages["posefit.fitting"]
-    assert ".. automodule:: posefit_pycma\n" in pages["posefit_pycma"]
-    assert ".. automodule:: posefit.hooks\n" in pages["posefit"]
 
 
 def test_a_plan_is_described_with_every_field_list_and_corruption() -> None:
