@@ -22,7 +22,6 @@ from typing import Literal
 
 import numpy as np
 
-from c3d_points import read_c3d
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import Range, existing

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from c3d_points import read_c3d
 from footage_figures import SINGLE, TALL, Choice, figures, filmed_scene, footage_report
 from footage_sets import POINTS, errors_mm, films_in, read_c3d, recording_of, virtual_points
 from posefit.arrays import Array
