@@ -22,7 +22,7 @@ import pytest
 from posefit.report.live import LOOPBACK, Handler, LivePage, Progress, address_of, progress_of, serving
 from posefit.sweep.driver import Driver, Lease
 from posefit.sweep.ledger import PLANS, Ledger
-from tests.cli.test_command_line import fails, run
+from tests.commands import error_of, run
 from tests.report.browser import browser, data_in, ledger, opened, result
 from tests.sweep.fake import cells
 
@@ -179,7 +179,7 @@ def test_serving_waits_for_a_ledger_that_a_sweep_is_about_to_begin(
 def test_a_taken_port_is_refused(begun: Path) -> None:
     with socket.create_server((LOOPBACK, 0)) as taken:
         port = taken.getsockname()[1]
-        assert f"--port must be one that is free, got {port}: " in fails("report", begun, "--serve", "--port", port)
+        assert f"--port must be one that is free, got {port}: " in error_of("report", begun, "--serve", "--port", port)
 
 
 def test_ctrl_c_ends_it_with_status_0_after_one_line_with_the_address(begun: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from posefit.report.repeat import repeat_command
 from posefit.sweep.ledger import Ledger
-from tests.cli.test_command_line import run
+from tests.commands import run
 from tests.report.browser import EVIL, ledger, opened, result, sure
 from tests.report.searched import cell, problems, search_result, searched
 from tests.sweep.fake import cells

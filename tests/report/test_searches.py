@@ -16,7 +16,7 @@ from posefit.report.repeat import repeat_command
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import search_cells
-from tests.cli.test_command_line import fails, run
+from tests.commands import error_of, run
 from tests.report.browser import data_in, ledger, result
 from tests.report.contests import FIRST, contest_in, sentence
 from tests.report.searched import cell, problems, search_result, searched
@@ -121,7 +121,7 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     status, text = page_of(results)  # of a sweep that is still running
     assert (status, data_in(text)["live"]["done"]) == (200, 12)
     for name, message in (("figures", "got one of single searches"), ("iohprofiler", "posefit suite table ")):
-        mistake = fails("report", results, f"--{name}", tmp_path / "new")
+        mistake = error_of("report", results, f"--{name}", tmp_path / "new")
         assert f"--{name} must be given with a sweep of tracks" in mistake
         assert message in mistake
     assert not (tmp_path / "new").exists()
@@ -140,6 +140,6 @@ def test_a_ledger_of_tracks_and_searches_is_refused(tmp_path: Path) -> None:
         ledger(tmp_path / "a", [result(FIRST, 1.0)], [(search, ["no"])]),
         ledger(tmp_path / "b", [search_result(search, 3)], [(FIRST, ["no"])]),
     ):
-        message = fails("report", path, "--out", tmp_path / "page.html")
+        message = error_of("report", path, "--out", tmp_path / "page.html")
         assert "expected a ledger of tracks or one of single searches, got both in one" in message
         assert not (tmp_path / "page.html").exists()

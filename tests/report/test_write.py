@@ -16,7 +16,7 @@ from posefit.report.content import data_of
 from posefit.report.page import MARK
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
-from tests.cli.test_command_line import fails, run
+from tests.commands import error_of, run
 from tests.report.browser import data_in, ledger, result, sure
 from tests.report.contests import FIRST, full
 
@@ -182,7 +182,7 @@ def test_mistakes_are_one_line_and_write_nothing(
     before = sorted(tmp_path.rglob("*"))
     for words, message in MISTAKES:
         arguments = [word if re.match(r"--|\d", word) else tmp_path / word for word in words.split()]
-        assert message in fails("report", *arguments), words
+        assert message in error_of("report", *arguments), words
         assert sorted(tmp_path.rglob("*")) == before, words
     assert (tmp_path / "OTHER.html").read_text() == "<p>mine</p>"
 

@@ -10,7 +10,7 @@ from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from tests.cases import each
-from tests.cli.test_command_line import fails, run
+from tests.commands import error_of, run
 from tests.sweep.fake import failed
 
 PLAN = """
@@ -136,7 +136,7 @@ def test_mistakes_are_one_line_and_write_nothing(
         monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     (tmp_path / "bad.toml").write_text("[defaults]\nframe = 3\n")
     places = {"PLAN": plan, "OUT": tmp_path / "out", "BAD": tmp_path / "bad.toml"}
-    assert message in fails("sweep", *(places.get(word, word) for word in words))
+    assert message in error_of("sweep", *(places.get(word, word) for word in words))
     assert not (tmp_path / "out").exists()
 
 
@@ -144,5 +144,5 @@ def test_without_distributed_dask_says_what_to_install(
     plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    line = fails("sweep", plan, "--out", tmp_path / "out", "--dask-local", 2)
+    line = error_of("sweep", plan, "--out", tmp_path / "out", "--dask-local", 2)
     assert line.endswith("python -m pip install 'posefit[dask]'")
