@@ -11,7 +11,7 @@ from posefit.fitting.check import whole
 from posefit.niching import LEVELS_MM, MIN_PROBABILITY, SIZE, NicheInstance, niche_instance, niche_space, scored
 from posefit.silhouette.cost import project
 from posefit.uncertainty.modes import Posterior
-from posefit_envs.base import NOT_BEGUN, ActionValidator, Infos, RenderedEnv
+from posefit_envs.base import ENDED, NOT_BEGUN, ActionValidator, Infos, RenderedEnv
 from posefit_envs.instance import ArgumentError, Image, backdrop, checked, instance_number, world_of
 from posefit_envs.rendering import Picture, render_frame
 
@@ -114,7 +114,7 @@ class ModesEnv(RenderedEnv):
         """Propose a pose, and report it where the last number is above 0."""
         posed = self._current()
         if self._ended:
-            raise error.ResetNeeded("the episode has ended: reset before the next step")
+            raise error.ResetNeeded(ENDED)
         action = self._validator.check(action, self.action_space.shape or ())
         before = np.mean(self._peak_ratio)
         self._propose(posed, action[:-1], float(action[-1]))
