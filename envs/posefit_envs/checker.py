@@ -10,6 +10,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from posefit_envs.base import row_of
 
+FINAL = ("final_obs", "final_info")
+
 
 def check_vector_env(
     vector: VectorEnv[Any, Any, Any], make: Callable[[], gym.Env[Any, Any]], steps: int = 50, seed: int = 0
@@ -31,45 +33,37 @@ def check_vector_env(
     assert observations in vector.observation_space, "reset must return observations of the observation space"
     for i, single in enumerate(singles):
         observation, info = single.reset(seed=seed + i)
-        _same(f"environment {i}, reset: observation", row_of(observations, i), observation)
-        _same_info(f"environment {i}, reset", infos, info, i)
+        own = {"observation": row_of(observations, i), "info": _info(infos, i)}
+        _same(f"environment {i}, reset:", own, {"observation": observation, "info": info})
     ended = np.zeros(n, dtype=bool)
     vector.action_space.seed(seed)
     for step in range(steps):
         actions = vector.action_space.sample()
-        returned = (observations, infos), copy.deepcopy((observations, infos))
+        before, kept = (observations, infos), copy.deepcopy((observations, infos))
         observations, rewards, terminated, truncated, infos = vector.step(actions)
         assert observations in vector.observation_space, f"step {step}: observations must lie in the observation space"
-        _same_later(f"step {step}", *returned)
+        _same(f"step {step}: the observations before it", before[0], kept[0])
+        for key in [key for key in kept[1] if not key.startswith(("final_", "_final_"))]:  # a reset replaces those
+            _same(f"step {step}: the info {key} before it", before[1][key], kept[1][key])
         for i, single in enumerate(singles):
-            where = f"environment {i}, step {step}"
             if ended[i]:  # NEXT_STEP: this step resets, and its action is ignored
                 observation, info = single.reset()
                 reward, ends, cut = 0.0, False, False
             else:
                 observation, reward, ends, cut, info = single.step(actions[i])  # type: ignore[assignment]
+            own, expected = {}, {}
             if mode == AutoresetMode.SAME_STEP and (ends or cut):
-                _same(f"{where}: final observation", infos["final_obs"][i], observation)
-                _same_info(f"{where}: final info", infos["final_info"], info, i)
+                own = {"final": infos["final_obs"][i], "final info": _info(infos["final_info"], i)}
+                expected = {"final": observation, "final info": info}
                 observation, info = single.reset()
-            _same(f"{where}: observation", row_of(observations, i), observation)
-            _same(f"{where}: reward", rewards[i], reward)
-            _same(f"{where}: terminated", terminated[i], ends)
-            _same(f"{where}: truncated", truncated[i], cut)
-            _same_info(where, infos, info, i)
+            own |= {"observation": row_of(observations, i), "reward": rewards[i]}
+            own["info"] = _info(infos, i)
+            expected |= {"observation": observation, "reward": reward, "info": info}
+            own |= {"terminated": terminated[i], "truncated": truncated[i]}
+            _same(f"environment {i}, step {step}:", own, expected | {"terminated": ends, "truncated": cut})
             ended[i] = (ends or cut) and mode == AutoresetMode.NEXT_STEP
-    vector.close()
-    vector.close()
-    for single in singles:
-        single.close()
-
-
-def _same_later(where: str, now: Any, before: Any) -> None:
-    """Compare the observations and infos of the step before with their copies."""
-    _same(f"{where}: the observations before it", now[0], before[0])
-    for key, value in before[1].items():
-        if not key.startswith(("final_", "_final_")):  # objects, which a reset replaces
-            _same(f"{where}: the info {key} before it", now[1][key], value)
+    for one in (vector, vector, *singles):
+        one.close()
 
 
 def _same(where: str, own: Any, expected: Any) -> None:
@@ -81,9 +75,6 @@ def _same(where: str, own: Any, expected: Any) -> None:
     assert np.array_equal(np.asarray(own), np.asarray(expected)), f"{where} must be {expected}, got {own}"
 
 
-def _same_info(where: str, infos: dict[str, Any], info: dict[str, Any], i: int) -> None:
-    masks = {key: np.asarray(infos[f"_{key}"]) for key in infos if f"_{key}" in infos}
-    present = {key for key, mask in masks.items() if mask[i] and key not in ("final_obs", "final_info")}
-    assert present == set(info), f"{where}: info must have {sorted(info)}, got {sorted(present)}"
-    for key, value in info.items():
-        _same(f"{where}: info {key}", infos[key][i], value)
+def _info(infos: dict[str, Any], i: int) -> dict[str, Any]:
+    """Return what the masks of infos say that environment i has."""
+    return {key: infos[key][i] for key in infos if f"_{key}" in infos and infos[f"_{key}"][i] and key not in FINAL}

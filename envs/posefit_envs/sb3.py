@@ -40,17 +40,12 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             super().__init__(vector.num_envs, vector.single_observation_space, vector.single_action_space)
 
         def reset(self) -> Any:
-            observations, infos = vector.reset(seed=self._seed_list(), options=self._one_for_all())
+            seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
+            observations, infos = vector.reset(seed=seeds, options=self._options[0] or None)
             self.reset_infos = [_row(infos, i) for i in range(self.num_envs)]
             self._reset_seeds()
             self._reset_options()
             return observations
-
-        def _seed_list(self) -> Any:
-            return None if all(seed is None for seed in self._seeds) else list(self._seeds)
-
-        def _one_for_all(self) -> Any:
-            return self._options[0] or None
 
         def step_async(self, actions: Any) -> None:
             self._actions = actions
@@ -109,9 +104,9 @@ def _mixed(mask: Any, chosen: Any, others: Any) -> Any:
 
 
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:
-    """Return the info of one environment."""
+    """Return the info of environment i, of infos with their masks."""
     return {
-        key: values[i]
-        for key, values in infos.items()
-        if not key.startswith("_") and np.asarray(infos.get(f"_{key}", np.ones(i + 1, dtype=bool)))[i]
+        name: values[i]
+        for name, values in infos.items()
+        if not name.startswith("_") and np.asarray(infos.get(f"_{name}", np.ones(i + 1, dtype=bool)))[i]
     }

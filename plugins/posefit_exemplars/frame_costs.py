@@ -7,7 +7,7 @@ from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs
-from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 
 SMALL = 40  # pixels: no side of a small picture is shorter
 FACTORS = (4, 2, 1)

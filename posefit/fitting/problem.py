@@ -23,8 +23,7 @@ from posefit.silhouette.cost import (
     mean_over_views,
     pose_costs,
 )
-from posefit.silhouette.mask import Silhouette
-from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
 from posefit.silhouette.sharing import parts_of, work_through
 
 
@@ -79,7 +78,7 @@ class PoseProblem:
     def coarser(self, factor: int) -> "PoseProblem":
         """Return the same problem on every `factor`th pixel of every `factor`th row; made once.
 
-        It has the same space, and a proposal means the same pose. See `posefit.silhouette.pyramid`.
+        It has the same space, and a proposal means the same pose. See `posefit.silhouette.mask`.
         """
         if factor not in self._coarser:
             self._coarser[factor] = replace(

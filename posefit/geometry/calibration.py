@@ -4,7 +4,7 @@ A file holds one camera or several. All give camera_from_world in OpenCV's frame
 differs, and is turned to +y here: the axis that the images of all cameras see pointing up, unless `up` names one.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -139,45 +139,38 @@ def _own(path: Path, _: str) -> list[Calibration]:
 
 
 def _toml(_: Path, text: str) -> list[Calibration]:
-    calibrations: list[Calibration] = []
-    for name, camera in parsed_toml(text).items():
-        if name == "metadata" or not isinstance(camera, dict):
-            continue
-        rotation = _turned(camera["rotation"]) if "rotation" in camera else None
-        translation = _numbers(camera["translation"], (3,)) if "translation" in camera else None
-        calibrations.append(
-            Calibration(
-                str(camera.get("name", name)),
-                _size(*camera["size"]),
-                _numbers(camera["matrix"], (3, 3)),
-                _distortion(camera.get("distortions", [])),
-                rotation,
-                translation,
-                bool(camera.get("fisheye", False)),
-            )
+    return [
+        _stated(
+            str(camera.get("name", name)),
+            camera["size"],
+            camera["matrix"],
+            camera.get("distortions", []),
+            camera.get("rotation"),
+            camera.get("translation"),
+            bool(camera.get("fisheye", False)),
         )
-    return calibrations
+        for name, camera in parsed_toml(text).items()
+        if name != "metadata" and isinstance(camera, dict)
+    ]
 
 
 def _qualisys(_: Path, text: str) -> list[Calibration]:
-    root = xml_of(text)
     calibrations: list[Calibration] = []
-    for camera in root.iter("camera"):
+    for number, camera in enumerate(xml_of(text).iter("camera")):
         view, lens, place = (_tag(camera, name) for name in ("fov_video", "intrinsic", "transform"))
         left, top, right, bottom = (float(view.get(side, "")) for side in ("left", "top", "right", "bottom"))
         focal, centre = (
             np.array([float(lens.get(f"{name}{axis}", "")) / SUBPIXELS for axis in "UV"])
             for name in ("focalLength", "centerPoint")
         )
-        matrix = _pinhole(focal, centre - (left, top))
         names = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
-        distortion = np.array([float(lens.get(name, "0")) for name in (*names, "radialDistortion3")])
+        distortion = [float(lens.get(name, "0")) for name in (*names, "radialDistortion3")]
         turned = np.array([[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"])
         rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
         position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0
-        size = _size(right - left + 1, bottom - top + 1)
-        name = camera.get("serial", f"camera {len(calibrations)}")
-        calibrations.append(Calibration(name, size, matrix, distortion, rotation, -rotation @ position))
+        size, matrix = (right - left + 1, bottom - top + 1), _pinhole(focal, centre - (left, top))
+        name = camera.get("serial", f"camera {number}")
+        calibrations.append(_stated(name, size, matrix, distortion, rotation, -rotation @ position))
     return calibrations
 
 
@@ -190,64 +183,55 @@ def _tag(camera: Any, name: str) -> Any:
 
 def _opencv(path: Path, text: str) -> list[Calibration]:
     values = stored_values(text)
-    matrix = _matrix(values, "camera_matrix", "cameraMatrix", "K", "M")
-    width, height = (_named(values, f"image_{name.lower()}", f"image{name}") for name in ("Width", "Height"))
-    if matrix is None or width is None or height is None:
+
+    def matrix(*names: str) -> Array | None:
+        return next((matrix_of(values[name]) for name in names if name in values), None)
+
+    own = matrix("camera_matrix", "cameraMatrix", "K", "M")
+    size = [values.get(f"image_{name.lower()}", values.get(f"image{name}")) for name in ("Width", "Height")]
+    if own is None or None in size:
         raise InputError("one without camera_matrix, image_width and image_height")
-    distortion = _matrix(values, "distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
-    rotation = _matrix(values, "R", "rotation", "rvec")
-    translation = _matrix(values, "T", "translation", "tvec")
-    if rotation is not None and rotation.size == 3:
-        rotation = _turned(rotation.reshape(3))
+    distortion = matrix("distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
+    rotation, translation = matrix("R", "rotation", "rvec"), matrix("T", "translation", "tvec")
     if (rotation is None) != (translation is None):
         raise InputError("one with a rotation or a translation, but not both")
-    return [
-        Calibration(
-            path.stem,
-            _size(number_of(width), number_of(height)),
-            _numbers(matrix, (3, 3)),
-            _distortion([] if distortion is None else distortion),
-            None if rotation is None else _numbers(rotation, (3, 3)),
-            None if translation is None else _numbers(translation.reshape(-1), (3,)),
-        )
-    ]
+    if rotation is not None and rotation.size == 3:
+        rotation = rotation.reshape(3)
+    if translation is not None:
+        translation = translation.reshape(-1)
+    sides = [number_of(side) for side in size]
+    return [_stated(path.stem, sides, own, [] if distortion is None else distortion, rotation, translation)]
 
 
-def _named(values: Mapping[str, Any], *names: str) -> Any:
-    """Return the first value that has one of these names, or None."""
-    return next((values[name] for name in names if name in values), None)
-
-
-def _matrix(values: Mapping[str, Any], *names: str) -> Array | None:
-    value = _named(values, *names)
-    return None if value is None else matrix_of(value)
-
-
-def _turned(vector: Any) -> Array:
-    """Return the rotation (3, 3) that a vector (3,) stands for: its axis, and as long as its angle."""
-    return np.asarray(cv2.Rodrigues(_numbers(vector, (3,)))[0], dtype=np.float64)
-
-
-def _distortion(values: Any) -> Array:
-    """Return OpenCV's numbers of a lens; none, or any number of zeros, is no distortion."""
-    numbers = np.array(values, dtype=np.float64).reshape(-1)
-    if not np.isfinite(numbers).all():
+def _stated(
+    name: str, size: Any, matrix: Any, distortion: Any, rotation: Any, translation: Any, fisheye: bool = False
+) -> Calibration:
+    """Return what a file states, checked; a rotation (3,) is its axis, as long as its angle."""
+    width, height = size
+    if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
+        raise InputError(f"an image size of {width} x {height}")
+    lens = np.array(distortion, dtype=np.float64).reshape(-1)
+    if not np.isfinite(lens).all():
         raise InputError("a distortion that is not finite")
-    if not numbers.any():
-        return np.zeros(4)
-    if numbers.size not in DISTORTIONS:
-        raise InputError(f"a distortion of {numbers.size} numbers")
-    return numbers
+    if not lens.any():
+        lens = np.zeros(4)
+    elif lens.size not in DISTORTIONS:
+        raise InputError(f"a distortion of {lens.size} numbers")
+    if np.shape(rotation) == (3,):
+        rotation = cv2.Rodrigues(_numbers(rotation, (3,)))[0]
+    return Calibration(
+        name,
+        (int(width), int(height)),
+        _numbers(matrix, (3, 3)),
+        lens,
+        None if rotation is None else _numbers(rotation, (3, 3)),
+        None if translation is None else _numbers(translation, (3,)),
+        fisheye,
+    )
 
 
 def _pinhole(focal: Array, centre: Array) -> Array:
     return np.array([[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]])
-
-
-def _size(width: Any, height: Any) -> tuple[int, int]:
-    if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
-        raise InputError(f"an image size of {width} x {height}")
-    return int(width), int(height)
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> Array:

@@ -31,39 +31,30 @@ def stored_values(text: str) -> dict[str, Any]:
 
 
 def matrix_of(value: Any) -> Array:
-    """Return a matrix, its channels last where it has several. Raises ValueError where it is none, or contradictory."""
-    stated = value if isinstance(value, dict) and "data" in value else {}
-    sides = [stated["rows"], stated["cols"]] if {"rows", "cols"} <= stated.keys() else stated.get("sizes")
-    if sides is None:
-        return numbers_of(value)
-    shape = tuple(_count(side) for side in (sides if isinstance(sides, list) else [sides])[:4])
-    match = _TYPE.fullmatch(str(stated.get("dt", "d")))
-    if match is None:
-        raise InputError(f"a matrix of the type {quoted(stated['dt'])}")
-    channels = int(match[1] or 1)
-    numbers = numbers_of(stated["data"])
-    shape = shape if channels == 1 else (*shape, channels)
-    if numbers.size != math.prod(shape):
-        raise InputError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
-    if match[2] in _ROUNDED:
-        numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
-    return numbers.reshape(shape)
-
-
-def numbers_of(value: Any) -> Array:
-    """Return numbers, or lists of lists of them, as an array. Raises ValueError where they are none, or too many."""
-    if isinstance(value, str):
-        value = value[: 40 * NUMBERS].split()
-    rows = value if isinstance(value, list) else [value]
+    """Return a matrix, or numbers in one row. Raises ValueError where there are none, too many, or another number."""
+    stated = value if isinstance(value, dict) and "data" in value else {"data": value}
+    listed = stated["data"][: 40 * NUMBERS].split() if isinstance(stated["data"], str) else stated["data"]
+    rows = listed if isinstance(listed, list) else [listed]
     flat = [
-        number for row in rows[: NUMBERS + 1] for number in (row[: NUMBERS + 1] if isinstance(row, list) else [row])
+        number for row in rows[: NUMBERS + 1] for number in (row if isinstance(row, list) else [row])[: NUMBERS + 1]
     ]
     if len(flat) > NUMBERS:
         raise InputError(f"a matrix of more than {NUMBERS} numbers")
     numbers = np.array([number_of(number) for number in flat], dtype=np.float64)
-    if rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows):
-        return numbers.reshape(len(rows), -1)
-    return numbers
+    match = _TYPE.fullmatch(str(stated.get("dt", "d")))
+    if match is None:
+        raise InputError(f"a matrix of the type {quoted(stated['dt'])}")
+    if match[2] in _ROUNDED:
+        numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
+    sides = [stated["rows"], stated["cols"]] if {"rows", "cols"} <= stated.keys() else stated.get("sizes")
+    if sides is None:
+        even = rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows)
+        return numbers.reshape(len(rows), -1) if even else numbers
+    shape = [_count(side) for side in (sides if isinstance(sides, list) else [sides])[:4]]
+    shape += [int(match[1])] if match[1] else []  # channels
+    if numbers.size != math.prod(shape):
+        raise InputError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
+    return numbers.reshape(shape)
 
 
 def number_of(value: Any) -> float:

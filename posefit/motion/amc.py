@@ -15,9 +15,9 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
-from posefit.motion.asf import LARGEST, METRES_PER_UNIT, checked_unit, lines_of, mistake, parse_asf
+from posefit.motion.asf import METRES_PER_UNIT, checked_unit, lines_of, mistake, parse_asf, shown, values_of
 from posefit.motion.motion import LONGEST, Motion
-from posefit.reading import SHOWN, check_size, cut
+from posefit.reading import check_size
 
 FPS = 120.0  # CMU's rate; the files do not state it
 SIZE_LIMIT = 500_000_000  # bytes
@@ -85,9 +85,9 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
         span = spans.get(word)
         if span is not None and frame >= 0:
             if word in bones_read:
-                raise mistake(path, number, f"each bone once in frame {frame}", f"{_quoted(word)} again")
+                raise mistake(path, number, f"each bone once in frame {frame}", f"{shown(word)} again")
             bones_read.add(word)
-            row[span[0] : span[1]] = _numbers(path, number, words, span[1] - span[0])
+            row[span[0] : span[1]] = values_of(path, number, words, span[1] - span[0])
         elif len(words) == 1 and word.isdigit() and len(word) < 10:
             if radians is None:
                 raise mistake(path, number, ":DEGREES or :RADIANS before the first frame", f"frame {int(word)}")
@@ -104,13 +104,13 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
         elif frame < 0 and word.startswith(b":"):
             keyword = word.upper()
             if keyword not in (b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"):
-                raise mistake(path, number, ":FULLY-SPECIFIED, :DEGREES or :RADIANS", _quoted(raw))
+                raise mistake(path, number, ":FULLY-SPECIFIED, :DEGREES or :RADIANS", shown(raw))
             if keyword != b":FULLY-SPECIFIED":
                 radians = keyword == b":RADIANS"
         elif frame < 0:
-            raise mistake(path, number, "a header such as :DEGREES or the number of a frame", _quoted(raw))
+            raise mistake(path, number, "a header such as :DEGREES or the number of a frame", shown(raw))
         else:
-            raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", _quoted(raw))
+            raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", shown(raw))
     if frame < 0:
         raise mistake(path, max(number, 1), "at least one frame", "the end of the file")
     _check_whole(path, number, spans, bones_read, frame, "the end of the file")
@@ -118,27 +118,10 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
     return np.array(data).reshape(-1, width), bool(radians)
 
 
-def _numbers(path: Path, number: int, words: list[bytes], count: int) -> list[float]:
-    if len(words) != count + 1:
-        raise mistake(path, number, f"{count} values for {_quoted(words[0])}", f"{len(words) - 1}")
-    try:
-        values = [float(word) for word in words[1:]]
-    except ValueError:
-        raise mistake(path, number, f"numbers for {_quoted(words[0])}", _quoted(b" ".join(words[1:]))) from None
-    if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
-        expected = f"finite numbers below {LARGEST:g} for {_quoted(words[0])}"
-        raise mistake(path, number, expected, _quoted(b" ".join(words[1:])))
-    return values
-
-
 def _check_whole(path: Path, number: int, spans: Spans, bones_read: set[bytes], frame: int, came: str) -> None:
     if len(bones_read) < len(spans):
         missing = next(bone for bone in spans if bone not in bones_read)
-        raise mistake(path, number, f"bone {_quoted(missing)} in frame {frame}", came)
-
-
-def _quoted(raw: bytes) -> str:
-    return repr(cut(raw.strip()[: 4 * SHOWN].decode("utf-8", errors="replace")))
+        raise mistake(path, number, f"bone {shown(missing)} in frame {frame}", came)
 
 
 def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METRES_PER_UNIT) -> None:

@@ -1,9 +1,10 @@
 """Acclaim skeletons (.asf): read into a `Skeleton`, and written from one."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,6 +44,25 @@ def checked_unit(metres_per_unit: float) -> float:
     return float(metres_per_unit)
 
 
+def shown(*words: bytes | str) -> str:
+    """Return words of a file as a message quotes them."""
+    texts = (word if isinstance(word, str) else word[: 4 * SHOWN].decode("utf-8", errors="replace") for word in words)
+    return repr(cut(" ".join(texts).strip()))
+
+
+def values_of(path: Path, number: int, words: Sequence[Any], count: int) -> list[float]:
+    """Return the numbers of a line after its first word. Raises ValueError where they are not so many small ones."""
+    if len(words) != count + 1:
+        raise mistake(path, number, f"{count} values for {shown(words[0])}", f"{len(words) - 1}")
+    try:
+        values = [float(word) for word in words[1:]]
+    except ValueError:
+        raise mistake(path, number, f"numbers for {shown(words[0])}", shown(*words[1:])) from None
+    if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
+        raise mistake(path, number, f"finite numbers below {LARGEST:g} for {shown(words[0])}", shown(*words[1:]))
+    return values
+
+
 @dataclass(frozen=True)
 class _Line:
     path: Path
@@ -56,21 +76,11 @@ class _Line:
     def mistake(self, expected: str, got: str | None = None) -> InputError:
         return mistake(self.path, self.number, expected, repr(" ".join(self.words)) if got is None else got)
 
-    def numbers(self, count: int, more: int = 0) -> list[float]:
-        """Return the numbers after the keyword, which `more` other words follow."""
-        if len(self.words) != 1 + count + more:
-            raise self.mistake(f"'{self.key}' and {count + more} values")
-        try:
-            values = [float(word) for word in self.words[1 : 1 + count]]
-        except ValueError:
-            raise self.mistake(f"'{self.key}' and {count} numbers") from None
-        if not sum(map(abs, values)) < LARGEST:
-            raise self.mistake(f"'{self.key}' and finite numbers below {LARGEST:g}")
-        return values
+    def numbers(self, count: int) -> list[float]:
+        return values_of(self.path, self.number, self.words, count)
 
 
-@dataclass(frozen=True)
-class _Bone:
+class _Bone(NamedTuple):
     vector: Array  # (3,) file units
     axis: Array  # (3,) radians
     free: tuple[str, ...]
@@ -155,19 +165,14 @@ def _units(lines: list[_Line]) -> tuple[float, bool]:
 
 
 def _check_root(lines: list[_Line]) -> None:
-    has_order = False
+    wanted = {"order": " ".join(ROOT_CHANNELS), "axis": "XYZ"}
     for line in lines[1:]:
-        values = tuple(word.upper() for word in line.words[1:])
-        if line.key == "order":
-            has_order = True
-            if values != ROOT_CHANNELS:
-                raise line.mistake(f"root order {' '.join(ROOT_CHANNELS)}")
-        elif line.key == "axis" and values != ("XYZ",):
-            raise line.mistake("root axis XYZ")
-        elif line.key in ("position", "orientation") and any(line.numbers(3)):
+        if line.key in wanted and " ".join(line.words[1:]).upper() != wanted[line.key]:
+            raise line.mistake(f"root {line.key} {wanted[line.key]}")
+        if line.key in ("position", "orientation") and any(line.numbers(3)):
             raise line.mistake(f"root {line.key} 0 0 0")
-    if not has_order:
-        raise lines[-1].mistake(f"root order {' '.join(ROOT_CHANNELS)}", "none")
+    if all(line.key != "order" for line in lines):
+        raise lines[-1].mistake(f"root order {wanted['order']}", "none")
 
 
 def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
@@ -197,34 +202,26 @@ def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
 
 
 def _bone(block: dict[str, _Line], radians: float) -> _Bone:
-    direction = np.array(block["direction"].numbers(3))
-    (length,) = block["length"].numbers(1)
-    axis = np.array(block["axis"].numbers(3, more=1))
+    direction, (length,) = np.array(block["direction"].numbers(3)), block["length"].numbers(1)
     norm = float(np.linalg.norm(direction))
     if length < 0.0:
         raise block["length"].mistake("a length of 0 or more")
     if length > 0.0 and norm < 1.0 / LARGEST:
         raise block["direction"].mistake("a direction that is not zero")
-    if block["axis"].words[4].upper() != "XYZ":
-        raise block["axis"].mistake("axis order XYZ")
+    axis = block["axis"]
+    if len(axis.words) != 5 or axis.words[4].upper() != "XYZ":
+        raise axis.mistake("axis order XYZ")
+    angles = np.array(replace(axis, words=axis.words[:4]).numbers(3))
     free = tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
     if not set(free) <= {"rx", "ry", "rz"} or sorted(set(free)) != list(free):
         raise block["dof"].mistake("dof out of rx ry rz, in this order")
-    limits = _read_limits(block["limits"], len(free)) * radians if "limits" in block else None
-    return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), axis * radians, free, limits)
-
-
-def _read_limits(line: _Line, free: int) -> Array:
-    """Return (lowest, highest) for each free angle, from words such as `(-160.0 20.0)` on one line or several."""
-    text = " ".join(line.words[1:]).replace("(", " ").replace(")", " ")
-    expected = f"limits (lowest highest) for each of {free} free angles"
-    try:
-        limits = np.array([float(word) for word in text.split()]).reshape(free, 2)
-    except ValueError:
-        raise line.mistake(expected) from None
-    if not (np.abs(limits) < LARGEST).all() or (limits[:, 0] > limits[:, 1]).any():
-        raise line.mistake(f"{expected}, finite and in order")
-    return limits
+    limits = None
+    if "limits" in block:  # (lowest highest) for each free angle, such as `(-160.0 20.0)`, on one line or several
+        words = " ".join(block["limits"].words).replace("(", " ").replace(")", " ").split()
+        limits = np.array(replace(block["limits"], words=words).numbers(2 * len(free))).reshape(-1, 2) * radians
+        if (limits[:, 0] > limits[:, 1]).any():
+            raise block["limits"].mistake("limits (lowest highest) in order")
+    return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), angles * radians, free, limits)
 
 
 def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:

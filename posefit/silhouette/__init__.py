@@ -2,11 +2,10 @@
 
 | looking for | file |
 |---|---|
-| a mask, its unknown pixels, and both as bits | mask.py |
+| a mask, its unknown pixels, both as bits, and at half or quarter size | mask.py |
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
 | drawings put upon one another, compiled | several.py |
 | candidates of limbs, each drawn once, and what their combinations cost | limbs.py |
-| half and quarter size: every second pixel of every second row | pyramid.py |
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
 | a body drawn as spans of bits, compiled | rasteriser.py, lanes.py |
 | its pixels counted against silhouettes, compiled | kernels.py |

@@ -13,7 +13,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.silhouette.cost import BETA, areas, mismatch
-from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
 from posefit.tracking.trajectory import motion_of
 from posefit.uncertainty.calibration import LEVELS

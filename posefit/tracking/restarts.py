@@ -26,7 +26,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion.motion import Motion
-from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
 from posefit.tracking.trajectory import cheaper, effort_of, mean_cost, with_total_effort
 

@@ -10,6 +10,7 @@ from collections import Counter
 import pytest
 
 from posefit.arrays.compiling import in_turn
+from tests.cases import each
 
 # a loop that calls another, one that calls itself, one that calls another twice, one that no type fits, and one that
 # is to become part of others
@@ -76,10 +77,9 @@ assert loops.halved(9) == 3
 
 
 @pytest.fixture
-def start(tmp_path):
-    (tmp_path / "loops.py").write_text(LOOPS, encoding="utf-8")
-
-    def started(script, **variables):
+def start():
+    def started(script, tmp_path, **variables):
+        (tmp_path / "loops.py").write_text(LOOPS, encoding="utf-8")
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0", **variables}
         path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
         return subprocess.Popen(
@@ -110,29 +110,25 @@ ONCE = {
 
 
 def test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all(start, tmp_path):
-    both = [start(ALL), start(ALL)]
+    both = [start(ALL, tmp_path), start(ALL, tmp_path)]
     for one in both:
         assert one.stdout.readline() == "ready\n"
     (tmp_path / "go").touch()
     assert Counter(compiled(both[0]) + compiled(both[1])) == ONCE
     # and nothing of it is lost: a third one finds both signatures of each
-    assert compiled(start(ALL)) == []
+    assert compiled(start(ALL, tmp_path)) == []
 
 
-def test_two_threads_that_need_functions_of_each_other_do_not_wait_for_each_other(start, tmp_path):
-    (tmp_path / "go").touch()
-    script = """
+SCRIPTS = {
+    # two threads that need functions of each other
+    """
 from threading import Thread
 jobs = [Thread(target=loops.outer, args=(np.arange(4.0),)), Thread(target=loops.inner, args=(np.arange(4.0), 1))]
 for job in jobs: job.start()
 for job in jobs: job.join()
-"""
-    assert sorted(compiled(start(script))) == ["inner array(float64, 1d, C)", "outer array(float64, 1d, C)"]
-
-
-def test_a_function_that_cannot_be_compiled_leaves_no_lock_behind(start, tmp_path):
-    (tmp_path / "go").touch()
-    script = """
+""": ["inner array(float64, 1d, C)", "outer array(float64, 1d, C)"],
+    # a function that cannot be compiled leaves no lock behind
+    """
 from numba.core.errors import TypingError
 for _ in range(2):
     try:
@@ -142,8 +138,19 @@ for _ in range(2):
         pass
 from posefit.arrays.compiling import _held
 assert not _held
-"""
-    assert compiled(start(script)) == ["impossible array(float64, 1d, C)"] * 2
+""": ["impossible array(float64, 1d, C)"] * 2,
+    # a number written out in a call is no signature of its own
+    "assert loops.first(np.arange(3.0, 6.0)) == 7.0": ["first array(float64, 1d, C)", "picked array(float64, 1d, C)"],
+    # a function that is inlined is kept as well where Python calls it
+    "assert loops.doubled(2.0) == 4.0": ["doubled float64"],
+}
+
+
+@each(("script", "expected"), SCRIPTS.items())
+def test_each_function_is_compiled_once(start, tmp_path, script, expected):
+    (tmp_path / "go").touch()
+    assert sorted(compiled(start(script, tmp_path))) == expected
+    assert "impossible" in script or compiled(start(script, tmp_path)) == []
 
 
 def test_without_a_folder_for_the_cache_every_process_compiles(start, tmp_path):
@@ -151,27 +158,14 @@ def test_without_a_folder_for_the_cache_every_process_compiles(start, tmp_path):
     (tmp_path / "cache").write_text("a file where the folder should be", encoding="utf-8")
     (tmp_path / "__pycache__").write_text("and here", encoding="utf-8")
     nowhere = {"HOME": str(tmp_path / "cache"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    assert Counter(compiled(start(ALL, **nowhere))) == ONCE
-    assert Counter(compiled(start(ALL, **nowhere))) == ONCE
+    assert Counter(compiled(start(ALL, tmp_path, **nowhere))) == ONCE
+    assert Counter(compiled(start(ALL, tmp_path, **nowhere))) == ONCE
 
 
 def test_a_disk_without_room_for_the_cache_costs_nothing_but_time(start, tmp_path):
     (tmp_path / "go").touch()
     script = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
-    assert Counter(compiled(start(script + ALL))) == ONCE
-
-
-def test_a_function_that_is_inlined_is_kept_as_well_where_python_calls_it(start, tmp_path):
-    (tmp_path / "go").touch()
-    script = "assert loops.doubled(2.0) == 4.0"
-    assert compiled(start(script)) == ["doubled float64"]
-    assert compiled(start(script)) == []
-
-
-def test_a_number_written_out_in_a_call_is_no_signature_of_its_own(start, tmp_path):
-    (tmp_path / "go").touch()
-    script = "assert loops.first(np.arange(3.0, 6.0)) == 7.0"
-    assert Counter(compiled(start(script))) == {"first array(float64, 1d, C)": 1, "picked array(float64, 1d, C)": 1}
+    assert Counter(compiled(start(script + ALL, tmp_path))) == ONCE
 
 
 HOLD = """

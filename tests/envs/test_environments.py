@@ -11,12 +11,9 @@ import pytest
 from gymnasium import error
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env, data_equivalence
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import posefit_envs  # noqa: F401, registers them
 from posefit import SynthesisTracker
-from posefit.silhouette.corruption import CORRUPTIONS
 from posefit_envs.instance import instance
 from tests.cases import each
 
@@ -257,33 +254,3 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))
     env.step(np.full(size, -2.0))  # a second warning would be an error
-
-
-worlds = st.fixed_dictionaries(
-    {
-        "motion": st.sampled_from(["walk", "run", "walk-a"]),
-        "view_degrees": st.sampled_from([0.0, 45.0, 90.0, 200.0, [10.0, 100.0]]),
-        "prior": st.sampled_from(["pca", "full", "union"]),
-        "translation": st.sampled_from(["known", "searched", "aligned"]),
-        "size": st.sampled_from([(36, 36), (64, 48), (50, 70)]),
-        "noise": st.dictionaries(st.sampled_from(sorted(CORRUPTIONS)), st.floats(0.0, 1.0), max_size=5),
-        "mismatch_percent": st.floats(0.0, 20.0),
-        "instance": st.none() | st.integers(0, 19_999),
-    }
-)
-
-
-@settings(max_examples=25, deadline=None)
-@given(worlds, st.integers(0, 1000), st.sampled_from(SEARCHES))
-def test_random_steps_stay_in_their_spaces(arguments: dict[str, Any], seed: int, name: str) -> None:
-    env = gym.make(name, disable_env_checker=True, **arguments)
-    observation, _ = env.reset(seed=seed)
-    env.action_space.seed(seed)
-    for _ in range(60):
-        assert observation in env.observation_space
-        observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
-        assert np.isfinite(float(reward))
-        assert all(np.isfinite(value).all() for value in info.values())
-        if terminated or truncated:
-            observation, _ = env.reset()
-    env.close()

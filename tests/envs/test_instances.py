@@ -5,7 +5,6 @@ import pytest
 
 from posefit.geometry.camera import Camera
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.silhouette.cost import areas, mismatch
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
 from posefit_envs.instance import SPLITS, first_episode, instance, world_of
@@ -65,14 +64,3 @@ def test_each_corruption_changes_the_silhouette_more_the_stronger_it_is(name):
     changed = [(masks({name: strength}) != clean).mean() for strength in (0.1, 0.4, 1.0)]
     assert 0.0 <= changed[0] < changed[1] < changed[2] < 0.5
     assert (masks({name: 0.0}) == clean).all()
-
-
-def test_a_mismatched_body_costs_even_the_true_pose_something():
-    costs = []
-    for percent in (0.0, 10.0):
-        made = instance(world_of(size=(160, 120), mismatch_percent=percent), 3, 1, 10)
-        camera, silhouette = made.task.cameras[0], made.observations[0].silhouettes[0]
-        counts = areas(made.task.body, camera, silhouette, made.truth.poses[:1], made.truth.translations[:1])
-        costs.append(float(mismatch(counts)[0]))
-    assert costs[0] == 0.0
-    assert 1.0 < costs[1] < 30.0

@@ -207,21 +207,6 @@ def test_mistakes_are_named(name: str, d: int) -> None:
         gym.make_vec(name, num_envs=3, colour="red")
 
 
-@each("name", CASES)
-def test_every_environment_has_its_picture(name: str) -> None:
-    vector = gym.make_vec(name, num_envs=2, render_mode="rgb_array")
-    vector.reset(seed=0)
-    pictures: list[Any] = [vector.render()]
-    vector.step(vector.action_space.sample())
-    pictures.append(vector.render())
-    vector.reset(options={"reset_mask": np.array([True, False])})
-    pictures.append(vector.render())
-    for row in range(2):
-        assert (pictures[0][row] != pictures[1][row]).any()
-    assert (pictures[1][0] != pictures[2][0]).any()
-    np.testing.assert_array_equal(pictures[1][1], pictures[2][1])  # it goes on
-
-
 @each(
     ("name", "arguments"),
     [

@@ -58,17 +58,13 @@ def test_a_side_view_is_not_degenerate(yaw: float, pitch: float, roll: float) ->
 
 
 @given(turns, tilts, turns)
-def test_root_angles_come_back(yaw: float, pitch: float, roll: float) -> None:
-    angles = np.array([yaw, pitch, roll])
-    difference = wrapped(root_angles_from_rotation(rotation_from_root_angles(angles)) - angles)
-    np.testing.assert_allclose(difference, 0.0, rtol=0.0, atol=1e-9)
-
-
-@given(turns, tilts, turns)
-def test_joint_angles_come_back(x: float, y: float, z: float) -> None:
-    angles = np.array([x, y, z])
-    difference = wrapped(joint_angles_from_rotation(rotation_from_joint_angles(angles)) - angles)
-    np.testing.assert_allclose(difference, 0.0, rtol=0.0, atol=1e-9)
+def test_angles_come_back(first: float, middle: float, last: float) -> None:
+    angles = np.array([first, middle, last])
+    for there, back in (
+        (rotation_from_root_angles, root_angles_from_rotation),
+        (rotation_from_joint_angles, joint_angles_from_rotation),
+    ):
+        np.testing.assert_allclose(wrapped(back(there(angles)) - angles), 0.0, rtol=0.0, atol=1e-9)
 
 
 @each("roll", [0.0, 0.7, -2.0])

@@ -1,14 +1,18 @@
-"""Kinematics by law and against a slow twin."""
+"""Kinematics by law and against a slow twin; bones and angles of limbs."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from posefit.arrays import Array
 from posefit.geometry.kernels import sines_cosines
+from posefit.geometry.limbs import LIMBS, check_limbs, turns_of
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import (
     ANGLES,
     BONES,
+    INNER,
     JOINTS,
     MIRROR,
     PARENTS,
@@ -20,7 +24,8 @@ from posefit.geometry.skeleton import (
     side,
 )
 from posefit.motion.built_in import average_skeleton
-from tests.geometry.turns import about
+from tests.cases import each
+from tests.geometry.turns import about, chained
 
 
 def test_polynomial_sines_are_numpys_over_many_turns() -> None:
@@ -31,18 +36,11 @@ def test_polynomial_sines_are_numpys_over_many_turns() -> None:
     np.testing.assert_allclose(c, np.cos(x), rtol=0.0, atol=1e-10)
 
 
-def slow_joints(skeleton: Skeleton, pose: Array, translation: Array) -> Array:
-    """Return joints (27, 3) straight from Acclaim's definition."""
-    frames, joints = [about(1, pose[0]) @ about(0, pose[1]) @ about(2, pose[2])], [translation]
-    for bone, parent in enumerate(PARENTS[1:]):
-        start, c = angle_index(bone + 1), skeleton.axes[bone]
-        own = np.eye(3)
-        if start >= 0:
-            x, y, z = pose[start : start + 3]
-            own = about(2, z) @ about(1, y) @ about(0, x)
-        frames.append(frames[parent] @ c @ own @ c.T)
-        joints.append(joints[parent] + frames[-1] @ skeleton.offsets[bone])
-    return np.array(joints)
+def slow_joints(skeleton: Skeleton, pose: Array, place: Array) -> Array:
+    angles = [pose[3 + 3 * INNER.index(j) :][:3] if j in INNER else np.zeros(3) for j in range(1, len(JOINTS))]
+    turns = [about(2, z) @ about(1, y) @ about(0, x) for x, y, z in angles]
+    root = about(1, pose[0]) @ about(0, pose[1]) @ about(2, pose[2])
+    return chained(root, place, turns, list(skeleton.axes), list(skeleton.offsets))
 
 
 def test_any_lead_shape_goes_through() -> None:
@@ -113,3 +111,35 @@ def test_joints_equal_the_slow_twin_whatever_the_frames_of_the_angles() -> None:
         poses, places = rng.uniform(-3.0, 3.0, (10, ANGLES)), rng.normal(size=(10, 3))
         slow = [slow_joints(skeleton, pose, place) for pose, place in zip(poses, places, strict=True)]
         np.testing.assert_allclose(skeleton.joints(poses, places), slow, rtol=0.0, atol=1e-9)
+
+
+def test_the_limbs_and_the_torso_are_all_bones_once() -> None:
+    check_limbs(LIMBS)
+    torso = {"lowerback", "upperback", "thorax"}
+    assert sorted([*torso, *(bone for bones in LIMBS.values() for bone in bones)]) == sorted(BONES)
+    # a limb is one chain: each bone but the first hangs from the one before it
+    for bones in LIMBS.values():
+        assert all(JOINTS[PARENTS[JOINTS.index(b)]] == a for a, b in pairwise(bones))
+
+
+@each("name", LIMBS)
+def test_a_limbs_angles_move_all_of_its_bones_and_no_other(name: str) -> None:
+    skeleton = average_skeleton()
+    pose = np.zeros(66)
+    pose[turns_of(LIMBS[name])] = 0.3
+    moved = np.abs(skeleton.joints(pose) - skeleton.joints(np.zeros(66))).max(axis=1) > 1e-9
+    assert set(np.flatnonzero(moved[1:])) == {BONES.index(bone) for bone in LIMBS[name]}
+
+
+@each(
+    ("limbs", "message"),
+    [
+        ({}, "limbs must be at least one"),
+        ({"back": ["tail"]}, "got 'tail' in 'back'"),
+        ({"a": ["lhand"], "b": ["lhand"]}, "must not share a bone, got 'lhand' twice, the second time in 'b'"),
+        ({"forearm": ["lradius"], "hand": ["lhand"]}, "got 'forearm' without 'lwrist'"),
+    ],
+)
+def test_limbs_that_do_not_hang_together_are_refused(limbs: dict[str, list[str]], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        check_limbs(limbs)

@@ -4,20 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion.built_in import average_skeleton
-from posefit.silhouette.cost import areas, mismatch, project, view_of
-from posefit.silhouette.kernels import add_mismatch, paint_bits
+from posefit.silhouette.cost import areas, mismatch, project
 from posefit.silhouette.mask import Silhouette
-from posefit.silhouette.rasteriser import draw_pose, scratch
-
-counts = st.tuples(*[st.integers(0, 10**9)] * 3)
 
 
 def scene(seed: int, count: int) -> tuple[Array, Array, Silhouette, Camera, Body]:
@@ -39,34 +33,6 @@ def test_the_mismatch_by_hand() -> None:
     # Interpretation S2: no body seen, no silhouette seen, neither; each empty denominator makes its term 1
     assert mismatch(np.array([[9, 0, 0], [0, 9, 0], [0, 0, 0]])).tolist() == [100.0, 100.0, 100.0]
     assert mismatch(np.zeros((0, 3), dtype=np.int64)).shape == (0,)
-
-
-@settings(deadline=None)  # the first call compiles
-@given(counts, st.floats(0.0, 1.0))
-def test_the_mismatch_lies_in_0_to_100_and_is_linear_in_beta(area: tuple[int, int, int], beta: float) -> None:
-    row = np.array([area])
-    found, spilled, missed = (float(mismatch(row, b)[0]) for b in (beta, 0.0, 1.0))
-    assert 0.0 <= found <= 100.0
-    assert found == pytest.approx((1.0 - beta) * spilled + beta * missed)
-
-
-def test_costs_of_several_views_add_up() -> None:
-    costs = np.array([1.0, 2.0])
-    add_mismatch(np.array([[10, 20, 30], [0, 0, 5]]), 10.0, 0.5, costs)
-    np.testing.assert_allclose(costs, [4.25, 2.0])
-
-
-def test_known_and_unknown_pixels_add_up_to_all() -> None:
-    poses, translations, silhouette, camera, body = scene(1, 20)
-    mask = project(body, camera, poses[0], translations[0])
-    known, unknown, everything = (
-        areas(body, camera, Silhouette.of(mask, valid), poses, translations)
-        for valid in (silhouette.valid, ~silhouette.valid, None)
-    )
-    np.testing.assert_array_equal(known + unknown, everything)
-    nothing = areas(body, camera, Silhouette.of(mask, np.zeros_like(mask)), poses, translations)
-    assert not nothing.any()
-    assert (mismatch(nothing) == 100.0).all()
 
 
 def test_any_layout_and_type_of_array_gives_the_same_areas_and_none_is_written_to() -> None:
@@ -114,20 +80,3 @@ def test_shapes_that_do_not_fit_are_refused_before_the_kernel_sees_them(body: Bo
             areas(body, camera, seen, poses, translations)
     with pytest.raises(ValueError, match=r"pose and translation must have shapes"):
         project(body, camera, np.zeros(40), np.zeros(3))
-
-
-def test_painting_fills_the_bodys_pixels_and_none_beyond_the_image(body: Body) -> None:
-    for aside in [-1.5, -0.6, 0.0, 0.6, 1.5]:
-        for size in [(36, 36), (50, 70), (64, 48), (65, 40), (130, 90)]:
-            width, height = size
-            view = Camera.around(np.zeros(3), 0.0, 2.5, size)
-            pose, place = np.zeros(ANGLES), np.array([aside, 0.1, 0.0])
-            chain, seen = body.skeleton.chain, view_of(view)
-            image, box = draw_pose(chain, body.radii, seen, pose, place, scratch(seen, chain.parents.size, ANGLES))
-            room = np.full((height + 40, width + 100), 7, dtype=np.uint16)
-            pixels = room[:height, :width]
-            pixels[:] = 1
-            paint_bits(image, box, np.uint16(0xFF00), pixels)
-            np.testing.assert_array_equal(pixels, np.where(project(body, view, pose, place), 0xFF01, 1))
-            assert (room[height:] == 7).all()
-            assert (room[:, width:] == 7).all()

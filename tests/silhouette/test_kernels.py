@@ -15,9 +15,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
-from tests.silhouette.twin import body_distance, hull_distance, random_poses
-
-TIE = 1e-3  # pixels; the kernel's rows are float32
+from tests.silhouette.twin import TIE, body_distance, hull_distance, random_poses
 
 
 def assert_equals_the_twin(body: Body, camera: Camera, pose: Array, translation: Array) -> bool:

@@ -20,8 +20,7 @@ from posefit.registry import registry
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.cuda.device import moved_to
 from posefit.silhouette.drawn import PoseCount
-from posefit.silhouette.mask import Silhouette
-from posefit.silhouette.pyramid import coarser_silhouette
+from posefit.silhouette.mask import Silhouette, coarser_silhouette
 from posefit.testing.problem import pose_problem, walking_angles
 from tests.cases import each
 from tests.silhouette.twin import random_poses

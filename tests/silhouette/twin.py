@@ -8,6 +8,8 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, PARENTS
 from posefit.silhouette.rasteriser import FAR, NEAR
 
+TIE = 1e-3  # pixels, within which rounding may decide: the kernel's rows are float32
+
 
 def random_poses(rng: np.random.Generator, count: int) -> Array:
     """Return poses (n, 66) that face every way."""

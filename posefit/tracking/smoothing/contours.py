@@ -22,8 +22,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
-from posefit.silhouette.mask import PIECE, Mask
-from posefit.silhouette.pyramid import coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import PIECE, Mask, coarser_camera, coarser_silhouette
 from posefit.silhouette.rasteriser import NEAR
 from posefit.tracking.smoothing import kernels
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
