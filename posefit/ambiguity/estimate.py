@@ -27,8 +27,7 @@ from posefit.fitting.shape import NAMES, shaped
 from posefit.fitting.space import SearchSpace
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
-from posefit.footage.source import HEIGHTS, Source, kind_of, scene_of, useless_for
-from posefit.footage.training import training_clips, training_motions
+from posefit.footage.source import HEIGHTS, Source, kind_of, scene_of, training_clips, training_motions, useless_for
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton

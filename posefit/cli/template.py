@@ -42,14 +42,9 @@ def write_plugin(
     class_name = "".join(part.capitalize() for part in module.split("_"))
     if class_name in TAKEN or iskeyword(class_name):
         class_name += kind.capitalize()
-    usage = [f"posefit {name}"]
-    if kind != COMMAND:
-        used = (
-            f"extract VIDEO --out masks --extraction {name}"
-            if kind == "segmenter"
-            else f"track walk --method {'@' if kind == 'prior' else ''}{name}"
-        )
-        usage = [f"posefit check {kind} {name}", f"posefit {used}"]
+    used = {COMMAND: name, "segmenter": f"extract VIDEO --out masks --extraction {name}"}.get(
+        kind, f"track walk --method {'@' if kind == 'prior' else ''}{name}"
+    )
     words = {
         "name": name,
         "kind": kind,
@@ -57,11 +52,9 @@ def write_plugin(
         "dashed": name.replace("_", "-"),
         "class_name": class_name,
         "point": f"{module}-commands" if kind == COMMAND else module,
-        "usage": "\n".join(usage),
+        "usage": f"posefit check {kind} {name}\n" * (kind != COMMAND) + f"posefit {used}",
     }
     target = Path(folder or f"posefit-{words['dashed']}")
-    if target.exists():
-        raise InputError(f"{target}: expected a new folder, got one that exists")
     target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
         for template, written in (

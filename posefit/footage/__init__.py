@@ -7,8 +7,7 @@
 
 | looking for | file |
 |---|---|
-| a scene from the name of a motion, masks or a video | source.py |
-| what a method learns from: motions, folders of them, people of the library | training.py |
+| a scene from the name of a motion, masks or a video; what a method learns from | source.py |
 | the scene itself; observations of a known motion, on a GPU, or corrupted on purpose | scene.py |
 | numbered variations of a motion, as in other benchmarks | instance.py |
 | several cameras: calibrations, lens distortion, one frame rate; which way the person faces | cameras.py |

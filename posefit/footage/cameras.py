@@ -75,7 +75,8 @@ def combined(
     observations = Views(masks, yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate))
     if len(views) > 1 and (wrong := disagreement(observations, cameras, body.stature)):
         raise InputError(f"{name}: {wrong}")
-    yaw = observations.yaw(observations.first)
+    first = observations[observations.first]
+    yaw = first.yaw
     if view_degrees is not None:
         to_camera = -cameras[0].rotation[2]
         yaw = float(np.arctan2(to_camera[0], to_camera[2]) - np.radians(view_degrees))
@@ -86,7 +87,7 @@ def combined(
         rate,
         len(observations),
         yaw,
-        place_of(observations[observations.first].silhouettes, cameras, body.stature),
+        place_of(first.silhouettes, cameras, body.stature),
         None,
         observations,
         "given" if known else "guessed",

@@ -84,11 +84,8 @@ class Views(Sequence[Observation]):
             raise IndexError(k)
         silhouettes = [self._silhouette(masks, k) for masks in self.masks]
         usable = any(masks.usable[k] for masks in self.masks)
-        return Observation(silhouettes, usable=usable, yaw=self.yaw(k))
-
-    def yaw(self, k: int) -> float | None:
-        """Return about which way the person faces in frame k, in radians; None where that is unknown."""
-        return float(self.yaws[k]) if k < len(self.yaws) and np.isfinite(self.yaws[k]) else None
+        known = k < len(self.yaws) and np.isfinite(self.yaws[k])
+        return Observation(silhouettes, usable=usable, yaw=float(self.yaws[k]) if known else None)
 
     @cached_property
     def first(self) -> int:

@@ -6,8 +6,7 @@
 | the axes of the segments | segments.py |
 | clinical angles of hip, knee, ankle, shoulder and elbow, in degrees | angles.py |
 | when feet strike and lift off | events.py |
-| cadence, step, stride, speed, stance, and whether it is a walk | gait.py |
-| in which frames the person walks backwards | heading.py |
+| cadence, step, stride, speed, stance, and whether it is a walk, or backwards | gait.py |
 | tables, and files for other programs | tables.py, c3d.py |
 
     from posefit.measuring.angles import clinical_angles

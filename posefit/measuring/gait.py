@@ -1,4 +1,4 @@
-"""What a walk is like: cadence, lengths of steps and strides, speed, stance and the width of steps.
+"""What a walk is like: cadence, steps and strides, speed, stance and the width of steps; and who walks backwards.
 
 A step of a foot lasts from the other foot's strike to its own, a stride from one of its strikes to its next. Only those
 count whose feet strike in turn, in which the person moves the way they face, and of which every frame is known.
@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, fields
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES, both
@@ -24,6 +26,9 @@ MAX_STEP_WIDTH = 0.35  # metres between the lines that the feet of a walk keep t
 RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
 MIN_STANCE_SHARE = 0.57  # share of a stride; a runner's foot stands shorter, judged by the rearmost toes
 GRAVITY = 9.81  # metres a second squared
+TRAVEL_SECONDS = 0.5  # ours: over which the direction is measured
+MIN_TRAVEL_SPEED = 0.3  # metres a second, ours: below it a person goes nowhere
+WARNING_SHARE = 0.05  # ours: of frames, from which it is worth a warning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,3 +176,33 @@ def _values(steps: list[Step], name: str) -> list[float]:
 
 def _mean(steps: list[Step], name: str) -> float | None:
     return float(np.mean(values)) if (values := _values(steps, name)) else None
+
+
+def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
+    """Return in which frames (T,) the root faces away from its way; `unknown` frames count for nothing.
+
+    The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who
+    moves slower than 0.3 m/s has none. A heading is away from the way where it lies more than 90 degrees from it.
+    """
+    count, half = len(motion), max(round(0.5 * TRAVEL_SECONDS * motion.fps), 1)
+    back = np.zeros(count, dtype=bool)
+    if count <= 2 * half:
+        return back
+    yaws, ground = motion.poses[half : count - half, 0], motion.translations[:, [0, 2]]
+    way = ground[2 * half :] - ground[: -2 * half]
+    away = np.asarray((way * np.column_stack([np.sin(yaws), np.cos(yaws)])).sum(axis=1) < 0.0)
+    frame_known = np.isin(np.arange(count), [*unknown], invert=True)
+    known = np.asarray(sliding_window_view(frame_known, 2 * half + 1).all(axis=1))
+    fast = np.linalg.norm(way, axis=1) > MIN_TRAVEL_SPEED * 2 * half / motion.fps
+    back[half : count - half] = away & fast & known
+    return back
+
+
+def backwards_warning(back: NDArray[np.bool_]) -> str:
+    """Return a warning about frames in which the person walks backwards; empty where they are few."""
+    if back.mean() < WARNING_SHARE:
+        return ""
+    return (
+        f"the person seems to walk backwards in {back.sum()} of {len(back)} frames: expected to face the direction "
+        "of travel; if they do, the track faces the wrong way there"
+    )

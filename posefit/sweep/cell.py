@@ -125,7 +125,7 @@ class TrackCell(_Spec):
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
-        from posefit.footage.training import training_clips, training_motions
+        from posefit.footage.source import training_clips, training_motions
         from posefit.geometry.skeleton import joint_distances
         from posefit.tracking.measures import MEASURES
         from posefit.tracking.options import VIEW, TrackOptions

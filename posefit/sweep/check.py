@@ -11,8 +11,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import between, finite_number, whole
 from posefit.fitting.tracker import Prediction
 from posefit.footage.masks import FPS
-from posefit.footage.source import MOTIONS, load_motion
-from posefit.footage.training import training_clips
+from posefit.footage.source import MOTIONS, load_motion, training_clips
 from posefit.motion import built_in, recorded
 from posefit.reading import quoted, suggestion
 from posefit.registry import Offer, registry

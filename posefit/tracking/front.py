@@ -12,8 +12,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.footage.readers import IMAGES, name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of
-from posefit.footage.training import training_clips, training_motions
+from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.progress import Progress, interactive

@@ -20,8 +20,7 @@ from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
 from posefit.footage.masks import PackedMasks
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of
-from posefit.footage.training import training_clips, training_motions
+from posefit.footage.source import body_of, training_clips, training_motions
 from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
 from posefit.progress import QUIET, Progress

@@ -8,8 +8,7 @@ import numpy as np
 
 from posefit.fitting.shape import NAMES
 from posefit.fitting.tracker import Task
-from posefit.measuring.gait import gait_of
-from posefit.measuring.heading import backwards, backwards_warning
+from posefit.measuring.gait import backwards, backwards_warning, gait_of
 from posefit.progress import Progress
 from posefit.tracking.evaluation import LOST, evaluated, unseen
 from posefit.tracking.follow import Tracked

@@ -360,7 +360,7 @@ def test_a_new_plugin_has_names_of_its_own_and_replaces_nothing(tmp_path: Path) 
         *(([name], hidden.format(name)) for name in ("swarm", "reproduce", "envs")),
         (["9 lives"], "name must be small letters"),
         (["a", "--kind", "camera"], "kind must be one of optimiser, prior, tracker, segmenter, command, got 'camera'"),
-        (["a", "--out", tmp_path / "mine"], "expected a new folder, got one that exists"),
+        (["a", "--out", tmp_path / "mine"], "got one that exists"),
     ]:
         assert message in error_of("plugins", "new", "--out", tmp_path / "x", *words)
     assert list(tmp_path.iterdir()) == [tmp_path / "mine"]

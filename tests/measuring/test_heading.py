@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from posefit.measuring.heading import backwards, backwards_warning
+from posefit.measuring.gait import backwards, backwards_warning
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from tests.cases import each

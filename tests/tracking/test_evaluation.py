@@ -8,7 +8,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.footage.scene import Scene
-from posefit.footage.training import training_clips
+from posefit.footage.source import training_clips
 from posefit.geometry.body import varied
 from posefit.tracking import evaluation
 from posefit.tracking.evaluation import evaluated, nearest
