@@ -1,14 +1,26 @@
-"""Every study can be started, every plan beside them is one, and the table of rows is right."""
+"""Every study can be started, every plan beside them is one, and what they compute is right."""
 
 import importlib
+import json
 import os
+import re
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import audit
+import posefit
+from make_boxes import learned_from, upright_poses
+from make_library import LONGEST_GAP, TOLERANCE, kept_frames
+from posefit.motion.built_in import average_skeleton
+from posefit.suites.boxes import STEP, TRAINING_PEOPLE, learned_without
+from posefit.suites.problem import Suite
+from posefit.suites.running import run_on
 from posefit.sweep.plan import Plan
+from scores import auroc, calibration_error, conformal_factor, false_alarms, kept_errors
 from tests.docs.pages import DOCS
 
 STUDIES = DOCS / "studies"
@@ -92,3 +104,134 @@ def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target
     flow = np.linalg.lstsq(rows, outputs, rcond=None)[0]
     assert np.allclose(matrix, flow.T / unit + target)
     assert np.allclose(inputs @ (matrix - target).T + offset, scaled @ flow + wanted.mean(axis=0))
+
+
+def test_the_file_of_boxes_is_what_the_library_says_today() -> None:
+    """Where another LAPACK decomposes, rounding may differ, and a component may point the other way.
+
+    The sign is that of its largest number; those of a left and a right limb are equally large but for rounding.
+    """
+    learned, stored = (
+        learned_from(upright_poses(tuple(person for person in TRAINING_PEOPLE if person != "17"))),
+        learned_without("17"),
+    )
+    assert np.abs(STEP * learned["mean"] - stored.mean).max() <= STEP
+    components = STEP * learned["components"]
+    components *= np.sign((components * stored.components).sum(axis=1))[:, None]
+    assert np.abs(components - stored.components).max() <= 10 * STEP
+    assert np.array_equal(learned["order"], stored.order)
+
+
+def test_a_body_at_rest_leaves_few_frames_and_one_that_moves_all() -> None:
+    average = average_skeleton()
+    rest = np.zeros((50, 66))
+    assert kept_frames(average, rest, np.zeros((50, 3))).tolist() == [*range(0, 49, LONGEST_GAP), 49]
+    # the root is thrown to and fro by twice the tolerance: every frame is a corner
+    thrown = np.zeros((50, 3))
+    thrown[::2, 1] = 4.0 * TOLERANCE
+    assert kept_frames(average, rest, thrown).tolist() == list(range(50))
+    # at an even pace, everything lies on a line
+    assert len(kept_frames(average, rest, np.linspace(0.0, 5.0, 50)[:, None] * [1.0, 0.0, 0.0])) == 8
+
+
+def test_no_built_in_method_reports_below_the_optimum_or_another_cost_than_its_proposal_has() -> None:
+    problems = Suite(functions=[1, 2, 4, 5, 8], dimensions=[9], instances=[10_001])
+    rows = list(audit.audited(problems, audit.METHODS, times=0))
+    assert len(rows) == 5
+    assert all(set(row.costs) == set(audit.METHODS) for row in rows)
+    assert [fault for row in rows for fault in row.faults] == []
+
+
+def test_a_wrong_cost_is_reported() -> None:
+    problem = posefit.suite("posefit-2026.1", 1, 10_000, 9)
+    run_on(problem, "random", evaluations=50)
+    assert audit.reported_faults(problem) == []
+    problem.best_observed_fvalue1 -= 30.0
+    faults = audit.reported_faults(problem)
+    assert re.match(r"the best proposal must cost what was reported, -?\d", faults[0])
+    assert any("no cost may be below the optimum, 0.0" in fault for fault in faults)
+    assert any("the trace must fall to the best cost" in fault for fault in faults)
+
+
+def test_the_best_costs_are_written_to_a_new_file(tmp_path: Path) -> None:
+    words = [
+        "--function",
+        "5",
+        "--instances",
+        "2",
+        "--method",
+        "cma",
+        "--times",
+        "5",
+        "--write",
+        str(tmp_path / "best"),
+    ]
+    done = CliRunner().invoke(audit.main, words)
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[-1] == "2 problems, 4 searches, 0 faults"
+    known = json.loads((tmp_path / "best").read_text("utf-8"))
+    assert known["problems"] == 2
+    assert known["made_by"] == "cma with 5 times the usual budget, and cma with the usual one"
+    for name, cost in known["best"].items():
+        instance = int(re.search(r"_i(\d+)_", name)[1])  # type: ignore[index]
+        assert cost < posefit.suite("posefit-2026.1", 5, instance, 9).truth_cost
+
+
+SCORES = np.array([0.9, 0.8, 0.8, 0.4, 0.1])
+LOST = np.array([True, False, True, False, False])
+
+
+def test_auroc_is_the_share_of_pairs_in_order() -> None:
+    # 0.9 is above all three; 0.8 above two, and level with one
+    assert auroc(SCORES, LOST) == pytest.approx(5.5 / 6)
+    assert auroc(np.array([1.0, 1.0]), np.array([True, False])) == 0.5
+    assert auroc(SCORES, np.zeros(5, dtype=bool)) is None
+    assert auroc(SCORES, np.ones(5, dtype=bool)) is None
+
+
+def test_false_alarms_are_negatives_at_the_score_of_a_recall() -> None:
+    assert false_alarms(SCORES, LOST, 0.5) == 0.0  # one of two at 0.9
+    assert false_alarms(SCORES, LOST, 0.51) == pytest.approx(1 / 3)  # both at 0.8, as one of three negatives
+    assert false_alarms(SCORES, np.zeros(5, dtype=bool), 0.95) is None
+
+
+def test_kept_errors_are_means_of_the_frames_with_the_least_scores() -> None:
+    errors, scores = np.array([4.0, 1.0, 2.0, 9.0]), np.array([0.3, 0.1, 0.2, 0.4])
+    means = kept_errors(errors, scores, [0.01, 0.25, 0.5, 0.75, 1.0])
+    np.testing.assert_allclose(means, [1.0, 1.0, 1.5, 7 / 3, 4.0])
+
+
+def test_clips_count_alike_and_the_one_to_come_as_infinitely_far() -> None:
+    # three clips: 1, 2 | 3 | 4. Each weighs a quarter, shared by its scores; the last quarter is the new clip's
+    scores = [np.array([2.0, 1.0]), np.array([3.0]), np.array([4.0])]
+    assert conformal_factor(scores, 0.125) == 1.0
+    assert conformal_factor(scores, 0.2) == 2.0
+    assert conformal_factor(scores, 0.5) == 3.0
+    assert conformal_factor(scores, 0.6) == 4.0  # of the three that are known alone 3 would be enough
+    assert conformal_factor(scores, 0.75) == 4.0
+    with pytest.raises(ValueError, match=r"clips must be at least 4 for a level of 0\.8, got 3"):
+        conformal_factor(scores, 0.8)
+    for clips, level, message in (
+        ([], 0.5, "scores must be of one clip or more"),
+        ([np.zeros(0)], 0.5, "each with one score or more"),
+        ([np.ones(3)], 1.0, "level must be between 0 and 1, got 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            conformal_factor(clips, level)
+
+
+def test_conformal_factors_hold_for_clips_that_were_not_there() -> None:
+    # errors of a clip go together: a factor of its own times a normal one. 19 clips to learn from, one to come
+    rng, inside = np.random.default_rng(0), []
+    for _ in range(400):
+        clips = [np.exp(0.5 * rng.normal()) * np.abs(rng.normal(size=30)) for _ in range(20)]
+        inside.append((clips[-1] <= conformal_factor(clips[:-1], 0.8)).mean())
+    assert 0.78 <= np.mean(inside) <= 0.85  # at least the level, at most a twentieth above it
+
+
+def test_the_calibration_error_is_the_mean_gap_of_the_bins() -> None:
+    # bins of 0.5: (0.2, 0.4) are right once of two, off by 0.2; (0.9, 0.7, 1.0) always, off by 2.6 / 3 - 1
+    probabilities = np.array([0.2, 0.4, 0.9, 0.7, 1.0])
+    right = np.array([True, False, True, True, True])
+    assert calibration_error(probabilities, right, bins=2) == pytest.approx((2 * 0.2 + 3 * (1 - 2.6 / 3)) / 5)
+    assert calibration_error(np.array([0.0, 1.0]), np.array([False, True])) == 0.0

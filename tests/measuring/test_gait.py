@@ -1,18 +1,22 @@
-"""Gait of walks, beside an independent slow twin and published ranges, and the reasons why a motion is no walk."""
+"""Gait of walks, beside an independent slow twin and published ranges; why a motion is no walk; who walks backwards."""
 
+import csv
+import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import posefit
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.events import gait_events, low_pass
-from posefit.measuring.gait import Gait, gait_of
+from posefit.measuring.gait import Gait, backwards, backwards_warning, gait_of
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
-from posefit.tracking.table import gait_line
+from posefit.tracking.table import gait_line, table
 from tests.cases import each
 from tests.measuring.walker import SPEED, walker
 
@@ -126,3 +130,65 @@ def test_the_filter_passes_low_frequencies_without_a_shift() -> None:
     np.testing.assert_allclose(low_pass(even, 6.0, 100.0), even, atol=1e-12)
     wave = np.sin(2.0 * np.pi * 6.0 * times)
     np.testing.assert_allclose(low_pass(wave, 6.0, 100.0)[50:150], np.sqrt(0.5) * wave[50:150], atol=2e-3)
+
+
+WALK = built_in.motion("walk", frames=60)  # at 30 frames a second
+
+
+def turned(degrees: float) -> Motion:
+    return replace(WALK, poses=WALK.poses + np.radians(degrees) * np.eye(66)[0])
+
+
+@each(("degrees", "back"), [(0.0, False), (60.0, False), (120.0, True), (180.0, True)])
+def test_a_person_who_faces_away_from_their_way_walks_backwards(degrees: float, back: bool) -> None:
+    # half of half a second, beyond which nothing is known, is 8 frames
+    assert backwards(turned(degrees)).tolist() == [False] * 8 + [back] * 44 + [False] * 8
+
+
+@each(("speed", "back"), [(0.29, False), (0.31, True)])
+def test_below_30_cm_a_second_a_person_has_no_way(speed: float, back: bool) -> None:
+    places = np.array([0.0, 1.0, 0.0]) + np.arange(60)[:, None] / 30.0 * speed * np.array([0.0, 0.0, -1.0])
+    assert backwards(replace(WALK, poses=np.zeros((60, 66)), translations=places)).any() == back
+
+
+def test_unknown_frames_and_those_about_them_count_for_nothing() -> None:
+    assert np.flatnonzero(backwards(turned(180.0), {30})).tolist() == [*range(8, 22), *range(39, 52)]
+    assert not backwards(turned(180.0).frames(0, 16)).any()
+
+
+def test_a_few_frames_are_not_worth_a_warning() -> None:
+    assert backwards_warning(np.arange(100) < 4) == ""
+    assert backwards_warning(np.arange(100) < 5).startswith("the person seems to walk backwards in 5 of 100 frames")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("track") / "out"
+
+
+@pytest.fixture(scope="module")
+def tracked(out: Path) -> posefit.Track:
+    return posefit.track("walk", size=(160, 120), out=out)
+
+
+def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> None:
+    gait = json.loads((out / "summary.json").read_text())["gait"]
+    assert gait == tracked.summary["gait"]
+    assert gait["walk"] is True
+    assert tracked.truth is not None
+    true = gait_of(tracked.truth)
+    assert gait["cadence"] == pytest.approx(true.cadence, abs=3.0)
+    assert gait["speed"] == pytest.approx(true.speed, abs=0.05)
+    assert gait_line(gait) in table(tracked.summary).splitlines()
+    assert gait_line(gait).startswith(f"gait: {gait['cadence']:.0f} steps a minute, step ")
+    with (out / "gait.csv").open(newline="") as file:
+        steps = list(csv.DictReader(file))
+    assert sum(step["step_seconds"] != "" for step in steps) == gait["steps"]
+
+
+def test_a_track_of_no_walk_reports_why_and_a_single_frame_nothing() -> None:
+    quick: dict[str, Any] = {"size": (80, 60), "population_size": 10, "iterations": 2}
+    summary = posefit.track("jacks", frames=(0, 20), **quick).summary
+    assert summary["gait"]["walk"] is False
+    assert "no figures of gait: no strikes of a foot detected" in table(summary).splitlines()
+    assert "gait" not in table(posefit.fit("walk", **quick).summary)
