@@ -136,7 +136,7 @@ def _numbers(start: int | None, stop: int | None) -> range:
 def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
     from posefit.report.export import suite_runs, write_iohprofiler
-    from posefit.suites.tally import score_lines, suite_scores
+    from posefit.suites.running import score_lines, suite_scores
 
     scores = suite_scores(runs)
     if out is not None:

@@ -36,7 +36,7 @@ from posefit.report.summary import (
 )
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
-from posefit.suites.tally import SHOWN
+from posefit.suites.running import SHOWN
 from posefit.sweep.ledger import ROWS, Ledger
 from posefit.tracking.measures import BASELINES
 

@@ -12,7 +12,7 @@ from posefit.report.runs import Runs
 from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.profiles import Trace, attained, hits, targets
 from posefit.suites.functions import suite_function
-from posefit.suites.tally import SHOWN, suite_scores
+from posefit.suites.running import SHOWN, suite_scores
 from posefit.uncertainty.calibration import LEVELS
 
 POINTS = 41  # of a curve of tracks

@@ -22,8 +22,7 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.report.runs import damage, views
 from posefit.statistics.profiles import Trace
 from posefit.suites.functions import suite_function
-from posefit.suites.running import SuiteRun
-from posefit.suites.tally import budgets_differ
+from posefit.suites.running import SuiteRun, budgets_differ
 from posefit.version import __version__
 
 if TYPE_CHECKING:

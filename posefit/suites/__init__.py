@@ -11,5 +11,5 @@
 | which functions, dimensions and instances there are | functions.py |
 | the instances of each function | instances.py |
 | the boxes that are searched, made by `docs/studies/make_boxes.py` | boxes.py |
-| an optimiser on a problem; scores of runs | running.py, tally.py |
+| an optimiser on a problem; scores of runs | running.py |
 """

@@ -1,6 +1,12 @@
-"""An optimiser of a plugin on a problem of a suite."""
+"""An optimiser of a plugin on a problem of a suite; scores of runs: shares of targets, running times and costs.
 
-from collections.abc import Mapping
+Only runs with the same method, function, dimension, budget and way with infeasible proposals are taken together.
+
+Targets are an instance's own, from 32 to 0.25 above its best known cost. Hansen et al., COCO: a platform for comparing
+continuous optimizers in a black-box setting, 2021.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +18,9 @@ from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
-from posefit.suites.problem import EVALUATIONS, Problem
+from posefit.statistics.profiles import attained, expected_running_time, hits
+from posefit.suites.functions import suite_function
+from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
 
 RNG_STREAM = 2027  # part of the seed of every search
 
@@ -77,3 +85,114 @@ def run_on(
         problem.targets,
         *problem.trace,
     )
+
+
+ALL = 0  # the number that stands for all functions together
+SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the best known, those with an expected running time
+POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at which shares are reported
+
+
+@dataclass(frozen=True)
+class SuiteScore:
+    """The score of runs of one method with one budget on one function in one dimension."""
+
+    method: str
+    function: int
+    name: str
+    dimension: int
+    budget: int  # evaluations that a run could have had
+    infeasible: str  # the way with infeasible proposals: see `posefit.suites.problem.Problem`
+    runs: int
+    above: float  # median of the best costs above the best known
+    reached: float  # share of runs and targets, at the end
+    shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as budgets go
+    running_times: dict[float, float | None]  # expected evaluations to so much above the best known; None for never
+
+
+def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
+    """Return the scores of runs, by dimension, function and method, the best first.
+
+    In a dimension with several functions those of all together come first, as function 0. Methods with other settings
+    are other methods; runs with another budget, or with another way with what is not feasible, have a score of their
+    own. Raises ValueError where there is no run.
+    """
+    groups: dict[tuple[int, int, str, int, str], list[SuiteRun]] = {}
+    for run in runs:
+        for function in (run.function, ALL):
+            key = run.dimension, function, method_name(run), run.budget, run.infeasible
+            groups.setdefault(key, []).append(run)
+    if not groups:
+        raise InputError("runs must be at least one, got none")
+    pairs = {(dimension, function) for dimension, function, *_ in groups}
+    several = {dimension for dimension, _ in pairs if sum(other == dimension for other, _ in pairs) > 2}
+    scores = [
+        _score(method, function, group)
+        for (dimension, function, method, *_), group in groups.items()
+        if function != ALL or dimension in several
+    ]
+    return sorted(
+        scores,
+        key=lambda one: (one.dimension, one.function, -one.reached, one.above, one.method, one.budget, one.infeasible),
+    )
+
+
+def method_name(run: SuiteRun) -> str:
+    """Return a run's method with its settings."""
+    chosen = ", ".join(f"{name}={value}" for name, value in sorted(run.settings.items()))
+    return f"{run.method} ({chosen})" if chosen else run.method
+
+
+def budgets_differ(results: Sequence[SuiteRun] | Sequence[SuiteScore]) -> bool:
+    """Return whether in some dimension runs, or those behind scores, have several budgets."""
+    return len({(one.dimension, one.budget) for one in results}) > len({one.dimension for one in results})
+
+
+def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
+    """Return the score of runs that differ only in their instances, seeds and functions."""
+    dimension, budget = runs[0].dimension, runs[0].budget
+    reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
+    used = np.array([run.evaluations[-1] for run in runs])
+    times = expected_running_time(reached, used)
+    points = [point for point in POINTS if point * dimension <= budget]
+    shares = attained(reached, [*(point * dimension for point in points), float(used.max())])
+    return SuiteScore(
+        method,
+        function,
+        "all functions" if function == ALL else suite_function(function).name,
+        dimension,
+        budget,
+        runs[0].infeasible,
+        len(runs),
+        float(np.median([run.cost - run.best_known for run in runs])),
+        float(shares[-1]),
+        dict(zip(points, shares[:-1].tolist(), strict=True)),
+        {above: _finite(times[np.flatnonzero(above == TARGETS)[0]]) for above in SHOWN},
+    )
+
+
+def _finite(value: Array | float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
+    """Return the lines of two tables of scores, for a terminal: where runs end, and how soon they reach targets."""
+    budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
+    labels = [
+        one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
+    ]
+    wide, points = max(24, *map(len, labels)), sorted({point for one in scores for point in one.shares})
+    heads = [f"ERT +{above:g}" for above in SHOWN]
+    ends = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
+    courses = ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
+    for one, label in zip(scores, labels, strict=True):
+        function = one.name if one.function == ALL else f"{one.function} {one.name}"
+        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
+        times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
+        ends.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}")
+        shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
+        courses.append(f"{start}{_cells(shares)}".rstrip())
+    return ends + courses
+
+
+def _cells(texts: Sequence[str]) -> str:
+    return "".join(f" {text:>10}" for text in texts)

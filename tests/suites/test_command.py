@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.suites.running import run_on
-from posefit.suites.tally import suite_scores
+from posefit.suites.running import run_on, suite_scores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan, search_cells
