@@ -115,16 +115,3 @@ def left_alone() -> Iterator[None]:
     before = global_random_state()
     yield
     expect(global_random_state() == before, "the global random state must stay as it is, got another")
-
-
-@contextmanager
-def seeded(seed: int) -> Iterator[None]:
-    """Seed the global random generators for the body, and put them back."""
-    before = np.random.get_state(), random.getstate()  # noqa: NPY002
-    np.random.seed(seed)  # noqa: NPY002
-    random.seed(seed)
-    try:
-        yield
-    finally:
-        np.random.set_state(before[0])  # noqa: NPY002
-        random.setstate(before[1])
