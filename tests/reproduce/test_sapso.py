@@ -63,28 +63,18 @@ def report(written: tuple[Path, Result]) -> dict[str, Any]:
     return loaded
 
 
-def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path) -> None:
-    out = tmp_path / "out"
+def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out, clips = tmp_path / "out", tmp_path / "clips"
+    (clips / "16").mkdir(parents=True)
+    (clips / "16" / "16_15.amc").write_text("")
     assert fails("--seeds", 0, "--out", out) == "posefit: seeds must be at least 1, got 0"
-    line = fails("--clips", tmp_path / "nowhere", "--out", out)
-    assert line.startswith("posefit: clips must be a folder of CMU clips such as 16/16_15.amc, got")
-    assert "nowhere" in line
-    assert list(tmp_path.iterdir()) == []
-    out.mkdir()
-    assert "expected a new name to write to, got one that exists" in fails("--out", out)
-
-
-def test_a_folder_without_one_clip_names_it(tmp_path: Path) -> None:
-    (tmp_path / "16").mkdir()
-    (tmp_path / "16" / "16_15.amc").write_text("")
-    with pytest.raises(ValueError, match=r"such as 16/16_17\.amc"):
-        paper_motions(tmp_path, 10)
-
-
-def test_figures_need_matplotlib_and_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder, missing in ((tmp_path / "nowhere", "16/16_15"), (clips, "16/16_17")):
+        line = fails("--clips", folder, "--out", out)
+        assert line.startswith(f"posefit: clips must be a folder of CMU clips such as {missing}.amc, got {folder}")
+    assert "expected a new name to write to, got one that exists" in fails("--out", clips)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert "pip install posefit[figures]" in fails("--out", tmp_path / "out")
-    assert list(tmp_path.iterdir()) == []
+    assert "pip install posefit[figures]" in fails("--out", out)
+    assert list(tmp_path.iterdir()) == [clips]
 
 
 def test_a_run_that_is_interrupted_leaves_nothing(tmp_path: Path) -> None:

@@ -74,16 +74,13 @@ def test_the_figures_are_drawn(tmp_path: Path, experiment: PatentTrack) -> None:
 
 @pytest.mark.slow
 def test_reproduce_prints_both_presets() -> None:
+    wrong = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "0"])
+    assert wrong.exit_code == 2
+    assert wrong.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
     result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1"])
     assert result.exit_code == 0
     for words in ("default  patent  imm_all_six", "\nthe right model ", "\ndegrees ahead ", "\nlabels, patent "):
         assert words in result.stdout
-
-
-def test_reproduce_says_what_seeds_must_be() -> None:
-    result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "0"])
-    assert result.exit_code == 2
-    assert result.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
 
 
 def states(film: activities.Film, probability: float = 0.9) -> list[State]:
@@ -108,19 +105,15 @@ def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) 
     assert (figures["filter_ms"], figures["detection_ms"]) == pytest.approx((1.0, 2.0))
 
 
-def test_a_group_that_never_changes_is_late_by_whole_activities(film: activities.Film) -> None:
+def test_what_is_late_or_wrong_is_counted(film: activities.Film) -> None:
     right = states(film)
     # waving and striding shares the model `walk` with stepping; jumping jacks, 140 frames, and squat, 60, do not
     figures = switching_figures(film, [right[0]] * len(right))
     assert figures["switch_delays_frames"] == [0, 140, 60]
     assert figures["right_group_fraction"] == 250 / 450
-
-
-def test_a_restart_is_no_right_group_and_a_newcomer_may_be_a_wrong_one(film: activities.Film) -> None:
-    every = states(film)
-    every[5] = {**every[5], "newcomer": "squat"}
-    every[7] = {**every[7], "group": None}
-    figures = switching_figures(film, every)
+    right[5] = {**right[5], "newcomer": "squat"}
+    right[7] = {**right[7], "group": None}  # a restart
+    figures = switching_figures(film, right)
     assert (figures["activations"], figures["wrong_activations"]) == (1, 1)
     assert figures["right_group_fraction"] == 449 / 450
 
@@ -142,6 +135,8 @@ def test_errors_against_detected_joints_leave_hidden_ones_out(film: activities.F
     point = AT["right hand"]
     joints[0, point] = pixels[0, HAND] + [3.0, 4.0]
     confidence[0, point] = 0.5
+    assert model_states([frame]) == []  # of a tracker without models
+    assert switching_figures(film, []) == {}
     elbow, hand = detected_cm(film, [frame], [{"joints": joints, "confidence": confidence}])[0]
     assert np.isnan(elbow)
     assert hand == pytest.approx(100.0 * 5.0 * depths[0, HAND] / film.camera.focal[0])
@@ -150,9 +145,3 @@ def test_errors_against_detected_joints_leave_hidden_ones_out(film: activities.F
 def test_alternatives_are_compared_film_by_film() -> None:
     rows: list[list[dict[str, Any]]] = [[{"mpjpe_mm": mm} for mm in values] for values in ((90, 110), (100, 104))]
     assert change(*rows) == {"worse_mm": 2.0, "worse_films": 1.0}
-
-
-def test_a_tracker_without_models_has_no_states(film: activities.Film) -> None:
-    frame = Frame(np.zeros(66), np.zeros(3), 0.0, np.zeros((1, 3), dtype=np.int64), 1, 0.0, np.zeros(1))
-    assert model_states([frame]) == []
-    assert switching_figures(film, []) == {}
