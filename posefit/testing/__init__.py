@@ -17,6 +17,7 @@ attribute `baseline = True` is chance itself, and need not beat it.
 """
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -65,10 +66,11 @@ def segmenter_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | 
 
 
 def _checks(kind: str, factory: Callable[..., Any], settings: dict[str, Any] | None, *more: Any) -> list[Check]:
-    """Return the checks of a kind of plugin, whose rules are loaded when they are needed."""
+    """Return the checks of a kind of plugin: each of its rules, which are loaded when they are needed."""
     rules = import_module(f"posefit.testing.{kind}_rules")
-    checks: list[Check] = rules.checklist.of(rules.Case(factory, settings or {}, *more))
-    return checks
+    case = rules.Case(factory, settings or {}, *more)
+    texts = [rule.__doc__.partition("\n")[0].rstrip(".") for rule in rules.RULES]
+    return [Check(rule.__name__, text, partial(rule, case)) for rule, text in zip(rules.RULES, texts, strict=True)]
 
 
 def check_optimiser(factory: Callable[..., Any], **options: Any) -> Report:

@@ -16,7 +16,7 @@ from posefit.settings import planned
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, duplicates, left_alone
 from posefit.testing.problem import pose_problem
-from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
+from posefit.testing.results import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, shell, sphere
 
 EVALUATIONS = 400  # a search's budget where a check needs no special one
@@ -39,7 +39,6 @@ out.write(pickle.dumps(case.trace()))
 SPACE, BOX = Toy(5, ball), Toy(9)
 
 Evaluate = Callable[[Array], Array]
-checklist = Checklist()
 
 
 @dataclass(frozen=True)
@@ -116,10 +115,6 @@ def same(first: list[Array], second: list[Array]) -> bool:
     return len(first) == len(second) and all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-checklist(common.construction)
-
-
-@checklist
 def shape(case: Case) -> str:
     """The method ask returns an array (n, d)."""
     proposals = case.build().ask()
@@ -129,14 +124,12 @@ def shape(case: Case) -> str:
     return f"{len(proposals)} at a time"
 
 
-@checklist
 def dtype(case: Case) -> None:
     """The method ask returns float64."""
     for proposals, _ in case.steps(case.build(), BOX, sphere, 4):
         expect(proposals.dtype == np.float64, f"ask must return float64, got {proposals.dtype}")
 
 
-@checklist
 def box(case: Case) -> str:
     """Every proposal lies in [-1, 1]^d, with coordinates that wrap around and from a start on the edge too."""
     case.valid(Toy(6, wrapping=2), lambda x: 1.0 - np.abs(x[:, 0]), 12)
@@ -144,26 +137,22 @@ def box(case: Case) -> str:
     return case.valid(BOX, lambda x: -np.abs(x).sum(axis=1), 12)
 
 
-@checklist
 def feasible(case: Case) -> str:
     """Every proposal is feasible where a third of the box is."""
     return case.valid(Toy(4, ball), lambda x: -x.sum(axis=1), 12)
 
 
-@checklist
 def hardly_feasible(case: Case) -> str:
     """Every proposal is feasible, and the search goes on, where a few in a thousand are feasible."""
     return case.valid(Toy(3, shell), sphere)
 
 
-@checklist
 def dimensions(case: Case) -> None:
     """Spaces of one dimension and of 66 are searched."""
     for d in (1, 66):
         case.valid(Toy(d), sphere)
 
 
-@checklist
 def costs(case: Case) -> None:
     """Costs that are nan, infinite, equal or as large as 1e300 do no harm, one or all."""
     kinds: dict[str, Evaluate] = {
@@ -181,7 +170,6 @@ def costs(case: Case) -> None:
             raise BrokenError(f"costs that are {kind}: {broken}") from None
 
 
-@checklist
 def budget(case: Case) -> str:
     """A search uses its budget, in whole populations."""
     used, optimiser = 0, case.build()
@@ -192,7 +180,6 @@ def budget(case: Case) -> str:
     return f"{used} of {EVALUATIONS} evaluations"
 
 
-@checklist
 def order(case: Case) -> str:
     """The cost of row i belongs to proposal i."""
     rng = np.random.default_rng(1)
@@ -215,23 +202,17 @@ def order(case: Case) -> str:
     return f"mean cost {np.median(good):.3g}, shuffled {np.median(bad):.3g}"
 
 
-checklist(common.unknown_setting)
-
-
-@checklist
 def nonsense_settings(case: Case) -> str:
     """Nonsense in a setting is refused or harmless."""
     return common.nonsense_settings(case, harmless=True)
 
 
-@checklist
 def seeds(case: Case) -> None:
     """The same seed gives the same proposals, another seed gives others."""
     expect(same(case.trace(), case.trace()), "one seed must give one trace, got two")
     expect(not same(case.trace(), case.trace(seed=1)), "two seeds must give two traces, got the same")
 
 
-@checklist
 def new_process(case: Case) -> None:
     """The same seed gives the same proposals in a new process."""
     try:
@@ -246,14 +227,12 @@ def new_process(case: Case) -> None:
     expect(same(case.trace(), pickle.loads(trace)), "one seed must give one trace in every process, got two")
 
 
-@checklist
 def global_randomness(case: Case) -> None:
     """The global random generators are neither used nor changed."""
     with left_alone():
         case.trace()
 
 
-@checklist
 def inputs(case: Case) -> None:
     """The method tell leaves its arguments as they were."""
     optimiser = case.build(SPACE)
@@ -268,7 +247,6 @@ def inputs(case: Case) -> None:
             expect(np.array_equal(value, was), f"tell must not modify its {name}, got others afterwards")
 
 
-@checklist
 def copies(case: Case) -> None:
     """A deep copy, and what comes out of a pickle, go on as the original does, each on its own."""
 
@@ -285,7 +263,6 @@ def copies(case: Case) -> None:
             expect(same(original, rest(twin)), f"{what} must go on as the original, got another after {count}")
 
 
-@checklist
 def start(case: Case) -> str:
     """The first population comes from the start that the space gives."""
     if case.next_frame == "forget":
@@ -297,7 +274,6 @@ def start(case: Case) -> str:
     return f"{away:.3g} away, spread 0.02"
 
 
-@checklist
 def next_frame(case: Case) -> str:
     """A filter carries its particles into the next frame."""
     if case.next_frame != "carry":
@@ -319,7 +295,6 @@ def next_frame(case: Case) -> str:
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 
 
-@checklist
 def modes(case: Case) -> str:
     """The method modes returns proposals that were passed to tell, the best first."""
     space = Toy(3, ball)
@@ -340,13 +315,11 @@ def modes(case: Case) -> str:
     return f"{len(returned)} modes"
 
 
-@checklist
 def sphere_problem(case: Case) -> str:
     """A sphere is solved better than by chance."""
     return _beats_chance(case, Toy(6), sphere)
 
 
-@checklist
 def real_problem(case: Case) -> str:
     """A real pose problem is solved better than by chance."""
     problem = pose_problem()
@@ -368,7 +341,6 @@ def _beats_chance(case: Case, space: Space, evaluate: Evaluate) -> str:
     return f"cost {best:.4g}, by chance {chance:.4g}, {BUDGET} evaluations"
 
 
-@checklist
 def speed(case: Case) -> str:
     """A proposal takes less than 50 ms to make."""
 
@@ -376,3 +348,30 @@ def speed(case: Case) -> str:
         return sum(len(proposals) for proposals, _ in case.steps(case.build(BOX, seed), BOX, sphere, 10))
 
     return check_speed("a proposal", MAX_SECONDS, search)
+
+
+RULES = [
+    common.construction,
+    shape,
+    dtype,
+    box,
+    feasible,
+    hardly_feasible,
+    dimensions,
+    costs,
+    budget,
+    order,
+    common.unknown_setting,
+    nonsense_settings,
+    seeds,
+    new_process,
+    global_randomness,
+    inputs,
+    copies,
+    start,
+    next_frame,
+    modes,
+    sphere_problem,
+    real_problem,
+    speed,
+]

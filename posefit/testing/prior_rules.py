@@ -15,11 +15,10 @@ from posefit.motion import built_in
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, duplicates, global_random_state, left_alone
 from posefit.testing.problem import walking_angles
-from posefit.testing.results import BrokenError, Checklist, SkippedError, expect
+from posefit.testing.results import BrokenError, SkippedError, expect
 
 ROWS = 100
 MAX_SECONDS = 5e-3  # to recover a pose
-checklist = Checklist()
 
 
 @dataclass(frozen=True)
@@ -73,16 +72,11 @@ def _check_array(method: str, values: Array, shape: tuple[int, int]) -> None:
     expect(np.isfinite(values).all(), f"{method} must return finite values, got nan or infinity")
 
 
-checklist(common.construction)
-
-
-@checklist
 def fit(case: Case) -> None:
     """The method fit returns the prior itself."""
     expect(case.first.returned is case.first.prior, "fit must return self, got another object")
 
 
-@checklist
 def ranges(case: Case) -> str:
     """The range of the latents is finite and not reversed."""
     prior = case.fitted
@@ -93,7 +87,6 @@ def ranges(case: Case) -> str:
     return f"{len(low)} latents"
 
 
-@checklist
 def transform(case: Case) -> None:
     """Joint angles (n, 63) become latents (n, m)."""
     prior = case.fitted
@@ -101,7 +94,6 @@ def transform(case: Case) -> None:
         _check_array("transform", np.asarray(prior.transform(walking_angles()[:rows])), (rows, len(prior.low)))
 
 
-@checklist
 def inverse(case: Case) -> None:
     """Latents (n, m) become finite joint angles (n, 63), in every corner of the range too."""
     prior = case.fitted
@@ -110,7 +102,6 @@ def inverse(case: Case) -> None:
         _check_array("inverse_transform", np.asarray(prior.inverse_transform(latents)), (len(latents), 63))
 
 
-@checklist
 def training_in_range(case: Case) -> None:
     """The training poses lie within the range."""
     prior = case.fitted
@@ -120,7 +111,6 @@ def training_in_range(case: Case) -> None:
     expect(not out.any(), f"training poses must lie in low to high, got {int(out.any(axis=1).sum())} that do not")
 
 
-@checklist
 def training_feasible(case: Case) -> str:
     """Nine of ten training poses are feasible."""
     prior = case.fitted
@@ -131,7 +121,6 @@ def training_feasible(case: Case) -> str:
     return f"{100 * feasible.mean():.0f} %"
 
 
-@checklist
 def same_bits(case: Case) -> None:
     """A row has the same bits whatever rows stand beside it."""
     prior, latents = case.fitted, case.latents
@@ -142,7 +131,6 @@ def same_bits(case: Case) -> None:
         expect(np.array_equal(prior.feasible(latents[rows]), feasible[rows]), "feasible must not depend on other rows")
 
 
-@checklist
 def same_again(case: Case) -> None:
     """Learning the same poses again gives the same space."""
     again = case.fitted_again()
@@ -150,7 +138,6 @@ def same_again(case: Case) -> None:
     expect(same, "fitting twice must give the same space, got two")
 
 
-@checklist
 def inputs(case: Case) -> None:
     """Methods leave their arguments as they were."""
     prior, angles, latents = case.fitted, walking_angles(), case.latents
@@ -160,7 +147,6 @@ def inputs(case: Case) -> None:
     expect(np.array_equal(latents, case.latents), "latents must stay as they are, got others")
 
 
-@checklist
 def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
@@ -170,14 +156,12 @@ def global_randomness(case: Case) -> None:
         case.fitted.inverse_transform(case.latents)
 
 
-@checklist
 def copies(case: Case) -> None:
     """A deep copy and what comes out of a pickle are the same space."""
     for what, twin in duplicates(case.fitted).items():
         expect(_same(twin, case.fitted, case.latents), f"{what} must be the same space, got another")
 
 
-@checklist
 def file(case: Case) -> None:
     """The saved file is loaded again as the same space."""
     load = getattr(type(case.fitted), "load", None)
@@ -190,7 +174,6 @@ def file(case: Case) -> None:
         expect(_same(load(path), case.fitted, case.latents), "load must give the same space, got another")
 
 
-@checklist
 def learns(case: Case) -> str:
     """Training poses come back nearer than their mean is."""
     prior, angles = case.fitted, walking_angles()
@@ -200,7 +183,6 @@ def learns(case: Case) -> str:
     return f"{error:.2f} degrees, the mean pose {mean:.2f}"
 
 
-@checklist
 def bad_input(case: Case) -> None:
     """Joint angles of a wrong shape, with nan, or too few are refused."""
     angles = walking_angles()
@@ -214,10 +196,6 @@ def bad_input(case: Case) -> None:
         raise BrokenError(f"fit must raise ValueError for {what}, got a prior")
 
 
-checklist(common.nonsense_settings)
-
-
-@checklist
 def searchable(case: Case) -> str:
     """A search space on it can be drawn from."""
     prior = case.fitted
@@ -228,8 +206,29 @@ def searchable(case: Case) -> str:
     return f"{100 * space.feasible(uniform).mean():.2g} % of the box is feasible"
 
 
-@checklist
 def speed(case: Case) -> str:
     """A pose is recovered in less than 5 ms."""
     prior, latents = case.fitted, case.latents
     return check_speed("a pose", MAX_SECONDS, lambda _: len(prior.inverse_transform(latents)))
+
+
+RULES = [
+    common.construction,
+    fit,
+    ranges,
+    transform,
+    inverse,
+    training_in_range,
+    training_feasible,
+    same_bits,
+    same_again,
+    inputs,
+    global_randomness,
+    copies,
+    file,
+    learns,
+    bad_input,
+    common.nonsense_settings,
+    searchable,
+    speed,
+]

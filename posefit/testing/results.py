@@ -4,7 +4,6 @@ import re
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -148,22 +147,3 @@ def parametrize(checks: Sequence[Check]) -> Any:
     import pytest
 
     return pytest.mark.parametrize("check", checks, ids=[check.name for check in checks])
-
-
-class Checklist:
-    """Collects the checks of a kind of plugin, in the order in which they are written."""
-
-    def __init__(self) -> None:
-        self._bodies: list[Callable[[Any], str | None]] = []
-
-    def __call__(self, body: Callable[[Any], str | None]) -> Callable[[Any], str | None]:
-        """Add a function to the list; its name is the check's, the first line of its docstring the rule."""
-        self._bodies.append(body)
-        return body
-
-    def of(self, case: object) -> list[Check]:
-        """Return all checks, bound to one plugin."""
-        return [
-            Check(body.__name__, (body.__doc__ or "").strip().split("\n")[0].rstrip("."), partial(body, case))
-            for body in self._bodies
-        ]

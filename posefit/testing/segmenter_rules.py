@@ -16,14 +16,13 @@ from posefit.silhouette.foreground import Image, Segmenter
 from posefit.silhouette.mask import Mask
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, left_alone
-from posefit.testing.results import Checklist, SkippedError, expect
+from posefit.testing.results import SkippedError, expect
 
 SIZE = (320, 240)
 EMPTY, FRAMES = 8, 40  # frames of an empty scene, then frames of a person who walks through
 OVERLAP = 0.3  # of the person and the mask: half of what a poor background model reaches
 MAX_SECONDS = 1.0  # for a picture of that size
 SKIN, SHIRT, TROUSERS = (150.0, 175.0, 225.0), (235.0, 235.0, 235.0), (200.0, 150.0, 130.0)  # blue, green, red
-checklist = Checklist()
 
 
 @dataclass(frozen=True)
@@ -98,10 +97,6 @@ class Case(PluginCase):
         return self.segment()
 
 
-checklist(common.construction)
-
-
-@checklist
 def masks(case: Case) -> None:
     """The method segment returns two boolean masks of the picture's size."""
     for mask in (mask for pair in case.masks for mask in pair):
@@ -109,7 +104,6 @@ def masks(case: Case) -> None:
         expect(mask.dtype == np.bool_, f"a mask must be boolean, got {mask.dtype}")
 
 
-@checklist
 def overlap(case: Case) -> str:
     """The mask shows the person in half of the frames at least."""
     true = painted()[1][::4]
@@ -123,14 +117,12 @@ def overlap(case: Case) -> str:
     return f"overlap {middle:.2f}"
 
 
-@checklist
 def same_again(case: Case) -> None:
     """The same film gives the same masks."""
     same = np.array_equal(case.masks, case.segment())
     expect(same, "two segmenters of one film must give the same masks, got others")
 
 
-@checklist
 def inputs(case: Case) -> None:
     """The image stays as it was."""
     image = painted()[0].images[20].copy()
@@ -138,7 +130,6 @@ def inputs(case: Case) -> None:
     expect(np.array_equal(image, painted()[0].images[20]), "an image must stay as it is, got another")
 
 
-@checklist
 def background(case: Case) -> str:
     """A background that is shown is a picture of the film's size."""
     shown = getattr(case.build(), "background", None)
@@ -149,7 +140,6 @@ def background(case: Case) -> str:
     return ""
 
 
-@checklist
 def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     segmenter = case.build()
@@ -157,11 +147,20 @@ def global_randomness(case: Case) -> None:
         segmenter.segment(painted()[0].images[20])
 
 
-checklist(common.nonsense_settings)
-
-
-@checklist
 def speed(case: Case) -> str:
     """A picture of 320 x 240 takes less than a second."""
     segmenter, images = case.build(), painted()[0].images[16:20]
     return check_speed("a picture", MAX_SECONDS, lambda _: len([segmenter.segment(image) for image in images]))
+
+
+RULES = [
+    common.construction,
+    masks,
+    overlap,
+    same_again,
+    inputs,
+    background,
+    global_randomness,
+    common.nonsense_settings,
+    speed,
+]

@@ -18,11 +18,10 @@ from posefit.silhouette.mask import Silhouette
 from posefit.testing import common
 from posefit.testing.common import PluginCase, global_random_state, left_alone
 from posefit.testing.problem import SIZE
-from posefit.testing.results import BrokenError, Checklist, expect
+from posefit.testing.results import BrokenError, expect
 
 FRAMES = 12
 EVALUATIONS = 400
-checklist = Checklist()
 
 
 @lru_cache(maxsize=1)
@@ -93,16 +92,11 @@ class Case(PluginCase):
         return Tracked(tracker, frames, taken, audit.warnings, unchanged, random == global_random_state())
 
 
-checklist(common.construction)
-
-
-@checklist
 def one_frame_each(case: Case) -> str:
     """Every observation gives one frame: a pose (66,), a translation (3,), evaluations and seconds."""
     return f"{len(case.first.frames)} frames"
 
 
-@checklist
 def as_they_come(case: Case) -> None:
     """A frame is given before the observation after the next is taken; or as much later as the tracker's `lag` says."""
     lag = getattr(case.first.tracker, "lag", 1)
@@ -110,33 +104,28 @@ def as_they_come(case: Case) -> None:
         expect(taken <= given + lag, f"frames must come as observations do, got frame {given} after {taken} of them")
 
 
-@checklist
 def no_observation(case: Case) -> None:
     """No observation gives no frame."""
     frames = list(case.build().track([], np.random.default_rng(0)))
     expect(not frames, f"no observation must give no frame, got {len(frames)}")
 
 
-@checklist
 def audit(case: Case) -> str:
     """Cost and areas of a frame are those of its pose; it counts every pose it draws, and keeps the budget."""
     expect(not case.first.warnings, "; ".join(case.first.warnings))
     return f"at most {max(frame.evaluations for frame in case.first.frames)} of {EVALUATIONS} evaluations"
 
 
-@checklist
 def same_seed(case: Case) -> None:
     """The same seed gives the same poses."""
     expect(case.same(case.build()), "one seed must give one track, got two")
 
 
-@checklist
 def used_twice(case: Case) -> None:
     """A tracker that has tracked before does the same again."""
     expect(case.same(case.first.tracker), "a second track must be as the first, got another")
 
 
-@checklist
 def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
@@ -144,13 +133,11 @@ def global_randomness(case: Case) -> None:
             case.same(case.build())
 
 
-@checklist
 def inputs(case: Case) -> None:
     """Observations and task stay as they were."""
     expect(case.first.inputs_unchanged, "observations and task must stay as they are, got others")
 
 
-@checklist
 def follows(case: Case) -> str:
     """The track is nearer to the truth than a body lying on the floor: its MPJPE is below 400 mm."""
     task, motion, _ = scene()
@@ -162,4 +149,16 @@ def follows(case: Case) -> str:
     return f"MPJPE {error:.0f} mm"
 
 
-checklist(common.unknown_setting)
+RULES = [
+    common.construction,
+    one_frame_each,
+    as_they_come,
+    no_observation,
+    audit,
+    same_seed,
+    used_twice,
+    global_randomness,
+    inputs,
+    follows,
+    common.unknown_setting,
+]
