@@ -38,6 +38,13 @@ def check_place(path: str | Path) -> None:
         raise InputError(f"{path}: expected a place to write to, got one in {parent}, which is none")
 
 
+def check_free(path: str | Path | None) -> None:
+    """Return nothing. Raises InputError as `check_new` and `check_place` do, where there is a path."""
+    if path is not None:
+        check_new(path)
+        check_place(path)
+
+
 def new_folder(path: str | Path) -> AbstractContextManager[Path]:
     """Yield an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
 

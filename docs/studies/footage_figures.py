@@ -20,7 +20,7 @@ import numpy as np
 
 from footage_sets import Activity, Recording, errors_mm, films_in, recording_of
 from posefit.cli.options import EXTRACTION, FRAMES, JSON, options, track_flags
-from posefit.cli.output import json_line, progress, say
+from posefit.cli.output import progress, say
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
@@ -256,6 +256,6 @@ def figures(out: str | None, as_json: bool, **given: Any) -> None:
     except InputError as mistake:
         say(f"posefit: {mistake}")
         sys.exit(2)
-    click.echo(json_line(report) if as_json else "\n".join(_lines(report)))
+    click.echo(json.dumps(report) if as_json else "\n".join(_lines(report)))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(report['figures'])}")

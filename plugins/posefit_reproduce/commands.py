@@ -4,6 +4,7 @@
 it runs.
 """
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -13,7 +14,7 @@ import click
 
 from posefit import hookimpl
 from posefit.cli.options import JSON
-from posefit.cli.output import json_line, progress, say
+from posefit.cli.output import progress, say
 from posefit.errors import InputError
 
 NEIGHBOURS = "Processes. Seconds of a frame are those beside so many neighbours."
@@ -36,7 +37,7 @@ def vsmm_command(seeds: int, searches: bool, alternatives: bool, out: str | None
     from posefit_reproduce.vsmm.report import patent_report, patent_text
 
     figures = patent_report(seeds, searches, alternatives, out, workers, partial(progress, unit="run"))
-    click.echo(json_line(figures) if as_json else patent_text(figures))
+    click.echo(json.dumps(figures) if as_json else patent_text(figures))
     if out and not as_json:
         click.echo(f"written to {out}: look at figure-9-joints.png, figure-10-probabilities.png, figure-11-errors.png")
 
@@ -78,7 +79,7 @@ def sapso_command(
 
     scale = replace(QUICK if quick else Scale(), first_yaw=first_yaw)
     report = paper_report(clips, seeds, scale, out, workers, partial(progress, unit="run"))
-    click.echo(json_line(report) if as_json else paper_text(report))
+    click.echo(json.dumps(report) if as_json else paper_text(report))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(report['figures'])}")
 
@@ -112,7 +113,7 @@ def bench_command(threads: int | None, device: str | None, as_json: bool) -> Non
         say("timing the GPU beside the CPU; this takes a minute or more ...")
         figures = device_figures(device)
         lines = device_lines(figures)
-    click.echo(json_line(figures) if as_json else "\n".join(lines))
+    click.echo(json.dumps(figures) if as_json else "\n".join(lines))
 
 
 def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:

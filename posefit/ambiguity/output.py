@@ -1,16 +1,15 @@
 """The results of `posefit ambiguity`: the printed table, the JSON summary and the picture."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
 from posefit.ambiguity.estimate import YAWS, Ambiguity, Floor
-from posefit.files import new_folder
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS
@@ -216,21 +215,9 @@ def _blank(height: int, width: int) -> Image:
 FILES = ("ambiguity.json", "ambiguity.png")
 
 
-@contextmanager
-def written_to(path: str | None) -> Iterator[Callable[[Ambiguity], None]]:
-    """Yield a function that writes a result to the new folder `path`, or nothing where there is none.
-
-    Raises ValueError where `path` exists or cannot be written.
-    """
-    if path is None:
-        yield lambda _result: None
-        return
-    with new_folder(path) as folder:
-
-        def save(result: Ambiguity) -> None:
-            text, picture = FILES
-            (folder / text).write_text(json.dumps(summary_of(result), indent=1) + "\n", encoding="utf-8")
-            if not cv2.imwrite(str(folder / picture), picture_of(result)):
-                raise OSError(f"no room for {picture}")
-
-        yield save
+def write_result(folder: Path, result: Ambiguity) -> None:
+    """Write a result's numbers and its picture to a folder. Raises OSError where there is no room."""
+    text, picture = FILES
+    (folder / text).write_text(json.dumps(summary_of(result), indent=1) + "\n", encoding="utf-8")
+    if not cv2.imwrite(str(folder / picture), picture_of(result)):
+        raise OSError(f"no room for {picture}")

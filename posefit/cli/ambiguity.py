@@ -1,12 +1,13 @@
 """`posefit ambiguity`."""
 
+import json
 from contextlib import nullcontext
 from typing import Any
 
 import click
 
 from posefit.cli.options import EXTRACTION, JSON, WITHOUT, options, track_flags
-from posefit.cli.output import json_line, results_alone, say
+from posefit.cli.output import results_alone, say
 from posefit.cli.tracking import extraction_of, without_subjects
 
 
@@ -32,17 +33,19 @@ def ambiguity(as_json: bool, out: str | None, **given: Any) -> None:
     them all, below which no search can go, with a second camera as well. SOURCE is as for `track`.
     """
     from posefit.ambiguity.estimate import ambiguity_of
-    from posefit.ambiguity.output import ambiguity_table, summary_of, written_to
+    from posefit.ambiguity.output import ambiguity_table, summary_of, write_result
+    from posefit.files import new_folder
 
     source = given.pop("source") or ("walk",)
     given["extraction"] = extraction_of(given, source[0])
     if subjects := given.pop("without_subject"):
         given["train"] = without_subjects(given["train"], subjects)
-    with results_alone() if as_json else nullcontext(), written_to(out) as write:
+    with results_alone() if as_json else nullcontext(), new_folder(out) if out else nullcontext() as folder:
         result = ambiguity_of(source, say=say, **given)
-        write(result)
+        if folder is not None:
+            write_result(folder, result)
     if as_json:
-        click.echo(json_line(summary_of(result)))
+        click.echo(json.dumps(summary_of(result)))
         return
     click.echo(ambiguity_table(result))
     if out:

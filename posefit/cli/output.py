@@ -16,13 +16,6 @@ def say(message: str) -> None:
     click.echo("\n".join(map(printable, message.split("\n"))), err=True)
 
 
-def json_line(value: Any) -> str:
-    """Return a result as one line of JSON."""
-    import json
-
-    return json.dumps(value)
-
-
 def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
     """Yield steps, of which there are `count`, with a bar on stderr."""
     from tqdm import tqdm

@@ -1,10 +1,11 @@
 """`posefit plugins` and `posefit check`."""
 
+import json
 from typing import Any
 
 import click
 
-from posefit.cli.output import json_line, results_alone
+from posefit.cli.output import results_alone
 
 
 @click.group(invoke_without_command=True)
@@ -23,7 +24,7 @@ def plugins(context: click.Context, as_json: bool) -> None:
     with results_alone():
         offers = registry().offers
     if as_json:
-        click.echo(json_line([described(offer) for kind in KINDS for offer in offers[kind].values()]))
+        click.echo(json.dumps([described(offer) for kind in KINDS for offer in offers[kind].values()]))
         return
     for line in listing(registry()):
         click.echo(line)
@@ -96,7 +97,7 @@ def check(
             {"check": one.name, "outcome": one.outcome, "detail": one.detail, "traceback": one.traceback}
             for one in report.results
         ]
-        click.echo(json_line({"plugin": report.plugin, "summary": report.summary, "results": results}))
+        click.echo(json.dumps({"plugin": report.plugin, "summary": report.summary, "results": results}))
     else:
         click.echo(str(report))
     context.exit(0 if report else 1)

@@ -1,5 +1,6 @@
 """`posefit suite`."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from posefit.cli.options import parsed_by
-from posefit.cli.output import json_line, progress, results_alone, say
+from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.tracking.options import text_range
 
@@ -27,7 +28,7 @@ def suite(context: click.Context, as_json: bool) -> None:
     from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 
     if as_json:
-        click.echo(json_line([asdict(one) for one in FUNCTIONS]))
+        click.echo(json.dumps([asdict(one) for one in FUNCTIONS]))
         return
     click.echo(f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100")
     click.echo(f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out\n")
@@ -70,6 +71,7 @@ def suite_run(
 ) -> None:
     """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
     from posefit import settings
+    from posefit.files import check_free
     from posefit.fitting.check import whole
     from posefit.registry import registry
     from posefit.suites.problem import Suite
@@ -78,7 +80,7 @@ def suite_run(
     with results_alone():
         whole("budget", budget, 1)
         whole("seed", seed, 0)
-        _check_free(out)
+        check_free(out)
         numbers = _numbers(*instances)
         chosen_functions, chosen_dimensions = functions or None, dimensions or (9,)
         problems = Suite(
@@ -102,25 +104,17 @@ def suite_run(
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
+    from posefit.files import check_free
     from posefit.reading import counted
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.table import search_runs
 
-    _check_free(iohprofiler)
+    check_free(iohprofiler)
     results = Ledger(ledger, say)
     runs = list(search_runs(results))
     if failed := len(results.quarantined()):
         say(f"{counted(failed, 'cell')} failed, left out of all figures")
     _print(runs, iohprofiler, as_json)
-
-
-def _check_free(path: str | None) -> None:
-    """Raise InputError where a file or folder exists already, or has no place."""
-    from posefit.files import check_new, check_place
-
-    if path is not None:
-        check_new(path)
-        check_place(path)
 
 
 def _numbers(start: int | None, stop: int | None) -> range:
@@ -142,5 +136,5 @@ def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     if out is not None:
         write_iohprofiler(suite_runs(runs), out)
         say(f"written to {out}: IOHprofiler's files")
-    for line in [json_line([asdict(one) for one in scores])] if as_json else score_lines(scores):
+    for line in [json.dumps([asdict(one) for one in scores])] if as_json else score_lines(scores):
         click.echo(line)

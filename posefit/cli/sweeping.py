@@ -1,5 +1,6 @@
 """`posefit sweep` and `posefit report`."""
 
+import json
 from collections.abc import Iterator
 from contextlib import nullcontext, suppress
 from itertools import islice
@@ -8,7 +9,7 @@ from typing import Any
 import click
 
 from posefit.cli.options import ENGINE, options
-from posefit.cli.output import json_line, results_alone, say
+from posefit.cli.output import results_alone, say
 
 LINES = 1000  # that are printed at a time
 
@@ -54,7 +55,7 @@ def sweep(
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
         tally = command.run_plan(plan, out, start, say, retry_quarantined=retry_quarantined, keep_old=keep_old)
-    click.echo(json_line({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
+    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(command.exit_status(tally))
 
 
@@ -93,7 +94,7 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
     from posefit.report.write import leaderboard_lines, write_report
 
     summary = write_report(ledger, out, warn=say, **others)
-    for line in [json_line(summary)] if as_json else leaderboard_lines(summary):
+    for line in [json.dumps(summary)] if as_json else leaderboard_lines(summary):
         click.echo(line)
 
 

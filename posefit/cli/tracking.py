@@ -1,5 +1,6 @@
 """`posefit track`, `fit` and `extract`."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -8,7 +9,7 @@ from typing import Any
 import click
 
 from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options
-from posefit.cli.output import json_line, progress, results_alone, say
+from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
 
@@ -76,7 +77,7 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progre
     for name in ("source", "out", "force", "resume", "rerun"):
         options.pop(name)
     frames = track_live(live, progress=shown, **options)
-    summary = write_live(frames, out, (lambda frame: click.echo(json_line(frame.row))) if as_json else None)
+    summary = write_live(frames, out, (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None)
     latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
     shown.log(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
 
@@ -88,7 +89,7 @@ def _print(
     from posefit.tracking.table import brief, table
 
     if as_json:
-        click.echo(json_line({**summary, **more}))
+        click.echo(json.dumps({**summary, **more}))
         return
     if verbose:
         click.echo(table(summary))
@@ -117,7 +118,7 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
-        click.echo(json_line(result))
+        click.echo(json.dumps(result))
         return
     click.echo(
         f"{result['frames']} frames, {result['usable']} usable, {result['touching_border']} touch the border, "

@@ -143,8 +143,7 @@ class Problem:
     @property
     def best_known(self) -> float:
         """The lowest known cost: the truth's, or that of known.json."""
-        known = best_known_of(self.id)
-        return self.truth_cost if known is None else min(known, self.truth_cost)
+        return min(self.truth_cost, known_file()["best"].get(self.id, np.inf))
 
     @property
     def targets(self) -> Array:
@@ -305,8 +304,3 @@ def known_file() -> dict[str, Any]:
     """Return the contents of known.json: how it was made, and `best`, a cost by a problem's id."""
     contents: dict[str, Any] = parsed_json((files("posefit.suites") / "known.json").read_text(encoding="utf-8"))
     return contents
-
-
-def best_known_of(problem: str) -> float | None:
-    """Return the best known cost of a problem by its id; None where it is unknown."""
-    return known_file()["best"].get(problem)  # type: ignore[no-any-return]

@@ -14,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.errors import InputError
-from posefit.files import check_new, check_place
+from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
@@ -141,9 +141,8 @@ def write_live(
     stream breaks off. Raises InputError then, after both are written.
     """
     folder, latencies, last = None if out is None else Path(out), [], 0
+    check_free(folder)
     if folder is not None:
-        check_new(folder)
-        check_place(folder)
         folder.mkdir()
     lines = None if folder is None else (folder / LINES).open("w", encoding="utf-8")
     try:

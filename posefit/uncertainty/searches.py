@@ -43,7 +43,6 @@ class Weighed:
     costs: Array  # (n,)
     groups: NDArray[np.int64]  # (n,) the mode of each, a row of `modes`
     modes: Array  # (k, d) the lowest proposals of the valleys, the deepest first
-    evaluations: int  # beyond those of the searches
 
     def even(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return proposals (count, d) of equal weights (count,): each mode has its share, rounded up or down."""
@@ -78,8 +77,7 @@ def weighed(
     particles = max(int(left / (CHAIN + ROUNDS * (CHAIN - 1))), 2) * CHAIN
     sample = tempered(landscape, start, temperature, rng, particles=particles, chain=CHAIN, evaluations=left)
     groups = start.nearest(landscape.box, sample.proposals) % len(modes)
-    used = landscape.evaluations - before
-    return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes, used)
+    return Weighed(sample.proposals, sample.weights, sample.costs, groups, modes)
 
 
 def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) -> Searched:

@@ -16,7 +16,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_without
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import suite_instance
-from posefit.suites.problem import BudgetSpentError, Problem, best_known_of, known_file
+from posefit.suites.problem import BudgetSpentError, Problem, known_file
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
@@ -199,9 +199,9 @@ def test_the_file_names_problems_of_the_suite_and_costs_below_their_truths() -> 
         function, instance, dimension = map(int, re.fullmatch(r"posefit-2026.1_f(\d+)_i(\d+)_d(\d+)", name).groups())  # type: ignore[union-attr]
         problem = posefit.suite("posefit-2026.1", function, instance, dimension)
         assert problem.id == name
-        assert 0.0 <= cost == best_known_of(name) == problem.best_known < problem.truth_cost
+        assert 0.0 <= cost == problem.best_known < problem.truth_cost
         assert problem.targets[-1] == cost + 0.25
-    assert best_known_of("posefit-2026.1_f001_i00000_d09") is None
+    assert "posefit-2026.1_f001_i00000_d09" not in best
 
 
 def test_what_is_best_known_never_rises_and_no_problem_goes() -> None:
