@@ -143,7 +143,8 @@ class Problem:
     @property
     def best_known(self) -> float:
         """The lowest known cost: the truth's, or that of known.json."""
-        return min(self.truth_cost, known_file()["best"].get(self.id, np.inf))
+        known: float = known_file()["best"].get(self.id, np.inf)
+        return min(self.truth_cost, known)
 
     @property
     def targets(self) -> Array:
