@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from posefit import hookimpl as hookimpl
 from posefit.arrays import Array as Array
+from posefit.fitting.adapter import Adapter as Adapter
 from posefit.fitting.box import Space as Space
 from posefit.fitting.box import Start as Start
 from posefit.fitting.box import converted as converted
@@ -31,6 +32,7 @@ from posefit.fitting.box import sample_normal as sample_normal
 from posefit.fitting.box import wrap as wrap
 from posefit.fitting.check import at_least as at_least
 from posefit.fitting.check import between as between
+from posefit.fitting.check import choices as choices
 from posefit.fitting.check import one_of as one_of
 from posefit.fitting.check import positive as positive
 from posefit.fitting.check import whole as whole

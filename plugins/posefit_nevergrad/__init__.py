@@ -13,21 +13,12 @@ from typing import Any, final
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.plugin import (
-    Array,
-    RegisterOptimiser,
-    Space,
-    at_least,
-    draw_population,
-    finite_costs,
-    hookimpl,
-    repair,
-)
+from posefit.plugin import Adapter, Array, RegisterOptimiser, Space, at_least, draw_population, hookimpl
 from posefit.reading import quoted
 
 
 @final
-class Nevergrad:
+class Nevergrad(Adapter):
     """An optimiser of Nevergrad, asked for `population_size` proposals at a time, within a budget of `evaluations`.
 
     Settings:
@@ -54,7 +45,7 @@ class Nevergrad:
             raise InputError(
                 f"variant must be one of {len(known)} names such as TwoPointsDE, CMA, PSO, got {quoted(variant)}"
             )
-        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        super().__init__(space, draw_population(space, rng, 1)[0])
         rng = np.random.default_rng(int(rng.integers(2**63)))
         self._global = GlobalRandom(int(rng.integers(2**31)))
         with self._global:
@@ -66,23 +57,19 @@ class Nevergrad:
             for proposal in draw_population(space, rng, population_size):
                 self._optimiser.suggest(proposal)
         self._population_size = population_size
-        self._asked: list[Any] = []
+        self._candidates: list[Any] = []
 
-    def ask(self) -> Array:
+    def propose(self) -> Array:
         """Return the optimiser's next population (n, d)."""
-        if not self._asked:
-            with self._global:
-                self._asked = [self._optimiser.ask() for _ in range(self._population_size)]
-        return repair(self._space, np.array([candidate.value for candidate in self._asked]), self._home)
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        """Let the optimiser learn the costs (n,)."""
-        if not self._asked:
-            raise InputError("tell must follow ask, got costs before proposals")
         with self._global:
-            for candidate, cost in zip(self._asked, finite_costs(costs).tolist(), strict=True):
+            self._candidates = [self._optimiser.ask() for _ in range(self._population_size)]
+        return np.array([candidate.value for candidate in self._candidates])
+
+    def learn(self, proposals: Array, costs: Array) -> None:
+        """Let the optimiser learn the costs (n,)."""
+        with self._global:
+            for candidate, cost in zip(self._candidates, costs.tolist(), strict=True):
                 self._optimiser.tell(candidate, cost)
-        self._asked = []
 
 
 class GlobalRandom:

@@ -9,28 +9,17 @@ T. Akiba et al., Optuna: a next-generation hyperparameter optimization framework
 True
 """
 
-from typing import Any, Literal, final, get_args
+from typing import Any, Literal, final
 
 import numpy as np
 
-from posefit.errors import InputError
-from posefit.plugin import (
-    Array,
-    RegisterOptimiser,
-    Space,
-    at_least,
-    draw_population,
-    finite_costs,
-    hookimpl,
-    one_of,
-    repair,
-)
+from posefit.plugin import Adapter, Array, RegisterOptimiser, Space, at_least, choices, draw_population, hookimpl
 
 Variant = Literal["TPESampler", "CmaEsSampler", "GPSampler", "NSGAIISampler", "QMCSampler", "RandomSampler"]
 
 
 @final
-class Optuna:
+class Optuna(Adapter):
     """A study of Optuna with that sampler, asked for `population_size` proposals at a time, at first from the start.
 
     NSGAIISampler is quick enough for thousands of proposals; TPESampler and GPSampler take milliseconds each, and more
@@ -52,8 +41,8 @@ class Optuna:
         import optuna
 
         at_least("population_size", population_size, 1)
-        one_of("variant", variant, get_args(Variant))
-        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        choices(Optuna.__init__, locals())
+        super().__init__(space, draw_population(space, rng, 1)[0])
         rng = np.random.default_rng(int(rng.integers(2**63)))
         optuna.logging.set_verbosity(optuna.logging.ERROR)
         self._study: Any = optuna.create_study(sampler=getattr(optuna.samplers, variant)(seed=int(rng.integers(2**31))))
@@ -64,20 +53,15 @@ class Optuna:
         self._population_size = population_size
         self._trials: list[Any] = []
 
-    def ask(self) -> Array:
+    def propose(self) -> Array:
         """Return the study's next population (n, d)."""
-        if not self._trials:
-            self._trials = [self._study.ask(self._box) for _ in range(self._population_size)]
-        asked = np.array([[trial.params[name] for name in self._names] for trial in self._trials])
-        return repair(self._space, asked, self._home)
+        self._trials = [self._study.ask(self._box) for _ in range(self._population_size)]
+        return np.array([[trial.params[name] for name in self._names] for trial in self._trials])
 
-    def tell(self, proposals: Array, costs: Array) -> None:
+    def learn(self, proposals: Array, costs: Array) -> None:
         """Let the study learn the costs (n,)."""
-        if not self._trials:
-            raise InputError("tell must follow ask, got costs before proposals")
-        for trial, cost in zip(self._trials, finite_costs(costs).tolist(), strict=True):
+        for trial, cost in zip(self._trials, costs.tolist(), strict=True):
             self._study.tell(trial, cost)
-        self._trials = []
 
 
 @hookimpl

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.check import at_least, one_of
+from posefit.fitting.check import at_least, choices
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import Shape, Stored, angles_of, indices_of
 
@@ -32,7 +32,7 @@ class Full(Stored):
     rest: Array  # (63,) radians: the mean, where the others stay
 
     def __init__(self, *, limits: Literal["asf", "training"] = "asf", margin: float = 0.0) -> None:
-        one_of("limits", limits, ("asf", "training"))
+        choices(Full.__init__, locals())
         at_least("margin", margin, 0.0)
         self._limits, self._margin = limits, margin
 

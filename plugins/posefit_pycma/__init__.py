@@ -12,22 +12,11 @@ from typing import Any, final
 
 import numpy as np
 
-from posefit.errors import InputError
-from posefit.plugin import (
-    Array,
-    RegisterOptimiser,
-    Space,
-    at_least,
-    draw_population,
-    finite_costs,
-    hookimpl,
-    positive,
-    repair,
-)
+from posefit.plugin import Adapter, Array, RegisterOptimiser, Space, at_least, draw_population, hookimpl, positive
 
 
 @final
-class PyCMA:
+class PyCMA(Adapter):
     """pycma's evolution strategy with its own handling of the box.
 
     It starts around the prediction with its spread, or anywhere with `spread`, and again where it has stopped.
@@ -43,7 +32,7 @@ class PyCMA:
         if population_size != 0:
             at_least("population_size", population_size, 5)
         positive("spread", spread)
-        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        super().__init__(space, draw_population(space, rng, 1)[0])
         self._rng = np.random.default_rng(int(rng.integers(2**63)))
         self._spare = np.zeros(1 if space.dimensions == 1 else 0)  # pycma cannot search a single dimension
         stds = np.full(space.dimensions, spread) if space.start is None else np.maximum(space.start.spread, 1e-6)
@@ -53,25 +42,21 @@ class PyCMA:
         if population_size:
             self._options["popsize"] = population_size
         self._strategy: Any = None
-        self._asked: list[Array] | None = None
+        self._drawn: list[Array] = []  # with the spare dimension
 
-    def ask(self) -> Array:
+    def propose(self) -> Array:
         """Return the strategy's next population (n, d)."""
         from cma import CMAEvolutionStrategy
 
-        if self._asked is None:
-            if self._strategy is None or self._strategy.stop():
-                first = np.append(draw_population(self._space, self._rng, 1)[0], self._spare)
-                self._strategy = CMAEvolutionStrategy(first, 1.0, self._options)
-            self._asked = self._strategy.ask()
-        return repair(self._space, np.array(self._asked)[:, : self._space.dimensions], self._home)
+        if self._strategy is None or self._strategy.stop():
+            first = np.append(draw_population(self._space, self._rng, 1)[0], self._spare)
+            self._strategy = CMAEvolutionStrategy(first, 1.0, self._options)
+        self._drawn = self._strategy.ask()
+        return np.array(self._drawn)[:, : self._space.dimensions]
 
-    def tell(self, proposals: Array, costs: Array) -> None:
+    def learn(self, proposals: Array, costs: Array) -> None:
         """Let the strategy learn the costs (n,)."""
-        if self._asked is None:
-            raise InputError("tell must follow ask, got costs before proposals")
-        self._strategy.tell(self._asked, finite_costs(costs).tolist())
-        self._asked = None
+        self._strategy.tell(self._drawn, costs.tolist())
 
 
 class Normal:

@@ -14,23 +14,13 @@ from typing import Any, final
 
 import numpy as np
 
-from posefit.plugin import (
-    Array,
-    RegisterOptimiser,
-    Space,
-    at_least,
-    draw_population,
-    finite_costs,
-    hookimpl,
-    positive,
-    repair,
-)
+from posefit.plugin import Adapter, Array, RegisterOptimiser, Space, at_least, draw_population, hookimpl, positive
 
 MIN_POPULATION_OF_A_STRATEGY = 4  # proposals of a strategy: half of them are its parents
 
 
 @final
-class Ribs:
+class Ribs(Adapter):
     """CMA-ES that restarts from an archive of dominated novelty search: from proposals far from all better ones.
 
     An archive of `capacity` proposals keeps those that are farthest from their nearest better ones. Several evolution
@@ -67,8 +57,8 @@ class Ribs:
         at_least("neighbours", neighbours, 1)
         at_least("populations", populations, 1)
         positive("step", step)
-        self._first, self._asked = draw_population(space, rng, population_size), False
-        self._space, self._home, self._neighbours = space, self._first[0], neighbours
+        self._first, self._neighbours = draw_population(space, rng, population_size), neighbours
+        super().__init__(space, self._first[0])
         self._archive: Any = DNSArchive(
             solution_dim=space.dimensions,
             measure_dim=self._where(self._first).shape[1],
@@ -93,19 +83,17 @@ class Ribs:
             for k in range(strategies)
         ]
 
-    def ask(self) -> Array:
+    def propose(self) -> Array:
         """Return the next population (n, d)."""
         if self._archive.empty:
-            return self._first.copy()
-        self._asked = True
-        asked = np.concatenate([one.ask() for one in self._strategies])
-        return repair(self._space, asked, self._home)
+            return self._first
+        return np.concatenate([one.ask() for one in self._strategies])
 
-    def tell(self, proposals: Array, costs: Array) -> None:
+    def learn(self, proposals: Array, costs: Array) -> None:
         """Let the archive choose among its proposals and these, and every strategy learn from its own."""
-        values, where = -finite_costs(costs), self._where(proposals)
+        values, where, first = -costs, self._where(proposals), self._archive.empty
         added = self._archive.add(proposals, values, where)
-        if self._asked:
+        if not first:
             stops = np.cumsum([one.batch_size for one in self._strategies])
             for one, stop in zip(self._strategies, stops.tolist(), strict=True):
                 mine = slice(stop - one.batch_size, stop)

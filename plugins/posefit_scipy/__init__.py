@@ -10,11 +10,11 @@ True
 """
 
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
-from posefit.plugin import RegisterOptimiser, Space, at_least, draw_population, hookimpl, one_of
+from posefit.plugin import RegisterOptimiser, Space, at_least, choices, draw_population, hookimpl
 from posefit_scipy.bridge import Bridged, Objective
 
 Variant = Literal["differential_evolution", "dual_annealing"]
@@ -32,7 +32,7 @@ def scipy(
         population_size: size of differential evolution's population, 5 or more; dual annealing has none.
     """
     at_least("population_size", population_size, 5)
-    one_of("variant", variant, get_args(Variant))
+    choices(scipy, locals())
     return Bridged(space, rng, partial(_evolve, population_size) if variant == "differential_evolution" else _anneal)
 
 

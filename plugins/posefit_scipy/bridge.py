@@ -8,8 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from posefit.errors import InputError
-from posefit.plugin import Array, Space, draw_population, finite_costs, repair
+from posefit.plugin import Adapter, Array, Space, draw_population
 
 LEAVE_SECONDS = 5.0  # how long to wait for a library to leave when its search is dropped
 
@@ -18,7 +17,7 @@ Library = Callable[[Space, np.random.Generator, Objective], Any]
 
 
 @final
-class Bridged:
+class Bridged(Adapter):
     """An optimiser that runs `library(space, rng, objective)` in a thread, which waits in the objective for the costs.
 
     Proposals are repaired where they are not feasible, and costs are finite. The thread ends with the search: when
@@ -27,35 +26,24 @@ class Bridged:
     """
 
     def __init__(self, space: Space, rng: np.random.Generator, library: Library) -> None:
-        self._space, self._home = space, draw_population(space, rng, 1)[0]
+        super().__init__(space, draw_population(space, rng, 1)[0])
         self._library, self._seed = library, int(rng.integers(2**63))
         self._costs: list[Array] = []  # of all populations so far
-        self._asked: Array | None = None
         self._channel: _Channel | None = None
 
-    def ask(self) -> Array:
+    def propose(self) -> Array:
         """Return the population (n, d) whose costs the library waits for; an empty one once it has ended."""
-        ended = self._channel is not None and self._asked is None
-        if not ended and (self._channel is None or not self._channel.thread.is_alive()):  # not begun, copied or forked
-            self._channel = _Channel(self._library, self._space, self._seed)
+        told: list[Array | None] = [*self._costs[-1:]]
+        if self._channel is None or not self._channel.thread.is_alive():  # not begun, copied or forked
+            self._channel, told = _Channel(self._library, self._space, self._seed), [None, *self._costs]
             weakref.finalize(self, self._channel.close)
-            self._asked = self._channel.proposals()
-            for costs in self._costs:
-                self._channel.costs.put(costs)
-                self._asked = self._channel.proposals()
-        if self._asked is None:
-            return np.empty((0, self._space.dimensions))
-        return repair(self._space, self._asked, self._home)
+        for costs in told:
+            asked = self._channel.proposals(costs)
+        return np.empty((0, self._space.dimensions)) if asked is None else asked
 
-    def tell(self, proposals: Array, costs: Array) -> None:
-        """Pass the costs (n,) on. Raises ValueError where there are no proposals, or another number of them."""
-        if self._asked is None or self._channel is None:
-            raise InputError("tell must follow ask, got costs before proposals")
-        if len(costs) != len(self._asked):
-            raise InputError(f"tell must get {len(self._asked)} costs, got {len(costs)}")
-        self._costs.append(finite_costs(costs))
-        self._channel.costs.put(self._costs[-1])
-        self._asked = self._channel.proposals()
+    def learn(self, proposals: Array, costs: Array) -> None:
+        """Pass the costs (n,) on."""
+        self._costs.append(costs)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_channel": None, "_asked": None}
@@ -76,8 +64,10 @@ class _Channel:
         )
         self.thread.start()
 
-    def proposals(self) -> Array | None:
-        """Return the library's next proposals; None once it has ended."""
+    def proposals(self, told: Array | None) -> Array | None:
+        """Return the library's next proposals, after the costs of the last ones; None once it has ended."""
+        if told is not None:
+            self.costs.put(told)
         proposals = self._proposals.get()
         if isinstance(proposals, BaseException):
             raise RuntimeError(f"the library failed: {type(proposals).__name__}: {proposals}") from proposals
@@ -95,7 +85,7 @@ class _Channel:
             self._proposals.put(None)
         except _DroppedError:
             pass
-        except BaseException as error:  # whatever it is, `ask` or `tell` raises it
+        except BaseException as error:  # whatever it is, `ask` raises it
             self._proposals.put(error)
 
     def _objective(self, proposals: Array) -> Array:

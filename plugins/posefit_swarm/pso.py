@@ -12,7 +12,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space
-from posefit.fitting.check import one_of
+from posefit.fitting.check import choices
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
 
 POPULATION_SIZE = 40
@@ -57,7 +57,7 @@ class PSO:
         redraws: int = REDRAWS,
     ) -> None:
         check_swarm(population_size, iterations, inertia, acceleration, alpha, redraws)
-        one_of("velocity", velocity, ("constricted", "inertia", "original"))
+        choices(PSO.__init__, locals())
         if not phi > 4.0:
             raise InputError(f"phi must be above 4, got {phi}")
         self._kind, self._chi, self._phi = velocity, constriction(phi), phi

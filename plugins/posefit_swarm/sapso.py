@@ -6,7 +6,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import REDRAWS, Space
-from posefit.fitting.check import at_least, between, one_of, positive
+from posefit.fitting.check import at_least, between, choices, positive
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
 
 POPULATION_SIZE = 40  # N, section 5.2
@@ -64,13 +64,7 @@ class SAPSO:
         positive("temperature", temperature)
         between("cooling", cooling, 0.0, 1.0)
         at_least("stop_temperature", stop_temperature, 0.0)
-        one_of("cool", cool, ("iteration", "acceptance"))
-        one_of("rand", rand, ("dimension", "scalar"))
-        one_of("velocity_limits", velocity_limits, ("symmetric", "literal"))
-        one_of("rejected_velocity", rejected_velocity, ("kept", "zeroed"))
-        one_of("velocity_check", velocity_check, ("clamped", "redrawn"))
-        one_of("last_generation", last_generation, ("evaluated", "skipped"))
-        one_of("variant", variant, ("default", "paper"))
+        choices(SAPSO.__init__, locals())
         if variant == "paper":
             cool, rand, velocity_limits = "acceptance", "scalar", "literal"
             velocity_check, last_generation = "redrawn", "skipped"

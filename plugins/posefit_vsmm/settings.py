@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from posefit.fitting.check import at_least, between, one_of, positive, whole
+from posefit.fitting.check import at_least, between, choices, positive, whole
 
 Variant = Literal["default", "patent"]
 Structure = Literal["variable", "all"]
@@ -55,9 +55,7 @@ class Settings:
     recovery: bool = True
 
     def __post_init__(self) -> None:
-        for name, annotation in type(self).__annotations__.items():
-            if choices := get_args(annotation):
-                one_of(name, getattr(self, name), choices)
+        choices(Settings, vars(self))
         for name in ("smoothing", "most", "longest"):
             whole(name, getattr(self, name), 1)
         whole("dwell", self.dwell, 0)

@@ -1,9 +1,9 @@
 """Checks of settings and arguments, whose errors have one wording."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from posefit.errors import InputError
 from posefit.reading import cut, quoted
@@ -63,3 +63,13 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
     known = tuple(known)
     if value not in known:
         raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}")
+
+
+def choices(settings: object, values: Mapping[str, object]) -> None:
+    """Return nothing. Raises ValueError where a value is none of those that its annotation, a `Literal`, lists.
+
+    `settings` is a function with such parameters, or a class with such attributes; `values` may hold others too.
+    """
+    for name, annotation in settings.__annotations__.items():
+        if get_origin(annotation) is Literal:
+            one_of(name, values[name], get_args(annotation))

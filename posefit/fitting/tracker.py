@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
-from posefit.fitting.check import between, one_of, positive, whole
+from posefit.fitting.check import between, choices, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
@@ -145,7 +145,7 @@ class Prediction:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
-        one_of("variant", self.variant, ("default", "paper"))
+        choices(Prediction, vars(self))
         if self.variant == "paper":
             for name, value in PAPER.items():
                 object.__setattr__(self, name, value)
@@ -160,13 +160,10 @@ class Prediction:
         for name in ("root_range_degrees", "translation_range"):
             if not (np.isfinite(getattr(self, name)).all() and np.min(getattr(self, name)) >= 0.0):
                 raise InputError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
-        one_of("tilt", self.tilt, ("learned", "box"))
         if not 0.0 < self.tilt_share <= 1.0:
             raise InputError(f"tilt_share must be above 0 and at most 1, got {self.tilt_share}")
         if not 0.0 <= self.tilt_margin_degrees < np.inf:
             raise InputError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
-        one_of("prediction", self.prediction, ("latest", "literal"))
-        one_of("root_order", self.root_order, ("yaw_first", "xyz"))
         between("beta", self.beta, 0.0, 1.0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:

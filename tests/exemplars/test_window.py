@@ -5,14 +5,7 @@ import pytest
 
 from posefit.arrays import Array
 from posefit_exemplars.beam import Beam
-from posefit_exemplars.window import (
-    SIMILAR,
-    FrameStates,
-    SampledPaths,
-    frame_states,
-    mean_near,
-    state_weights,
-)
+from posefit_exemplars.window import SIMILAR, FrameStates, SampledPaths, frame_states, mean_near, state_weights
 
 
 def window(fits: list[list[float]], steps: list[Array]) -> list[FrameStates]:
