@@ -7,7 +7,6 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
-from posefit_exemplars import kernels
 from posefit_exemplars.beam import (
     FACINGS,
     MAX_EXCESS_COST,
@@ -63,32 +62,6 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
     return costs
 
 
-@pytest.mark.pure
-@each("limit", [np.inf, 3.0])
-def test_each_pose_is_reached_by_its_cheapest_step(limit: float) -> None:
-    rng = np.random.default_rng(0)
-    ahead = rng.normal(size=(3, 5, 8)).astype(np.float32)
-    ways, totals = rng.random((3, 5)), rng.random(5)
-    codes = rng.normal(size=(20, 8)).astype(np.float32)
-    bounds = np.array([0, 4, 9, 9, 15, 20])  # one group is empty
-    rows, near = np.array([0, 2, 3]), rng.integers(0, 4, (5, 2))  # the last group is near no state
-    least, owners, touched = np.full(20, np.inf), np.zeros(20, dtype=np.int64), np.zeros(20, dtype=np.int64)
-    state = least, owners, touched
-    count = kernels.cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, 0.25, limit, *state)
-    twin = np.full((5, 20), np.inf)
-    for r in rows:
-        for k in range(20):
-            if any(bounds[g] <= k < bounds[g + 1] for g in near[r]):
-                away = [((ahead[s, r] - codes[k]) ** 2).sum() for s in range(3)]
-                twin[r, k] = min(totals[r] + ways[s, r] + 0.25 * away[s] for s in range(3))
-    best = twin.min(axis=0)
-    reached = np.flatnonzero(best < limit)
-    assert 0 < len(reached) < 20
-    assert sorted(touched[:count].tolist()) == reached.tolist()
-    np.testing.assert_allclose(least[reached], best[reached], rtol=1e-5)
-    np.testing.assert_array_equal(owners[reached], twin.argmin(axis=0)[reached])
-
-
 @each("root", [None, np.array([0.0, 0.0, 0.05])])
 def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | None) -> None:
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 5.0]]) if root is None else None
@@ -117,17 +90,6 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | 
     np.testing.assert_allclose(beams.places, expected[beams.parents])
     turns = wrapped(beams.yaws - (before.yaws + turned)[beams.parents])
     np.testing.assert_allclose(np.abs(turns)[np.abs(turns) > 1e-9], TURN)
-
-
-def test_a_known_root_far_away_costs_a_jump(small: Exemplars) -> None:
-    before, expected = beam([3], [0.0]), small.after(np.array([3]), SECONDS)[2][0]
-    free, near, far = (
-        next_states(small, before, SECONDS, STEPS, MOST, root).totals.min()
-        for root in (None, expected, np.array([1e6, 0.0, 0.0]))
-    )
-    assert free < 0.5 * (2.0 / 3.0) ** 2  # poses are two centimetres apart, and the spread is three
-    assert free <= near < free + 0.2
-    assert far == pytest.approx(STEPS.jump + free, abs=0.2)
 
 
 def test_a_beam_is_limited_and_each_yaw_has_its_share(small: Exemplars) -> None:

@@ -117,8 +117,3 @@ def test_a_sampled_path_is_one_movement(walker: Walk) -> None:
     turns = np.abs(wrapped(np.diff(yaws, axis=0)))
     assert np.median(turns) < np.radians(5.0)
     assert float(np.mean(turns > np.radians(30.0))) < 0.05
-
-
-def test_paths_are_sampled_through_frames_that_show_nothing(walker: Walk) -> None:
-    frames = walker.hidden(3, 5).track(0, 8, **QUICK)
-    assert sampled_poses(frames).shape == (8, 24, 66)

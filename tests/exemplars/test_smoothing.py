@@ -1,8 +1,5 @@
 """The filter of estimates over time: its weights, its delay and its memory."""
 
-import gc
-import weakref
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -75,19 +72,3 @@ def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_alwa
             np.testing.assert_array_equal(frame.translation, before.place)
             if spread * ahead == 0.0:
                 np.testing.assert_array_equal(frame.pose, before.pose)
-
-
-def test_memory_stays_flat() -> None:
-    alive: list[weakref.ref[Estimate]] = []
-    most = 0
-
-    def stream() -> Iterator[Estimate]:
-        for k in range(200):
-            made = steady(k)
-            alive.append(weakref.ref(made))
-            yield made
-
-    for _ in smoothed(stream(), 2.0, 6):
-        gc.collect(0)
-        most = max(most, sum(reference() is not None for reference in alive))
-    assert most <= 2 * 6 + 3  # as many on either side, the reported one, and the next

@@ -80,14 +80,6 @@ def test_an_interrupted_track_is_continued(walker: Walk, seed: int) -> None:
     assert walker.errors_mm(rest, 12).max() < 100.0
 
 
-def test_the_same_seed_is_the_same_track() -> None:
-    one, other = (
-        posefit.track(recorded.clip("17_03").motion(), train=["library:09"], method="exemplars", frames=(0, 5), seed=3)
-        for _ in range(2)
-    )
-    assert one.motion.poses.tobytes() == other.motion.poses.tobytes()
-
-
 @each(
     ("setting", "message"),
     [
@@ -108,17 +100,6 @@ def test_a_wrong_setting_is_refused_in_one_line(setting: str, message: str) -> N
     (line,) = result.stderr.strip().splitlines()
     assert line.startswith("posefit: ")
     assert message in line
-
-
-def test_settings_are_for_a_thirtieth_of_a_second_at_any_frame_rate(walker: Walk) -> None:
-    at_30, at_120 = (ExemplarTracker(replace(walker.task, fps=fps)) for fps in (30.0, 120.0))
-    # the costs of four frames are worth what one was, and four random steps lead as far as one did
-    assert at_120.temperature == 4.0 * at_30.temperature
-    assert 2.0 * at_120.steps.spread == at_30.steps.spread
-    assert 2.0 * at_120.steps.turning == at_30.steps.turning
-    assert 4.0 * at_120.steps.pace == at_30.steps.pace
-    assert at_120.steps.jump == at_30.steps.jump
-    assert at_30.exemplars is at_120.exemplars
 
 
 def test_a_yaw_away_from_the_known_one_costs_more() -> None:

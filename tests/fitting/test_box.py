@@ -86,13 +86,6 @@ def test_a_repair_is_always_feasible() -> None:
             np.testing.assert_array_equal(proposals, before)
 
 
-def test_a_draw_from_a_start_on_the_edge_of_many_dimensions_is_no_heap_of_copies() -> None:
-    start = Start(np.ones(50), np.full(50, 0.1), np.zeros(50))
-    drawn = draw_population(Toy(50, start=start), np.random.default_rng(0), 40)
-    assert len(np.unique(drawn, axis=0)) == 40
-    assert (np.abs(drawn) <= 1.0).all()
-
-
 def test_a_draw_from_a_start_is_normal_within_the_box_and_redrawn_by_coordinates() -> None:
     start = Start(np.array([1.0, 0.9, 0.0]), np.array([0.1, 0.2, 0.1]), np.zeros(3))
     drawn = draw_population(Toy(3, start=start), np.random.default_rng(0), 5000)

@@ -115,12 +115,6 @@ def test_small_pictures_rank_poses_as_the_whole_one_does_and_the_true_one_first(
     assert (whole @ quarter) / (whole @ whole) > 0.95
 
 
-def test_proposals_and_coordinates_are_inverse(problem: PoseProblem) -> None:
-    proposals = drawn(problem, 30)
-    back = problem.space.proposals(problem.space.coordinates(proposals))
-    np.testing.assert_allclose(back, proposals, atol=1e-12)
-
-
 def test_a_searched_translation_has_three_more_dimensions(problem: PoseProblem) -> None:
     space = replace(problem.space, translation="searched", anchor=np.array([1.0, 2.0, 3.0]))
     assert space.dimensions == problem.space.dimensions + 3 == 12
