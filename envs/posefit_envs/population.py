@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space, displacement, draw_population, fold, repair, sample_normal
+from posefit.silhouette.mask import box_of
 from posefit_envs.instance import World, first_episode
 from posefit_envs.scales import log_cost, scaled, unscaled
 from posefit_envs.stage import Rows
@@ -53,15 +55,15 @@ def control_of(action: Array) -> ControlAction:
     """Return the control that an action (10,) in [-1, 1] stands for."""
     _, _, _, power, stride, log_temperature, restart, *kicks = action.tolist()
     weights = np.exp(SHARPNESS * action[:3])
-    shares = weights / weights.sum()
-    first, second, third = (max(kick, 0.0) * MAX_DIFFUSION for kick in kicks)
+    first, second, third = (weights / weights.sum()).tolist()
+    root, near, far = (max(kick, 0.0) * MAX_DIFFUSION for kick in kicks)
     return ControlAction(
-        (float(shares[0]), float(shares[1]), float(shares[2])),
+        (first, second, third),
         2.0 ** scaled(LOG_POPULATION, min(max(2.0 * power, -1.0), 1.0)),
         scaled(INERTIA, stride),
         10.0 ** scaled(LOG_TEMPERATURE, log_temperature),
         max(restart, 0.0),
-        (first, second, third),
+        (root, near, far),
     )
 
 
@@ -70,18 +72,17 @@ def action_of(control: ControlAction) -> Array:
 
     Raises ValueError where no action stands for it.
     """
-    shares = np.maximum(
-        1.0 + np.log(np.maximum(np.array(control.shares) / max(control.shares), 1e-9)) / SHARPNESS, -1.0
+    shares = 1.0 + np.log(np.maximum(np.array(control.shares) / max(control.shares), 1e-9)) / SHARPNESS
+    amounts = np.array([control.restart, *np.array(control.diffusion) / MAX_DIFFUSION])
+    action = np.array(
+        [
+            *np.maximum(shares, -1.0),
+            0.5 * unscaled(LOG_POPULATION, np.log2(control.population)),
+            unscaled(INERTIA, control.stride),
+            unscaled(LOG_TEMPERATURE, np.log10(control.temperature)),
+            *np.where(amounts > 0.0, amounts, -1.0),
+        ]
     )
-    ranged = [
-        0.5 * unscaled(LOG_POPULATION, np.log2(control.population)),
-        unscaled(INERTIA, control.stride),
-        unscaled(LOG_TEMPERATURE, np.log10(control.temperature)),
-    ]
-    amounts = [
-        amount if amount > 0.0 else -1.0 for amount in (control.restart, *np.array(control.diffusion) / MAX_DIFFUSION)
-    ]
-    action = np.array([*shares, *ranged, *amounts])
     if not (np.abs(action) <= 1.0).all():
         raise InputError(f"a control must lie in the range of actions, got {control}")
     return action
@@ -258,35 +259,31 @@ def instance_features(population: Population) -> Array:
 
 
 def _shape(mask: NDArray[np.bool_]) -> list[float]:
-    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     count = int(np.count_nonzero(mask))
     if not count:
         return [0.0] * 5
-    tall, wide = int(rows[-1] - rows[0]) + 1, int(columns[-1] - columns[0]) + 1
-    inner = np.zeros_like(mask)
-    inner[1:-1, 1:-1] = mask[1:-1, 1:-1] & mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
+    left, top, right, bottom = box_of(mask)
+    tall, wide = bottom - top, right - left
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    inner = cv2.erode(mask.astype(np.uint8), cross, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     edge = 1.0 - np.count_nonzero(inner) / count
     return [count / mask.size, tall / mask.shape[0], wide / mask.shape[1], count / (tall * wide), edge]
 
 
-def progress_features(population: Population) -> Array:
-    """Return the progress of a search (16,), in [0, 1] but for rounding."""
-    swarm, costs = population.swarm, population.costs
-    spreads = swarm.best.std(axis=0)
-    layers = [_log_scaled(float(spreads[layer].mean())) for layer in population.layers]
-    speed = float(np.abs(swarm.velocity).mean()) / ALPHA
-    shown = population.best, float(swarm.best_cost.min()), costs.min(), costs.mean(), costs.std()
-    log_costs = [log_cost(cost) for cost in shown]
-    control = population.control
-    waits = [population.left / population.steps, min(population.stale / 10.0, 1.0)]
-    accepted = float(population.accepted.mean())
-    return np.array([*log_costs, *layers, speed, accepted, *waits, *control.shares, control.population])
-
-
 def observed_state(features: Array, population: Population) -> State:
-    """Return the observation (25,) of an instance's features and a search."""
-    return np.asarray(np.clip([*features, *progress_features(population)], 0.0, 1.0), dtype=np.float32)
-
-
-def _log_scaled(spread: float) -> float:
-    return float(np.log(max(spread, MIN_SPREAD) / MIN_SPREAD) / np.log(MAX_SPREAD / MIN_SPREAD))
+    """Return the observation (25,) of an instance's features and of the progress of a search."""
+    swarm, costs, control = population.swarm, population.costs, population.control
+    spreads = swarm.best.std(axis=0)
+    layers = [max(float(spreads[layer].mean()), MIN_SPREAD) / MIN_SPREAD for layer in population.layers]
+    shown = population.best, float(swarm.best_cost.min()), costs.min(), costs.mean(), costs.std()
+    progress = [
+        *(log_cost(cost) for cost in shown),
+        *(float(np.log(spread) / np.log(MAX_SPREAD / MIN_SPREAD)) for spread in layers),
+        float(np.abs(swarm.velocity).mean()) / ALPHA,
+        float(population.accepted.mean()),
+        population.left / population.steps,
+        min(population.stale / 10.0, 1.0),
+        *control.shares,
+        control.population,
+    ]
+    return np.asarray(np.clip([*features, *progress], 0.0, 1.0), dtype=np.float32)

@@ -27,6 +27,7 @@ from typing import Any
 
 PATIENCE = 120.0  # seconds that another process may take over a function, until this one compiles it itself
 LOOK = 0.02  # seconds between two looks whether it is done
+STARTED = time.time()  # before the modules were loaded that are compiled
 # whose versions are numba's affair
 _FOREIGN = sys.stdlib_module_names | {"cv2", "llvmlite", "numba", "numpy", "scipy"}
 
@@ -81,7 +82,10 @@ def cached(dispatcher: Any) -> Path | None:
 
 @cache
 def made_of(module: str) -> str:
-    """Return a digest of the source files of a module and of all that it imports as it is loaded, directly or not."""
+    """Return a digest of the source files of a module and of all that it imports as it is loaded, directly or not.
+
+    Raises RuntimeError where one of them has changed since: what runs in this process is not what stands there.
+    """
     digest, waiting, visited = hashlib.sha256(), [module], {module}
     while waiting:
         text, imported = _source(waiting.pop())
@@ -98,6 +102,8 @@ def _source(module: str) -> tuple[bytes, list[str]]:
     file = getattr(sys.modules.get(module), "__file__", None) or ""
     if not file.endswith(".py"):
         return b"", []
+    if Path(file).stat().st_mtime > STARTED:
+        raise RuntimeError(f"{file} has changed")
     text, names = Path(file).read_bytes(), []
     package = module if Path(file).stem == "__init__" else module.rpartition(".")[0]
     for line in ast.parse(text).body:  # what stands within `if` or a function need not be loaded in every process

@@ -4,11 +4,12 @@ The function stands here as plain Python, and below it as numba compiles it.
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import unpack_tuple
 from numba.extending import intrinsic, overload
 
 _ROWS, _COLUMNS = 4, 4  # of a frame; the last row is padding, the last column the place of its origin
@@ -34,58 +35,38 @@ def place_bone(chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> Non
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _place_bone(  # type: ignore[no-untyped-def]
-    typing_context: Any,  # noqa: ARG001
-    parent,  # noqa: ARG001
-    own,  # noqa: ARG001
-    turned,  # noqa: ARG001
-    turn,
-    angle,  # noqa: ARG001
-    sines,
-    cosines,
-    offset,
-    frames,
-) -> Any:
-    signature = (types.int64, types.int64, types.boolean, turn, types.int64, sines, cosines, offset, frames)
-    return types.void(*signature), _build_bone
+def _place_bone(typing_context: Any, chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> Any:  # noqa: ARG001
+    return types.void(chain, types.int64, sines, cosines, frames), _build_bone
 
 
 @overload(place_bone, inline="always")  # type: ignore[untyped-decorator]
 def _place_bone_compiled(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    def compiled(chain, b, sines, cosines, frames):  # type: ignore[no-untyped-def]
-        _place_bone(  # type: ignore[call-arg]
-            chain.parents[b],
-            b + 1,
-            chain.turned[b],
-            chain.turns[b],
-            chain.angles[b],
-            sines,
-            cosines,
-            chain.offsets[b],
-            frames,
-        )
-
-    return compiled
+    return lambda chain, b, sines, cosines, frames: _place_bone(chain, b, sines, cosines, frames)  # type: ignore[call-arg]
 
 
 def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Write `place_bone` as instructions for the four rows of a column."""
     number, index = ir.DoubleType(), ir.IntType(64)
     column = ir.VectorType(number, _ROWS)
-    parent, own, turned, turn, angle, sines, cosines, offset, frames = arguments
-    _, _, _, turn_type, _, sines_type, cosines_type, offset_type, frames_type = signature.args
+    chain, b, *others = arguments
+    kinds = *signature.args[0].types, *signature.args[2:]
+    arrays = zip(kinds, [*unpack_tuple(builder, chain), *others], strict=True)
+    parents, angles, turns, turned, offsets, sines, cosines, frames = (
+        context.make_array(kind)(context, builder, array).data for kind, array in arrays
+    )
 
-    def start(kind: Any, array: Any) -> Any:
-        return context.make_array(kind)(context, builder, array).data
+    def entry(data: Any, *at: Any) -> Any:
+        return builder.load(builder.gep(data, [reduce(builder.add, at)]))
+
+    def times(size: int, value: Any) -> Any:
+        return builder.mul(value, index(size))
 
     def place_of(joint: Any, k: int) -> Any:
-        at = builder.add(builder.mul(joint, index(_ROWS * _COLUMNS)), index(_ROWS * k))
-        return builder.bitcast(builder.gep(start(frames_type, frames), [at]), column.as_pointer())
+        at = builder.add(times(_ROWS * _COLUMNS, joint), index(_ROWS * k))
+        return builder.bitcast(builder.gep(frames, [at]), column.as_pointer())
 
-    def in_all_rows(data: Any, at: Any) -> Any:
-        lane = builder.insert_element(
-            ir.Constant(column, ir.Undefined), builder.load(builder.gep(data, [at])), ir.IntType(32)(0)
-        )
+    def in_all_rows(value: Any) -> Any:
+        lane = builder.insert_element(ir.Constant(column, ir.Undefined), value, ir.IntType(32)(0))
         return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), _ROWS), [0] * _ROWS))
 
     product = partial(builder.fmul, flags=_FREEDOM)
@@ -104,15 +85,11 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
         return chosen
 
     def at_rest(u: Any, v: Any, w: Any) -> list[Any]:
-        data = start(turn_type, turn)
-        p, q, r = ([in_all_rows(data, index(3 * row + k)) for k in range(3)] for row in range(3))
+        p, q, r = ([in_all_rows(entry(turns, times(9, b), index(3 * row + k))) for k in range(3)] for row in range(3))
         return [total(total(product(u, p[k]), product(v, q[k])), product(w, r[k])) for k in range(3)]
 
     def rotated(u: Any, v: Any, w: Any) -> tuple[Any, Any, Any]:
-        sine, cosine = (
-            [in_all_rows(start(kind, of), builder.add(angle, index(k))) for k in range(3)]
-            for kind, of in ((sines_type, sines), (cosines_type, cosines))
-        )
+        sine, cosine = ([in_all_rows(entry(of, angle, index(k))) for k in range(3)] for of in (sines, cosines))
 
         def turned_by(k: int, first: Any, second: Any) -> tuple[Any, Any]:
             return (
@@ -125,12 +102,13 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
         v, w = turned_by(0, v, w)
         return u, v, w
 
+    parent, own, angle = entry(parents, b), builder.add(b, index(1)), entry(angles, b)
     axes = [builder.load(place_of(parent, k), align=8) for k in range(3)]
-    axes = changed_where(builder.trunc(turned, ir.IntType(1)), axes, at_rest)
+    axes = changed_where(builder.trunc(entry(turned, b), ir.IntType(1)), axes, at_rest)
     axes = changed_where(builder.icmp_signed(">=", angle, index(0)), axes, rotated)
     origin = builder.load(place_of(parent, 3), align=8)
     for k in range(3):
         builder.store(axes[k], place_of(own, k), align=8)
-        origin = total(origin, product(axes[k], in_all_rows(start(offset_type, offset), index(k))))
+        origin = total(origin, product(axes[k], in_all_rows(entry(offsets, times(3, b), index(k)))))
     builder.store(origin, place_of(own, 3), align=8)
     return context.get_dummy_value()

@@ -13,7 +13,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS, check_limbs, turns_of
 from posefit.geometry.skeleton import ANGLES, BONES
-from posefit.silhouette import drawn, several
+from posefit.silhouette import drawn, kernels
 from posefit.silhouette.cost import Areas, view_of
 from posefit.silhouette.mask import Silhouette, pack
 
@@ -112,7 +112,7 @@ class LimbMasks:
         empty = pack(np.zeros((camera.height, camera.width), dtype=bool))
         images = np.zeros((len(each), *empty.shape), dtype=np.uint64)
         boxes = np.zeros((len(each), 4), dtype=np.int64)
-        several.draw_bones(body.skeleton.chain, radii, view_of(camera), each, places, images, boxes)
+        kernels.draw_bones(body.skeleton.chain, radii, view_of(camera), each, places, images, boxes)
         there = (boxes[:, 0] < boxes[:, 1]) & (boxes[:, 2] <= boxes[:, 3])
         top, left = boxes[there][:, ::2].min(axis=0) if there.any() else (0, 0)
         bottom, last = boxes[there][:, 1::2].max(axis=0) if there.any() else (0, -1)
@@ -138,7 +138,7 @@ class LimbMasks:
         out = np.empty((len(chosen), 3), dtype=np.int64)
         first = np.cumsum((1, *self.poses.counts[:-1]))
         observed, valid = (_flat(bits[None, *self.cut])[0] for bits in silhouette.bits)
-        several.count_combinations(self.images, self.spans, first, chosen, order, observed, valid, out)
+        kernels.count_combinations(self.images, self.spans, first, chosen, order, observed, valid, out)
         out[:, 0] += np.count_nonzero(silhouette.mask)
         return out
 

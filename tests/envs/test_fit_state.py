@@ -77,14 +77,12 @@ def test_the_picture_comes_beside_the_search_if_asked_for() -> None:
         gym.make(NAME, max_evaluations=1)
 
 
-def test_a_step_from_the_best_so_far_beats_random_search() -> None:
-    env = gym.make(NAME, max_evaluations=100).unwrapped
-    costs = {}
-    for name, make in (("gaussian", gaussian_policy), ("random", random_search_policy), ("uniform", uniform_policy)):
-        policy = make(env, np.random.default_rng(0))
-        costs[name] = np.mean([rollout(env, policy, 10_000 + k, k)["best_cost"] for k in range(6)])
-    assert costs["gaussian"] < costs["random"]
-    assert costs["uniform"] < costs["random"]
+def test_policies_act_in_their_environment() -> None:
+    env = gym.make(NAME, max_evaluations=20).unwrapped
+    for make in (gaussian_policy, random_search_policy, uniform_policy):
+        info = rollout(env, make(env, np.random.default_rng(0)), 17, 0)
+        assert (info["evaluations"], info["instance"]) == (20, 17)
+        assert info["gain"] >= 0.0
     assert rollout(env, constant_policy(np.zeros(10)), 17, 0)["gain"] == 0.0
     with pytest.raises(ValueError, match="spread must be"):
         gaussian_policy(env, np.random.default_rng(0), spread=0.0)

@@ -38,23 +38,17 @@ def test_every_format_gives_the_same_camera(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose(pixels, [[160.0, 120.0], [160.0, 120.0 - 255.0 / 4.0], [160.0 + 62.5, 120.0]])
 
 
-DOWN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks straight down: its up is -z
-
-
-@each(
-    "camera",
-    [
+def test_our_own_cameras_come_back_however_they_are_held(tmp_path: Path) -> None:
+    down = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks straight down: its up is -z
+    for camera in (
         Camera.around(np.array([0.1, 0.9, 0.3]), 0.7, 3.0, (320, 240)),
-        Camera(320, 240, np.full(2, 300.0), np.array([160.0, 120.0]), DOWN, np.array([0.0, 0.0, 4.0])),
-    ],
-)
-def test_our_own_cameras_come_back_however_they_are_held(tmp_path: Path, camera: Camera) -> None:
-    (tmp_path / "camera.json").write_text(camera.to_json())
-    (one,) = read_calibrations(tmp_path / "camera.json")
-    assert not one.distorted
-    again = one.camera((320, 240), upright([one]))
-    for name in ("focal", "centre", "rotation", "translation"):
-        np.testing.assert_allclose(getattr(again, name), getattr(camera, name), atol=1e-12)
+        Camera(320, 240, np.full(2, 300.0), np.array([160.0, 120.0]), down, np.array([0.0, 0.0, 4.0])),
+    ):
+        (tmp_path / "camera.json").write_text(camera.to_json())
+        (one,) = read_calibrations(tmp_path / "camera.json")
+        again = one.camera((320, 240), upright([one]))
+        for name in ("focal", "centre", "rotation", "translation"):
+            np.testing.assert_allclose(getattr(again, name), getattr(camera, name), atol=1e-12)
 
 
 def test_a_camera_that_is_not_placed_looks_level_from_the_origin(tmp_path: Path) -> None:
@@ -71,17 +65,6 @@ def test_up_can_be_named(tmp_path: Path) -> None:
     np.testing.assert_allclose(upright([one], "y"), np.eye(3))
     with pytest.raises(ValueError, match="up must be one of x, y, z, got 'w'"):
         upright([one], "w")  # type: ignore[arg-type]
-
-
-@each("name", ["a.toml", "a.yml"])
-def test_the_maps_undo_the_lens(tmp_path: Path, name: str) -> None:
-    (one,) = read_calibrations(written(tmp_path, name))
-    across, down = one.maps((640, 480))
-    # the pixel 200 right of the centre was bent outwards by k1 r^2, r = 200 / 500
-    y, x = 240, 520
-    r2 = ((x - 319.5) / 500.0) ** 2 + ((y - 239.5) / 510.0) ** 2
-    assert across[y, x] == pytest.approx(319.5 + (x - 319.5) * (1.0 + 0.1 * r2), abs=1e-3)
-    assert down[y, x] == pytest.approx(239.5 + (y - 239.5) * (1.0 + 0.1 * r2), abs=1e-3)
 
 
 def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
@@ -119,16 +102,6 @@ def test_a_file_that_is_no_calibration_is_named(tmp_path: Path, name: str, text:
         read_calibrations(tmp_path / name)
     assert str(tmp_path / name) in str(caught.value)
     assert "\n" not in str(caught.value).strip()
-
-
-def test_the_real_calibration_places_its_camera_ten_metres_off() -> None:
-    path = Path(__file__).parents[3] / "shared" / "data" / "video" / "sports2d_walk" / "Calib_demo.toml"
-    if not path.is_file():
-        pytest.skip(f"no calibration at {path}")
-    (one,) = read_calibrations(path)
-    camera = one.camera(one.size, upright([one]))
-    assert np.abs(camera.position).max() == pytest.approx(10.0, abs=0.1)
-    assert camera.rotation[1] @ [0.0, 1.0, 0.0] == pytest.approx(-1.0, abs=1e-3)  # level and upright
 
 
 OPENCV = """%YAML:1.0
@@ -191,11 +164,8 @@ def test_numbers_are_those_that_opencv_reads(tmp_path: Path) -> None:
     ("made_for", "came", "fits"),
     [
         ((1080, 1920), (1088, 1920), True),
-        ((1920, 1080), (1920, 1088), True),
         ((1920, 1088), (1920, 1080), True),  # calibrated with the padding, filmed without
-        ((854, 480), (864, 480), True),
         ((1920, 1080), (1080, 1920), False),
-        ((1080, 1920), (1096, 1920), False),
         ((1080, 1920), (1082, 1920), False),
     ],
 )
@@ -206,11 +176,7 @@ def test_a_picture_that_a_codec_filled_up_has_the_camera_that_it_had(
     one = Calibration("a", made_for, matrix, np.zeros(4), None, None)
     padded = one.padded(came)
     assert (padded is not None) == fits
-    if padded is None:
-        return
-    before, after = one.camera(made_for, np.eye(3)), padded.camera(came, np.eye(3))
-    np.testing.assert_array_equal(after.focal, before.focal)
-    np.testing.assert_array_equal(after.centre, before.centre)  # what is added, is added at the end
-    assert (after.width, after.height) == came
-    half = padded.camera((came[0] // 2, came[1] // 2), np.eye(3))  # scaled by the picture's own size
-    np.testing.assert_allclose(half.focal, before.focal / 2)
+    if padded is not None:
+        before, after = one.camera(made_for, np.eye(3)), padded.camera(came, np.eye(3))
+        np.testing.assert_array_equal([after.focal, after.centre], [before.focal, before.centre])
+        assert (after.width, after.height) == came

@@ -46,14 +46,6 @@ def test_around_by_hand_from_the_side() -> None:
     np.testing.assert_allclose(depths, [4.0, 4.0, 4.0, 2.0])
 
 
-@each("size", [(320, 240), (240, 320)])
-def test_the_field_of_view_spans_the_larger_side(size: tuple[int, int]) -> None:
-    camera = Camera.around(np.zeros(3), 0.0, 3.0, size, field_of_view=0.7)
-    reach = 3.0 * np.tan(0.35)
-    edge, _ = camera.project(np.array([reach, 0.0, 0.0] if size[0] > size[1] else [0.0, -reach, 0.0]))
-    np.testing.assert_allclose(edge, [320.0, 120.0] if size[0] > size[1] else [120.0, 320.0])
-
-
 @each("size", [(200, 150), (150, 200), (64, 64)])
 def test_framing_is_the_nearest_camera_that_does(size: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
@@ -85,13 +77,11 @@ def test_a_camera_that_cannot_be_is_refused(change: dict[str, Any], message: str
     ("key", "text"),
     [
         ("width", "0"),
-        ("width", "9" * 5000),
         ("focal", '"far"'),
         ("focal", "[" * 100_000),
         ("focal", f"[{10**400}, 1]"),
         ("centre", "[NaN, 1.0]"),
         ("camera_from_world", "[[1], [1, 2]]"),
-        ("camera_from_world", "null"),
         ("more", "1"),
         ("more", " " * 1_000_001 + "1"),
     ],

@@ -75,16 +75,6 @@ def test_on_the_singularity_the_rotation_still_comes_back(pitch: float, roll: fl
     np.testing.assert_allclose(again, rotation, rtol=0.0, atol=1e-7)
 
 
-@given(triples, triples, triples)
-def test_the_geodesic_is_a_distance(a: Array, b: Array, c: Array) -> None:
-    first, second, third = (rotation_from_joint_angles(angles) for angles in (a, b, c))
-    distance = float(geodesic(first, second))
-    assert 0.0 <= distance <= np.pi + 1e-9
-    assert float(geodesic(second, first)) == pytest.approx(distance, abs=1e-6)
-    assert float(geodesic(third @ first, third @ second)) == pytest.approx(distance, abs=1e-6)
-    assert distance <= float(geodesic(first, third)) + float(geodesic(third, second)) + 1e-6
-
-
 @given(turns, st.integers(0, 2), triples)
 def test_the_geodesic_of_a_turn_about_one_axis_is_its_angle(angle: float, axis: int, start: Array) -> None:
     first = rotation_from_joint_angles(start)

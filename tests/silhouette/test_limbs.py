@@ -52,9 +52,8 @@ def test_any_combinations_in_any_order_do_so_too(body: Body, camera: Camera) -> 
     poses = candidates(1, (8, 8, 8, 8, 8))
     some = np.random.default_rng(2).integers(0, 8, (500, 5))
     some[100:110] = some[99]
-    assert_as_whole(body, camera, poses, (0.0, 0.0, 0.0), some)
-    assert_as_whole(body, camera, poses, (0.0, 0.0, 0.0), some[:1])
-    assert_as_whole(body, camera, poses, (0.0, 0.0, 0.0), some[:0])
+    for count in (500, 1, 0):
+        assert_as_whole(body, camera, poses, (0.0, 0.0, 0.0), some[:count])
 
 
 def test_limbs_off_the_image_or_behind_the_camera_have_no_pixels(body: Body, camera: Camera) -> None:
@@ -62,15 +61,6 @@ def test_limbs_off_the_image_or_behind_the_camera_have_no_pixels(body: Body, cam
         poses = candidates(3, (2, 2, 2, 2, 2))
         towards = camera.rotation.T @ np.array([where[0], where[1], -where[2]])
         assert_as_whole(body, camera, poses, towards.tolist(), every_combination(poses.counts))
-
-
-def test_limbs_may_be_the_callers_own_and_only_their_angles_are_used(body: Body, camera: Camera) -> None:
-    poses = candidates(4, (5, 6), TWO)
-    every = every_combination(poses.counts)
-    assert_as_whole(body, camera, poses, (0.0, 0.0, 0.0), every)
-    changed = poses.combined(every) != poses.pose
-    # the wrist turns about three axes, and so do femur, tibia and foot; a hand and toes are ends
-    assert changed.any(axis=0).sum() == 3 + 9
 
 
 @pytest.mark.pure

@@ -14,7 +14,6 @@ from posefit.fitting.prior import Tilt
 from posefit.fitting.space import Translation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import areas, project
@@ -74,11 +73,6 @@ def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: p
     rng = np.random.default_rng(6)
     camera = Camera.around(np.zeros(3), 0.4, 3.0, (24, 20))
     assert_equals_the_cpu(body, camera, random_poses(rng, 13), rng.normal(0.0, 0.2, (13, 3)))
-
-
-def test_no_poses_have_no_areas(body: Body, camera: Camera) -> None:
-    silhouette = moved_to(Silhouette.of(np.ones((camera.height, camera.width))), "cuda")
-    assert areas(body, camera, silhouette, np.empty((0, ANGLES)), np.empty((0, 3))).shape == (0, 3)
 
 
 def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:

@@ -6,8 +6,5 @@ Nothing here but `device` is imported unless a silhouette lies on a device.
 |---|---|
 | whether a device is available; a silhouette on it | device.py |
 | thousands of poses in parts, there and back; arrays that stay there | areas.py |
-| one pose: the steps of its threads | launch.py |
-| forward kinematics | kinematics.py |
-| cones, and where a row of pixels crosses them | cones.py |
-| operations that are one instruction on a device | arithmetic.py |
+| one pose: the steps of its threads, compiled | launch.py |
 """

@@ -1,28 +1,265 @@
-"""One pose a block of threads: kinematics, cones, bits and their count, in one launch."""
+"""One pose a block of threads: kinematics, cones, bits and their count, in one launch.
+
+The steps are those of `posefit.geometry.kernels` and `posefit.silhouette.rasteriser`: a thread for each world axis of
+the frames, for a joint, a bone, or some words of a row. What a device says in one instruction and Python in several
+stands first: each as plain Python, which numba's simulator runs, and below it as numba compiles it for a device.
+"""
+
+import math
 
 import numpy as np
 from numba import cuda, float32, float64, int32, uint32
+from numba.cuda.extending import overload
 
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.cuda.cones import (
-    BOUNDS,
-    FIRST,
-    LAST,
-    LINES,
-    ROW,
-    STOP,
-    TOP,
-    crossing,
-    project_joint,
-    word_of,
-    write_cone,
-)
-from posefit.silhouette.cuda.kinematics import place_bones, place_root, write_sine
+from posefit.silhouette.lanes import BLOCK
+from posefit.silhouette.rasteriser import FAR, NEAR
+from posefit.silhouette.rasteriser import STRIP_PIXELS as STRIP
 
 THREADS = 64  # of a block
 MOST = 32  # silhouettes that one launch compares a drawing with
 WORDS = 4  # of a row that a thread fills at a time
 _ANGLES, _BONES, _JOINTS = ANGLES, len(BONES), len(JOINTS)
+_PI_HIGH, _PI_LOW = 3.141592653589793, 1.2246467991473532e-16  # pi in two parts, as on a CPU
+_FLAT = 1e-9
+_ZERO, _ONE, _WINDOW = np.float32(0.0), np.float32(1.0), np.float32(64.0)
+_HUGE = np.float32(1e9)
+U, V, METRE = range(3)  # rows of `ends`, a column a joint
+X0, Y0, S0, X1, Y1, S1, XP, MP, PA, PB, XQ, MQ, QA, QB, LINES = range(15)  # rows of `lines`, a column a bone
+ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)  # rows of `bounds`: those drawn, strips, and the cone's own first row
+
+
+def fused(factor, by, addend):
+    """Return factor * by + addend of float32 numbers, rounded once: as compiled loops have it on a CPU with FMA."""
+    return np.float32(float(factor) * float(by) + float(addend))
+
+
+@overload(fused)
+def _fused_compiled(factor, by, addend):  # noqa: ARG001
+    return lambda factor, by, addend: cuda.fma(factor, by, addend)
+
+
+def single_root(square):
+    """Return the square root of a float32 of 0 or more, as one."""
+    return np.float32(math.sqrt(square))
+
+
+@overload(single_root)
+def _single_root_compiled(square):  # noqa: ARG001
+    return lambda square: math.sqrt(square)
+
+
+def spanned(first, stop):
+    """Return a word of 32 bits, those from `first` on set that come before `stop`; both are cut to 0 to 32."""
+    bits = (1 << min(max(int(stop), 0), 32)) - (1 << min(max(int(first), 0), 32))
+    return np.uint32(max(bits, 0))
+
+
+@overload(spanned)
+def _spanned_compiled(first, stop):  # noqa: ARG001
+    def compiled(first, stop):
+        a, b = np.uint64(min(max(first, 0), 32)), np.uint64(min(max(stop, 0), 32))
+        return np.uint32((np.uint64(1) << b) - (np.uint64(1) << a)) if b > a else np.uint32(0)
+
+    return compiled
+
+
+def floored(number):
+    """Return the largest whole number that is not above a number, as one of its own kind; infinity stays."""
+    return np.floor(number)
+
+
+@overload(floored)
+def _floored_compiled(number):  # noqa: ARG001
+    return lambda number: math.floor(number)
+
+
+def ceiled(number):
+    """Return the least whole number that is not below a number, as one of its own kind; infinity stays."""
+    return np.ceil(number)
+
+
+@overload(ceiled)
+def _ceiled_compiled(number):  # noqa: ARG001
+    return lambda number: math.ceil(number)
+
+
+@cuda.jit(device=True)
+def write_sine(i, angle, sines, cosines):
+    """Write the sine and cosine of one angle, by the polynomials of a CPU."""
+    turns = floored(angle * (1.0 / _PI_HIGH) + 0.5)
+    x = (angle - turns * _PI_HIGH) - turns * _PI_LOW
+    sign = 1.0 - 2.0 * (turns - 2.0 * floored(0.5 * turns))
+    z = x * x
+    s = -1.0 / 1307674368000.0
+    s = s * z + 1.0 / 6227020800.0
+    s = s * z - 1.0 / 39916800.0
+    s = s * z + 1.0 / 362880.0
+    s = s * z - 1.0 / 5040.0
+    s = s * z + 1.0 / 120.0
+    s = s * z - 1.0 / 6.0
+    sines[i] = sign * (x + x * z * s)
+    c = 1.0 / 20922789888000.0
+    c = c * z - 1.0 / 87178291200.0
+    c = c * z + 1.0 / 479001600.0
+    c = c * z - 1.0 / 3628800.0
+    c = c * z + 1.0 / 40320.0
+    c = c * z - 1.0 / 720.0
+    c = c * z + 1.0 / 24.0
+    c = c * z - 0.5
+    cosines[i] = sign * (1.0 + z * c)
+
+
+@cuda.jit(device=True)
+def place_root(i, place, sines, cosines, frames):
+    """Write world coordinate i of the root's three axes and of its place."""
+    sy, sp, sr = sines[0], sines[1], sines[2]
+    cy, cp, cr = cosines[0], cosines[1], cosines[2]
+    if i == 0:
+        frames[0, 0, i] = cy * cr + sy * sp * sr
+        frames[0, 1, i] = sy * sp * cr - cy * sr
+        frames[0, 2, i] = sy * cp
+    elif i == 1:
+        frames[0, 0, i] = cp * sr
+        frames[0, 1, i] = cp * cr
+        frames[0, 2, i] = -sp
+    else:
+        frames[0, 0, i] = cy * sp * sr - sy * cr
+        frames[0, 1, i] = cy * sp * cr + sy * sr
+        frames[0, 2, i] = cy * cp
+    frames[0, 3, i] = place
+
+
+@cuda.jit(device=True)
+def place_bones(i, starts, angles, turned, turns, offsets, sines, cosines, frames):
+    """Write world coordinate i of all frames (27, 4, 3) beyond the root's: no axis asks for another one."""
+    for b in range(starts.size):
+        p, a = starts[b], angles[b]
+        u, v, w = frames[p, 0, i], frames[p, 1, i], frames[p, 2, i]
+        if turned[b]:
+            first = u * turns[b, 0, 0] + v * turns[b, 1, 0] + w * turns[b, 2, 0]
+            second = u * turns[b, 0, 1] + v * turns[b, 1, 1] + w * turns[b, 2, 1]
+            w = u * turns[b, 0, 2] + v * turns[b, 1, 2] + w * turns[b, 2, 2]
+            u, v = first, second
+        if a >= 0:  # Rz @ Ry @ Rx
+            first = u * cosines[a + 2] + v * sines[a + 2]
+            v = v * cosines[a + 2] - u * sines[a + 2]
+            u = first * cosines[a + 1] - w * sines[a + 1]
+            w = w * cosines[a + 1] + first * sines[a + 1]
+            first = v * cosines[a] + w * sines[a]
+            w = w * cosines[a] - v * sines[a]
+            v = first
+        frames[b + 1, 0, i], frames[b + 1, 1, i], frames[b + 1, 2, i] = u, v, w
+        frames[b + 1, 3, i] = frames[p, 3, i] + u * offsets[b, 0] + v * offsets[b, 1] + w * offsets[b, 2]
+
+
+@cuda.jit(device=True)
+def project_joint(j, frames, view, ends):
+    """Write the projection of joint j, in pixels, and the pixels of a metre there: 0 where it is not to be drawn."""
+    a, b, c = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
+    x = view[0] * a + view[1] * b + view[2] * c + view[9]
+    y = view[3] * a + view[4] * b + view[5] * c + view[10]
+    z = view[6] * a + view[7] * b + view[8] * c + view[11]
+    ends[U, j] = ends[V, j] = ends[METRE, j] = 0.0
+    if NEAR <= z <= FAR:  # false for nan as well
+        depth = 1.0 / z
+        ends[U, j] = view[14] + view[12] * x * depth - 0.5
+        ends[V, j] = view[15] + view[13] * y * depth - 0.5
+        ends[METRE, j] = math.sqrt(view[12] * view[13]) * depth
+
+
+@cuda.jit(device=True)
+def write_segment(k, row, px, py, slope, gap, u0, v0, r0, v1, r1, lines):
+    """Write one tangent segment of cone k, from row `row` of `lines` on: its line, and the rows that it crosses."""
+    a = v0 + r0 * py
+    b = v1 + r1 * py
+    crosses = abs(px) > _FLAT and gap > 0.0
+    lines[row, k] = u0 + r0 * px - a * slope
+    lines[row + 1, k] = slope
+    lines[row + 2, k] = min(a, b) if crosses else 1.0
+    lines[row + 3, k] = max(a, b) if crosses else 0.0
+
+
+@cuda.jit(device=True)
+def write_cone(k, start, radii, ends, strips, width, height, lines, bounds):
+    """Write the bounds of cone k, and the discs and tangent segments that border it; no rows where it is invisible."""
+    bounds[ROW, k] = bounds[STOP, k] = 0
+    u0, v0, r0 = ends[U, start], ends[V, start], ends[METRE, start] * radii[k, 0]
+    u1, v1, r1 = ends[U, k + 1], ends[V, k + 1], ends[METRE, k + 1] * radii[k, 1]
+    top = min(max(ceiled(min(v0 - r0, v1 - r1)), 0.0), float(height))
+    bottom = max(min(floored(max(v0 + r0, v1 + r1)) + 1.0, float(height)), 0.0)
+    left = min(max(ceiled(min(u0 - r0, u1 - r1)), 0.0), float(width))
+    right = max(min(floored(max(u0 + r0, u1 + r1)) + 1.0, float(width)), 0.0)
+    if not (top < bottom and left < right and min(ends[METRE, start], ends[METRE, k + 1]) > 0.0):
+        return
+    bounds[ROW, k] = int(top) // BLOCK * BLOCK
+    bounds[STOP, k] = min((int(bottom) + BLOCK - 1) // BLOCK * BLOCK, height)
+    bounds[FIRST, k] = min(int(left) // STRIP, strips - 2)
+    bounds[LAST, k] = (int(right) - 1) // STRIP
+    bounds[TOP, k] = int(top)
+    dx = u1 - u0
+    dy = v1 - v0
+    dr = r0 - r1
+    dd = dx * dx + dy * dy
+    gap = dd - dr * dr
+    # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or minus across it
+    along = dr / max(dd, 1e-30)
+    across = math.sqrt(max(gap, 0.0)) / max(dd, 1e-30)
+    px = along * dx - across * dy
+    py = along * dy + across * dx
+    qx = along * dx + across * dy
+    qy = along * dy - across * dx
+    v0 -= top
+    v1 -= top
+    lines[X0, k], lines[Y0, k], lines[S0, k] = u0, v0, r0 * r0
+    lines[X1, k], lines[Y1, k], lines[S1, k] = u1, v1, r1 * r1
+    p = -py / (px if abs(px) > _FLAT and gap > 0.0 else 1.0)
+    q = -qy / (qx if abs(qx) > _FLAT and gap > 0.0 else 1.0)
+    write_segment(k, XP, px, py, p, gap, u0, v0, r0, v1, r1, lines)
+    write_segment(k, XQ, qx, qy, q, gap, u0, v0, r0, v1, r1, lines)
+
+
+@cuda.jit(device=True)
+def crossing(k, y, lines):
+    """Return from where to where cone k spans row y, counted from its own first; a huge column first where it does not.
+
+    All are float32, as on a CPU.
+    """
+    low, high = _HUGE, -_HUGE
+    if lines[PA, k] <= y <= lines[PB, k]:
+        x = fused(lines[MP, k], y, lines[XP, k])
+        low = high = x
+    if lines[QA, k] <= y <= lines[QB, k]:
+        x = fused(lines[MQ, k], y, lines[XQ, k])
+        low, high = min(low, x), max(high, x)
+    away = y - lines[Y0, k]
+    square = fused(-away, away, lines[S0, k])
+    if square >= _ZERO:
+        half = single_root(square)
+        low, high = min(low, lines[X0, k] - half), max(high, lines[X0, k] + half)
+    away = y - lines[Y1, k]
+    square = fused(-away, away, lines[S1, k])
+    if square >= _ZERO:
+        half = single_root(square)
+        low, high = min(low, lines[X1, k] - half), max(high, lines[X1, k] + half)
+    return low, high
+
+
+@cuda.jit(device=True)
+def word_of(low, high, strip, first, last, start):
+    """Return the bits of a span in one strip, of a cone that has the strips from `first` to `last`.
+
+    They are counted, as on a CPU, from the first pixel of the window of two strips that begins at strip `start`: so
+    both round the same way.
+    """
+    if strip < first or strip > last:
+        return np.uint32(0)
+    column = np.float32(STRIP * start)
+    stop = min(np.float32(STRIP * (last + 1)) - column, _WINDOW)
+    a = np.int32(ceiled(max(low - column, _ZERO)))
+    b = np.int32(min(high - column + _ONE, stop))
+    before = STRIP * (strip - start)
+    return spanned(a - before, b - before)
 
 
 @cuda.jit(device=True)
