@@ -8,7 +8,6 @@ from typing import Any, TypeVar
 
 from posefit.errors import InputError
 from posefit.files import new_folder
-from posefit.report.figures import library
 from posefit.sweep.command import cores
 from posefit.sweep.engines.engine import Limits
 from posefit.sweep.engines.processes import Processes
@@ -65,6 +64,8 @@ def figures_folder(path: str | Path | None) -> Iterator[Path | None]:
     if path is None:
         yield None
         return
+    from posefit.report.figures import library
+
     library("")
     with new_folder(path) as folder:
         yield folder

@@ -195,8 +195,7 @@ def _lines_2(report: dict[str, Any]) -> Iterator[str]:
         yield f"{LABELS[motion]:39}" + "".join(f"{head:>8}" for head in heads) + f"{'evaluations':>12}"
         for name, one in rows.items():
             cells = list(one["paper"].values()) if "paper" in one else ["-"] * 3
-            figures = ("error_degrees", "free_degrees", "worst_degrees", "spread_degrees")
-            cells += [f"{one[key]:.2f}" for key in figures]
+            cells += [f"{one[f'{key}_degrees']:.2f}" for key in ("error", "free", "worst", "spread")]
             cells.append(f"{one['seconds_per_frame']:.4f}" if name in METHODS else "-")
             cells.append("-" if one["skill"] is None else f"{one['skill']:.2f}")
             cells += [f"{100 * one[key]:.0f} %" for key in ("swapped", "lost", "wrong") if key in one]
