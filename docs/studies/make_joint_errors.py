@@ -19,10 +19,9 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_vsmm import joints
-from posefit_vsmm.joints import BODY, detected
+from posefit_vsmm.joints import BODY, detected, lines_of
 from posefit_vsmm.measurement import NARROWEST, head_radius
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.state import ENDS, POINTS
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")

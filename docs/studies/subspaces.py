@@ -81,7 +81,7 @@ class SubspaceSearch(joined.Search):
         root = np.maximum(np.sqrt(np.diag(around)[[*YAW_PITCH_ROLL]]), joined.ROOT_LEAST)
         space = SearchSpace(prior, poses[0, :3], joined.REACH * root, places[0], self.task.translation)
         latents = prior.transform(poses[:, 3:])[0]
-        deviations = np.sqrt((((every.ways @ prior.components.T) * every.high[:, None]) ** 2).sum(axis=0))
+        deviations = np.sqrt((((every.components @ prior.components.T) * every.high[:, None]) ** 2).sum(axis=0))
         first = space.dimensions - len(latents)
         mean = space.proposals(np.concatenate([space.centre[:first], latents]))
         scale = np.concatenate([np.full(first, 1.0 / joined.REACH), deviations / space.half[first:]])
@@ -106,7 +106,7 @@ class SubspaceSearch(joined.Search):
         models, belief = self.followed[-1]._models, self.followed[-1]._belief
         assert belief is not None
         if not self.chosen:
-            return library().names
+            return tuple(library().models)
         group = models.group if models.newcomer is None else None
         return tuple(models.groups[group or models.topology.most_probable(models.active, belief.probabilities)])
 

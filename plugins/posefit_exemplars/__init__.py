@@ -10,7 +10,7 @@ Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 - `frame_costs` has the costs of poses in a frame.
 - `window` is the likeliest path through the last frames, the weights of states, and sampled paths.
 - `refinement` searches around the path, `smoothing` filters the estimates over time.
-- `calibration` makes the posterior's intervals hold, `lost_model` gives the probability that a frame is lost.
+- `lost_model` makes the posterior's intervals hold, and gives the probability that a frame is lost.
 - `tracker` has the settings, and processes one frame after the other.
 
 >>> import posefit

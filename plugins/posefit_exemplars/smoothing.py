@@ -11,8 +11,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.geometry.rotation import wrapped
-from posefit_exemplars.calibration import recalibrated
 from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.lost_model import recalibrated
 from posefit_exemplars.window import SampledPaths
 
 SMOOTHED = 3.0  # standard deviations that the filter reaches to either side

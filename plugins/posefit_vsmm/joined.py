@@ -3,13 +3,13 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit import settings as of_plugins
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.optimiser import OptimiserFactory, minimise
+from posefit.fitting.prior import Components
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Observation, Task
@@ -25,14 +25,8 @@ from posefit_vsmm.tracker import VSMM, matched
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 
 
-@dataclass(eq=False)
-class Directions:
-    """Joint angles are `middle` + latents @ `ways`; a prior that needs no fit."""
-
-    middle: Array = field(repr=False)  # (63,)
-    ways: Array = field(repr=False)  # (m, 63)
-    low: Array  # (m,)
-    high: Array  # (m,)
+class Directions(Components):
+    """Joint angles are a mean and a sum of directions that need not be orthonormal."""
 
     @classmethod
     def of(cls, state: Array, covariance: Array, reliance: Reliance, count: int, reach: float) -> "Directions":
@@ -53,15 +47,11 @@ class Directions:
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) that come nearest to joint angles (n, 63)."""
-        return np.asarray(wrapped(angles - self.middle) @ np.linalg.pinv(self.ways))
+        return np.asarray(wrapped(angles - self.mean) @ np.linalg.pinv(self.components))
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
-        return np.asarray(self.middle + (latents[:, :, None] * self.ways).sum(axis=1))
-
-    def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are poses."""
-        return np.ones(len(latents), dtype=bool)
+        return np.asarray(self.mean + (latents[:, :, None] * self.components).sum(axis=1))
 
 
 LEAST = np.repeat([0.02, np.radians(4.0)], [3, ERROR - 3])  # metres and radians: deviations added to the filter's

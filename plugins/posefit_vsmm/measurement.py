@@ -16,10 +16,9 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import empty_frames, place_joints
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import OWN, detected, rule_errors
+from posefit_vsmm.joints import OWN, Lines, detected, rule_errors
 from posefit_vsmm.kernels import bend, points_and_jacobian
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.preprocess import Lines
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ERROR, FIRST_BONE, POINTS, Reliance
 

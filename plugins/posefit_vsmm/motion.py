@@ -7,7 +7,7 @@ them; the models that the package carries are fitted to CMU clips by docs/studie
 
 import json
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
@@ -121,14 +121,8 @@ class Library:
 
     models: dict[str, MotionModel]
     reliance: Reliance
-    report: dict[
-        str, dict[str, float]
-    ]  # degrees: one and ten steps on clips that were not used, against standing still
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The models' names."""
-        return tuple(self.models)
+    # degrees: one and ten steps on clips that were not used, against standing still
+    report: dict[str, dict[str, float]]
 
 
 @lru_cache(maxsize=2)

@@ -1,24 +1,114 @@
-"""Which groups of models are in force, cycle by cycle: the variable structure. VSMM steps 5 and 7 to 9.
+"""Groups of models, and which are in force, cycle by cycle: the variable structure. VSMM steps 4, 5 and 7 to 9.
 
-The field calls this model-set adaptation. Groups are numbered as in their file: the rules speak of the first, the
+The field calls this model-set adaptation. A TOML file (Interpretation V1) holds `stay`, a table `groups` of names and
+their models, and a table `neighbours` of models and those that they change into. It may hold a table `activities` of
+names and their models: the labels of frames. Groups are numbered as in their file: the rules speak of the first, the
 second and the third.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
 from typing import Literal, final
 
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.fitting.check import one_of
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
-from posefit_vsmm.groups import Topology
+from posefit.reading import parsed_toml, quoted, read_text
 from posefit_vsmm.imm import IMM, PLACED, Belief, Measurement, start
 from posefit_vsmm.motion import CLIP_FPS, Library, VectorModel, inverse_tangent, lifted, unit
 from posefit_vsmm.settings import HipAngle, Settings
 from posefit_vsmm.state import AT
+
+SIZE_LIMIT = 100_000  # bytes
+TABLES = ("groups", "neighbours", "activities")
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Groups of models, in the order in which they are numbered, and the neighbours of each model.
+
+    The field calls them model sets, and the neighbours a digraph of models.
+    """
+
+    groups: Mapping[str, tuple[str, ...]]
+    neighbours: Mapping[str, tuple[str, ...]]
+    activities: Mapping[str, tuple[str, ...]]  # each model is in one at least
+    stay: float
+
+    def transition(self, models: Sequence[str]) -> Array:
+        """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
+
+        It is the transition matrix of a Markov chain; each row sums to 1.
+        A model without a neighbour there may change into any, as a group of its own can only be left that way.
+        """
+        matrix = np.zeros((len(models), len(models)))
+        for i, name in enumerate(models):
+            others = [j for j, other in enumerate(models) if other in self.neighbours[name] and j != i]
+            others = others or [j for j in range(len(models)) if j != i]
+            matrix[i, others] = (1.0 - self.stay) / max(1, len(others))
+            matrix[i, i] = self.stay if others else 1.0
+        return matrix
+
+    def union(self, names: Collection[str]) -> tuple[str, ...]:
+        """Return the models of some groups, each once, in the order of the groups."""
+        return tuple(dict.fromkeys(model for name, mine in self.groups.items() if name in names for model in mine))
+
+    def most_probable(self, models: Sequence[str], probabilities: Array) -> str:
+        """Return the group whose models are the most probable together. VSMM step 5."""
+        return _most_probable(self.groups, models, probabilities)
+
+    def activity(self, models: Sequence[str], probabilities: Array) -> str:
+        """Return the activity whose models are the most probable together."""
+        return _most_probable(self.activities, models, probabilities)
+
+
+def _most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array) -> str:
+    known = dict(zip(models, probabilities, strict=True))
+    return max(sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name]))
+
+
+def read_topology(path: str | Path | None, known: Collection[str]) -> Topology:
+    """Return the topology of a TOML file, or the one that the package carries.
+
+    Raises ValueError naming the file where it is not what it should be, or names a model that is not known.
+    """
+    label = "groups.toml" if path is None else str(path)
+    try:
+        text = (files("posefit_vsmm") / label).read_text("utf-8") if path is None else read_text(path, SIZE_LIMIT)
+        values = parsed_toml(text)
+    except FileNotFoundError:
+        raise InputError(f"{label}: expected a file of groups, got none") from None
+    except ValueError as error:
+        raise InputError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
+    values = {"activities": {}, **values}
+    if set(values) != {"stay", *TABLES}:
+        raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
+    stay = values["stay"]
+    if not isinstance(stay, float) or not 0.0 < stay < 1.0:
+        raise InputError(f"{label}: stay must be a number between 0 and 1, got {quoted(stay)}")
+    for key in TABLES:
+        if not isinstance(values[key], dict) or not all(isinstance(models, list) for models in values[key].values()):
+            raise InputError(f"{label}: {key} must be a table of lists of models, got {quoted(values[key])}")
+    groups, neighbours, activities = (
+        {name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in TABLES
+    )
+    if not groups or not all(groups.values()):
+        raise InputError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
+    used = {model for models in groups.values() for model in models} | set(neighbours)
+    for model in used.union(*neighbours.values(), *activities.values()):
+        one_of(f"{label}: a model", model, known)
+    alone = {model: (model,) for model in known if not any(model in models for models in activities.values())}
+    return Topology(
+        groups, {model: neighbours.get(model, ()) for model in used}, {**activities, **alone}, stay
+    )  # VSMM 4
+
 
 _LIMBS = np.array(
     [

@@ -15,16 +15,14 @@ from posefit.fitting import metrics
 from posefit.fitting.alignment import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
-from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter
+from posefit_vsmm.joints import JointFilter, lines_of
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
 from posefit_vsmm.motion import STIFF, MotionModel, library, turned
-from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
-from posefit_vsmm.switching import Models
+from posefit_vsmm.switching import Models, read_topology
 
 if TYPE_CHECKING:
     from posefit_vsmm.joined import Search
@@ -259,7 +257,7 @@ class VSMM:
     def __init__(self, task: Task, how: Settings, search: "Search | None" = None) -> None:
         self.task, self.how, self.search = task, how, search
         self.library = library(how.shrink, how.models)
-        self.topology = read_topology(Path(how.groups) if how.groups else None, self.library.names)
+        self.topology = read_topology(Path(how.groups) if how.groups else None, self.library.models)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""

@@ -13,7 +13,7 @@ from posefit import minimise
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
 from posefit_nevergrad import GlobalRandom
-from posefit_scipy.bridge import Bridged
+from posefit_scipy import Bridged
 from tests.cases import each
 
 

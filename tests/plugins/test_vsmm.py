@@ -19,12 +19,11 @@ from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
-from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import PLACED
 from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
-from posefit_vsmm.switching import Models
+from posefit_vsmm.switching import Models, read_topology
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, vsmm
 from tests.cases import each
 

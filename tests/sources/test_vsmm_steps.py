@@ -12,9 +12,8 @@ from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
-from posefit_vsmm.groups import read_topology
 from posefit_vsmm.imm import Belief, Measurement, start
-from posefit_vsmm.joints import JointFilter, detected, rule_errors
+from posefit_vsmm.joints import JointFilter, Lines, detected, lines_of, rule_errors
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure, JointMeasurement
 from posefit_vsmm.motion import (
@@ -26,10 +25,18 @@ from posefit_vsmm.motion import (
     tangent,
     without_heading,
 )
-from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ENDS, ERROR, HELD_ANGLES, POINTS, decode, encode
-from posefit_vsmm.switching import FIRST, Models, Rivalry, limb_angles, normalised, regrouped, requested_group
+from posefit_vsmm.switching import (
+    FIRST,
+    Models,
+    Rivalry,
+    limb_angles,
+    normalised,
+    read_topology,
+    regrouped,
+    requested_group,
+)
 
 SIZE = (240, 320)  # rows, columns
 NO_BIAS = np.zeros((len(POINTS), 2))
@@ -290,7 +297,7 @@ def test_the_models_are_no_worse_than_standing_still_where_the_report_says_so() 
 
 
 def test_the_groups_are_those_of_the_reading() -> None:  # VSMM 4
-    topology = read_topology(None, library().names)
+    topology = read_topology(None, library().models)
     assert topology.groups == {
         "G1": ("stiff-walk", "walk", "arms-out"),
         "G2": ("arms-out", "jacks", "jump"),
@@ -302,7 +309,7 @@ def test_the_groups_are_those_of_the_reading() -> None:  # VSMM 4
 
 def models(**given: Any) -> Models:
     carried = library()
-    return Models(Settings.of(given), carried, read_topology(None, carried.names), built_in.average_skeleton(), 30.0)
+    return Models(Settings.of(given), carried, read_topology(None, carried.models), built_in.average_skeleton(), 30.0)
 
 
 def test_process_noise_is_a_multiple_of_the_models_own() -> None:  # Interpretation V7
@@ -474,7 +481,7 @@ def test_a_new_model_starts_from_the_captured_state_that_matches_best() -> None:
 
 
 def test_old_and_new_groups_are_in_force_together() -> None:  # VSMM 8.4
-    topology = read_topology(None, library().names)
+    topology = read_topology(None, library().models)
     assert topology.union(("G3", "G1")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
     assert topology.union(("G1", "G2")) == ("stiff-walk", "walk", "arms-out", "jacks", "jump")
 
