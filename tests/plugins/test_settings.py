@@ -93,21 +93,18 @@ def test_an_unknown_annotation_accepts_everything() -> None:
     assert [one.name for one in settings_of(stringly)] == ["a"]
 
 
-def test_a_budget_becomes_iterations() -> None:
+def test_a_budget_becomes_iterations_or_evaluations_whichever_an_optimiser_plans_with() -> None:
     rows: list[Any] = [
-        ({}, 2440, None, {"iterations": 60}),
-        ({}, 2440, 20, {"population_size": 20, "iterations": 121}),
-        ({"population_size": 61}, 2440, None, {"population_size": 61, "iterations": 39}),
-        ({"iterations": 5}, 2440, None, {"iterations": 5}),
-        ({}, 50, None, {"iterations": 1}),
+        (SAPSO, {}, 2440, None, {"iterations": 60}),
+        (SAPSO, {}, 2440, 20, {"population_size": 20, "iterations": 121}),
+        (SAPSO, {"population_size": 61}, 2440, None, {"population_size": 61, "iterations": 39}),
+        (SAPSO, {"iterations": 5}, 2440, None, {"iterations": 5}),
+        (SAPSO, {}, 50, None, {"iterations": 1}),
+        (Particle, {"noise": 0.2}, 500, 20, {"noise": 0.2, "evaluations": 500}),
+        (lambda space, rng: None, {}, 500, 20, {}),
     ]
-    for given, evaluations, size, filled in rows:
-        assert planned(SAPSO, given, evaluations, size) == filled, given
-
-
-def test_a_budget_becomes_evaluations_where_an_optimiser_plans_with_them() -> None:
-    assert planned(Particle, {"noise": 0.2}, 500, 20) == {"noise": 0.2, "evaluations": 500}
-    assert planned(lambda space, rng: None, {}, 500, 20) == {}
+    for optimiser, given, evaluations, size, filled in rows:
+        assert planned(optimiser, given, evaluations, size) == filled, given
 
 
 def test_a_list_of_settings_is_read_from_a_docstring() -> None:

@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
-from posefit.plugin import draw_population
 from posefit.registry import registry
 from posefit.testing import (
     check_optimiser,
@@ -19,6 +18,7 @@ from posefit.testing import (
     run_checks,
 )
 from posefit_priors.pca import PCA
+from posefit_swarm.random import Random
 from posefit_swarm.sapso import SAPSO
 from tests.testing import planted
 
@@ -59,20 +59,8 @@ def test_it_passes_the_papers_tracker() -> None:
     assert len(report.of("passed")) == 11
 
 
-class Chance:
-    """Draws uniformly."""
-
-    def __init__(self, space: Any, rng: Any, *, population_size: int = 40) -> None:
-        self.space, self.rng, self.population_size = space, rng, population_size
-
-    def ask(self) -> Any:
-        return draw_population(self.space, self.rng, self.population_size)
-
-    def tell(self, proposals: Any, costs: Any) -> None: ...
-
-
-class Baseline(Chance):
-    baseline = True
+class Chance(Random):
+    baseline = False
 
 
 def test_chance_does_not_beat_chance_and_need_not_where_it_is_the_baseline() -> None:
@@ -82,7 +70,7 @@ def test_chance_does_not_beat_chance_and_need_not_where_it_is_the_baseline() -> 
         return [(result.outcome, result.detail) for result in ran]
 
     assert [outcome for outcome, _ in outcomes(Chance)] == ["failed", "failed"]
-    for factory in (Baseline, partial(Baseline, population_size=20), registry().optimiser("random")):
+    for factory in (Random, partial(Random, population_size=20)):
         assert outcomes(factory) == [("skipped", "it is the baseline itself")] * 2
 
 
