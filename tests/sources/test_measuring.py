@@ -81,17 +81,14 @@ def test_a_foot_strikes_where_it_is_farthest_ahead() -> None:  # ZENI2008 (heel 
         strikes = gait_events(walker(yaw=yaw)).strikes
         assert strikes["left"] / 100.0 == pytest.approx(FIRST["l"] + STRIDE * np.arange(4), abs=0.01)
         assert strikes["right"] / 100.0 == pytest.approx(FIRST["r"] + STRIDE * np.arange(3), abs=0.01)
+    still = gait_events(walker(speed=0.0)).strikes  # without any floor or way
+    assert still["left"] == pytest.approx(gait_events(walker()).strikes["left"], abs=0.01)
 
 
 def test_a_foot_lifts_off_where_its_toes_are_farthest_behind() -> None:  # ZENI2008 (toe off)
     offs = gait_events(walker()).offs
     first = FIRST["l"] + STANCE * STRIDE
     assert offs["left"] / 100.0 == pytest.approx(first + STRIDE * np.arange(3), abs=0.01)
-
-
-def test_events_hold_without_any_floor_or_way() -> None:
-    still = gait_events(walker(speed=0.0))
-    assert still.strikes["left"] == pytest.approx(gait_events(walker()).strikes["left"], abs=0.01)
 
 
 def test_cadence_is_counted_in_a_minute() -> None:  # WHITTLE2007 (cadence)

@@ -14,10 +14,7 @@ def test_the_peak_ratio_is_the_share_of_known_poses_that_were_found() -> None:  
     assert peak_ratio(DISTANCES, 50.0) == pytest.approx(2 / 3)
     assert peak_ratio(DISTANCES, 200.0) == pytest.approx(2 / 3)  # no reported pose has the third as its nearest
     assert peak_ratio(np.empty((0, 3)), 60.0) == 0.0
-
-
-def test_a_reported_pose_speaks_for_its_nearest_known_one_alone() -> None:
-    assert peak_ratio(np.array([[30.0, 40.0]]), 60.0) == 0.5
+    assert peak_ratio(np.array([[30.0, 40.0]]), 60.0) == 0.5  # a reported pose speaks for its nearest one alone
 
 
 def test_weights_near_a_known_pose_are_added_up() -> None:

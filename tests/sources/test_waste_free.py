@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.testing.toy import Toy
 from posefit.uncertainty import smc
 from posefit.uncertainty.landscape import Landscape
-from posefit.uncertainty.smc import NormalMixture, next_step, systematic_rows, tempered
+from posefit.uncertainty.smc import NormalMixture, next_step, tempered
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,6 @@ def test_a_walk_has_the_covariance_within_the_modes() -> None:
     proposals = (centres[:, None] + offsets).reshape(-1, 2)
     walk = smc._walk(start, Landscape(Toy(2), PAIR.cost), proposals, np.full(8, 0.125))
     np.testing.assert_allclose(walk @ walk.T, 2.38**2 / 2.0 * np.diag([0.005, 0.005]), rtol=1e-6)
-
-
-def test_a_comb_keeps_each_row_as_often_as_its_weight_asks() -> None:
-    np.testing.assert_array_equal(systematic_rows(np.array([0.5, 0.0, 0.25, 0.25]), 0.5, 4), [0, 0, 2, 3])
-    np.testing.assert_array_equal(systematic_rows(np.array([0.1, 0.9, 0.0]), 0.999, 2), [1, 1])
 
 
 def test_a_start_has_the_density_that_it_draws_from() -> None:
