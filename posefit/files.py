@@ -244,7 +244,6 @@ def _as_input_error(target: Path) -> Iterator[None]:
 
 @contextmanager
 def _undone(remove: Callable[[], None]) -> Iterator[None]:
-    """Call `remove` where the body fails."""
     try:
         yield
     except BaseException:

@@ -119,13 +119,11 @@ class Registry:
 
     def optimiser(self, name: str) -> "OptimiserFactory":
         """Return the optimiser factory of a name. Raises ValueError listing the known names."""
-        factory: OptimiserFactory = self.offer("optimiser", name).factory
-        return factory
+        return self.offer("optimiser", name).factory
 
     def prior(self, name: str) -> "PriorFactory":
         """Return the prior factory of a name. Raises ValueError listing the known names."""
-        factory: PriorFactory = self.offer("prior", name).factory
-        return factory
+        return self.offer("prior", name).factory
 
     def offer(self, kind: Kind, name: str) -> Offer:
         """Return what is offered under a name; `family:NAME` is the family with its setting `variant`.

@@ -102,7 +102,6 @@ def by_kind(joints_mm: Any) -> dict[str, float]:
 
 
 def _mode(result: Ambiguity, k: int) -> dict[str, Any]:
-    """Return the summary of a cluster."""
     cluster, states, library = result.clusters[k], result.states, result.library
     row, yaw = int(states.rows[cluster.best]), float(states.poses[cluster.best, 0])
     towards = facing(result.problem.cameras[0], states.translations[cluster.best])

@@ -64,7 +64,6 @@ class _Commands(click.Group):
 
 
 def _added() -> dict[str, click.Command]:
-    """Return the commands of plugins."""
     from posefit.registry import command_plugins
 
     added = command_plugins(tuple(main.commands))

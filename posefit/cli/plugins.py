@@ -104,6 +104,5 @@ def check(
 
 
 def _own(context: click.Context) -> tuple[str, ...]:
-    """Return the names of posefit's own commands."""
     root = context.find_root().command
     return tuple(root.commands) if isinstance(root, click.Group) else ()

@@ -99,7 +99,6 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
 
 
 def _serve(ledger: str, port: int) -> None:
-    """Show the report of a ledger until Ctrl-C."""
     from posefit.report.live import address_of, serving
 
     with suppress(KeyboardInterrupt), serving(ledger, port, say) as server:

@@ -112,7 +112,6 @@ def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Arr
 
 
 def _unequal(views: Sequence[CameraView]) -> list[str]:
-    """Return the warning that videos differ in length."""
     lengths = [len(view.masks) for view in views]
     if len(set(lengths)) == 1:
         return []

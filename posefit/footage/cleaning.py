@@ -104,7 +104,6 @@ def people_in(silhouette: Silhouette) -> list[Mask]:
 
 
 def _is_one_person(first: NDArray[np.int32], second: NDArray[np.int32], distance: float, joined: bool) -> bool:
-    """Return whether two pieces belong to one person."""
     left, top, wide, tall = (np.array([piece[k] for piece in (first, second)]) for k in range(4))
     if joined or distance <= NEAR * tall.max():
         return True

@@ -43,7 +43,6 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
 
 
 def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict[str, Any]]:
-    """Return the parameters by group and name."""
     frames = len(motion)
     groups: dict[str, dict[str, Any]] = {
         "POINT": {
@@ -79,7 +78,6 @@ def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict
 
 
 def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
-    """Yield time, foot and name of each event."""
     for step in gait.steps:
         yield step.strike_seconds, step.foot, "Foot Strike"
         if step.toe_off_seconds is not None:

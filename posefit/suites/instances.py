@@ -169,7 +169,6 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
 
 
 def _corrupted(draft: _Draft) -> SuiteInstance:
-    """Return a pose of the box whose silhouette is spoilt in two ways."""
     made, rng = _single(draft), draft.rng
     kinds = rng.choice(len(DAMAGES), 2, replace=False)
     noise = {DAMAGES[k]: float(rng.uniform(*STRENGTHS)) for k in kinds}
@@ -178,7 +177,6 @@ def _corrupted(draft: _Draft) -> SuiteInstance:
 
 
 def _mismatched(draft: _Draft) -> SuiteInstance:
-    """Return a pose of the box, searched with a body that is not the person's."""
     made = _single(draft)
     return draft.made(replace(made.posed, body=varied(made.posed.body, MISMATCH_PERCENT, draft.rng)), made.truth)
 
