@@ -6,48 +6,40 @@ from typing import Any, Literal
 
 from posefit.fitting.check import at_least, between, choices, positive, whole
 
-Variant = Literal["default", "patent"]
-Structure = Literal["variable", "all"]
-Quaternions = Literal["manifold", "vector"]
 Shrink = Literal["identity", "zero"]
-ClipRate = Literal["video", "clip"]
 JointErrors = Literal["measured", "plain"]
-Hidden = Literal["dropped", "imputed"]
 Assignment = Literal["optimal", "nearest"]
-AngleSource = Literal["state", "detected"]
 HipAngle = Literal["trunk", "vertical"]
-New = Literal["rerun", "patent"]
 Poses = Literal["typical", "captured"]
-Test = Literal["sequential", "patent"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """The settings of `vsmm`; see `posefit_vsmm.tracker.vsmm` for what they mean."""
 
-    variant: Variant = "default"
-    structure: Structure = "variable"
+    variant: Literal["default", "patent"] = "default"
+    structure: Literal["variable", "all"] = "variable"
     groups: str = ""
-    quaternions: Quaternions = "manifold"
+    quaternions: Literal["manifold", "vector"] = "manifold"
     shrink: Shrink = "identity"
     models: str = ""
-    clip_rate: ClipRate = "video"
+    clip_rate: Literal["video", "clip"] = "video"
     joint_errors: JointErrors = "measured"
     process_noise: float = 1.0
     joint_noise: float = 1.0
     initial_noise: float = 1.0
-    hidden: Hidden = "dropped"
+    hidden: Literal["dropped", "imputed"] = "dropped"
     assignment: Assignment = "optimal"
     gates: bool = True
-    angles: AngleSource = "detected"
+    angles: Literal["state", "detected"] = "detected"
     hip_angle: HipAngle = "vertical"
     most: int = 3
     smoothing: int = 1
     floor_degrees: float = 0.0
     dwell: int = 10
-    new: New = "rerun"
+    new: Literal["rerun", "patent"] = "rerun"
     poses: Poses = "typical"
-    test: Test = "patent"
+    test: Literal["sequential", "patent"] = "patent"
     false_alarm: float = 0.01
     miss: float = 0.01
     longest: int = 45

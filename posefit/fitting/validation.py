@@ -190,32 +190,51 @@ class AuditedTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield the tracker's frame for each observation. Raises BrokenRuleError where one is missing or wrong."""
-        drawn, stream = PoseCount(), _Stream(observations)
+        waiting: deque[Observation] = deque()  # those whose frames are still to come
+        unread: Exception | None = None  # why an observation could not be read
+        taken = reported = given = 0
+
+        def stream() -> Iterator[Observation]:
+            nonlocal taken, unread
+            rest = iter(observations)
+            while True:
+                try:
+                    with uncounted():  # to render a motion is no evaluation
+                        observation = next(rest, None)
+                except Exception as error:
+                    unread = error
+                    raise
+                if observation is None:
+                    return
+                taken += 1
+                waiting.append(observation)
+                yield observation
+
+        drawn, source = PoseCount(), stream()
         frames: Iterator[Frame] | None = None
-        reported = given = 0
         while True:
             try:
                 with drawn.counting(), plugin_errors(self._name, "it", passed=(ImportError, GeneratorExit)):
-                    frames = iter(self._tracker.track(stream, rng)) if frames is None else frames
+                    frames = iter(self._tracker.track(source, rng)) if frames is None else frames
                     frame = next(frames, None)
             except BrokenRuleError as broken:
-                if stream.error is not None and broken.__cause__ is stream.error:
-                    raise stream.error from None  # what could not be read is not the tracker's fault
+                if unread is not None and broken.__cause__ is unread:
+                    raise unread from None  # what could not be read is not the tracker's fault
                 raise
             if frame is None:
                 break
             given += 1
-            if given > stream.count:
+            if given > taken:
                 raise self._broken(f"track must yield a frame for each observation, got {given} for {given - 1}")
             self._check(frame)
             # it may have drawn poses for observations that it looks at ahead
-            ahead = self._task.evaluations * (stream.count - given)
+            ahead = self._task.evaluations * (taken - given)
             counted = math.ceil(drawn.poses / len(self._task.cameras)) - reported - ahead
-            frame = self._counted(frame, given - 1, counted, UNCOUNTED_POSES * stream.count)
-            frame = self._computed(frame, given - 1, stream.waiting.popleft())
+            frame = self._counted(frame, given - 1, counted, UNCOUNTED_POSES * taken)
+            frame = self._computed(frame, given - 1, waiting.popleft())
             reported += frame.evaluations
             yield frame
-        if given < stream.count or next(stream, None) is not None:
+        if given < taken or next(source, None) is not None:
             raise self._broken(f"track must yield a frame for each observation, got {given} and then no more")
 
     def _check(self, frame: Frame) -> None:
@@ -257,31 +276,6 @@ class AuditedTracker:
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")
-
-
-class _Stream:
-    """The observations that a tracker takes."""
-
-    def __init__(self, observations: Iterable[Observation]) -> None:
-        self._rest, self.count = iter(observations), 0
-        self.waiting: deque[Observation] = deque()  # those whose frames are still to come
-        self.error: Exception | None = None
-
-    def __iter__(self) -> "_Stream":
-        return self
-
-    def __next__(self) -> Observation:
-        try:
-            with uncounted():  # to render a motion is no evaluation
-                observation = next(self._rest)
-        except StopIteration:
-            raise
-        except Exception as error:
-            self.error = error
-            raise
-        self.count += 1
-        self.waiting.append(observation)
-        return observation
 
 
 def _short(value: object) -> str:

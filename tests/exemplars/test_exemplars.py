@@ -9,7 +9,6 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit.motion.motion import Motion
 from posefit_exemplars.exemplars import (
     DIMENSIONS,
     SAME,
@@ -18,7 +17,6 @@ from posefit_exemplars.exemplars import (
     about_vertical,
     exemplars_of,
     mirror_image,
-    thinned_frames,
 )
 from posefit_exemplars.kernels import STRETCH
 
@@ -43,12 +41,6 @@ def test_distances_of_codes_are_those_of_joints_and_never_greater() -> None:
         for i, j in ((0, 1), (0, 15), (7, 22)):
             true = np.sqrt(((joints[i] - joints[j]) ** 2).sum(axis=-1).mean())
             assert true - least < np.linalg.norm(codes[i] - codes[j]) < true + 1e-6
-
-
-def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
-    codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32) * SAME
-    assert thinned_frames(codes).tolist() == [0, 3, 4, 6]
-    assert thinned_frames(codes[:2]).tolist() == [0, 1]
 
 
 def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> None:
@@ -107,25 +99,6 @@ def test_poses_are_drawn_by_the_square_root_of_the_size_of_their_group(two: Exem
     np.testing.assert_allclose(counts[5:], 2_500, rtol=0.08)
 
 
-def test_states_are_made_once_for_the_same_motions() -> None:
-    walk = built_in.motion("walk-a", frames=12)
-    made = exemplars_of([walk], SKELETON, False)
-    copy = Motion(walk.name, walk.skeleton, walk.poses.copy(), walk.translations.copy(), walk.fps)
-    assert exemplars_of([copy], SKELETON, False) is made
-    others = (
-        [replace(walk, poses=walk.poses + 1e-9)],
-        [replace(walk, translations=walk.translations + 1e-9)],
-        [replace(walk, fps=60.0)],
-        [walk.frames(0, 4), walk.frames(4, 12)],
-        [walk.frames(0, 6), walk.frames(6, 12)],  # the same frames of the same names, cut elsewhere
-    )
-    assert exemplars_of([walk], SKELETON, True) is not made
-    for motions in others:
-        other = exemplars_of(motions, SKELETON, False)
-        assert other is not made
-        made = other
-
-
 def test_a_motion_of_one_frame_or_none_is_refused() -> None:
     walk = built_in.motion("walk-a", frames=1)
     for motions, message in (
@@ -134,3 +107,18 @@ def test_a_motion_of_one_frame_or_none_is_refused() -> None:
     ):
         with pytest.raises(ValueError, match=message):
             Exemplars.of(motions, SKELETON)
+
+
+def test_states_are_made_once_for_the_same_motions() -> None:
+    walk = built_in.motion("walk-a", frames=12)
+    made = exemplars_of([walk], SKELETON, False)
+    assert exemplars_of([replace(walk, poses=walk.poses.copy())], SKELETON, False) is made
+    moved, faster = replace(walk, translations=walk.translations + 1e-9), replace(walk, fps=60.0)
+    for motions in (
+        [moved],
+        [faster],
+        [walk.frames(0, 4), walk.frames(4, 12)],
+        [walk.frames(0, 6), walk.frames(6, 12)],
+    ):
+        assert exemplars_of(motions, SKELETON, False) is not made
+        made = exemplars_of(motions, SKELETON, False)

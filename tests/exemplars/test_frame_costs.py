@@ -51,16 +51,6 @@ def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_noth
         np.testing.assert_allclose(recalibration(cost, usable=False).joint_spreads, greatest)
 
 
-def test_no_mode_is_likelier_to_be_right_where_the_expected_error_is_greater() -> None:
-    stored = stored_calibration()
-    assert stored.joint_factors.shape == (3, 27)
-    assert stored.angle_factors.shape == (3, 66)
-    none = [stored.recalibration(log).none for log in np.linspace(stored.range[0], -1.0, 20)]
-    assert np.all(np.diff(none) > 0.0)
-    assert none[0] < 0.05 < 0.5 < none[-1]
-    assert recalibration(5.0).none > 0.0
-
-
 @each("views", [(45.0,), (45.0, 135.0)])
 def test_twins_cost_what_the_mirrored_and_each_reflected_pose_costs(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1), views)

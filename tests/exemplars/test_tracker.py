@@ -1,4 +1,4 @@
-"""People who are not in the training clips, followed; settings; when frames come, and what they cost."""
+"""People who are not in the training clips, followed; settings; when frames come, what they cost, and their samples."""
 
 import itertools
 from collections.abc import Iterator
@@ -12,7 +12,8 @@ from click.testing import CliRunner
 import posefit
 from posefit.arrays import Array
 from posefit.cli import main
-from posefit.fitting.tracker import Observation
+from posefit.fitting.tracker import Frame, Observation
+from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.testing import run_checks, tracker_checks
 from posefit_exemplars import beam
@@ -171,13 +172,6 @@ def test_a_person_who_appears_later_is_followed_from_then_on(walker: Walk, align
     assert walker.errors_mm(frames)[10:].max() < 150.0
 
 
-@each("translation", ["known", "aligned"])
-def test_a_track_of_no_person_is_finite(walker: Walk, translation: str) -> None:
-    frames = walker.hidden(0, 4).track(0, 4, translation=translation)
-    assert len(frames) == 4
-    assert all(np.isfinite([*frame.pose, *frame.translation, frame.cost]).all() for frame in frames)
-
-
 def test_a_root_may_jump_a_thousand_kilometres(walker: Walk) -> None:
     gone = Observation(EMPTY, np.array([1e6, 0.0, 0.0]), usable=False)
     frames = replace(walker, observations=[walker.observations[0], gone]).track(lag=1)
@@ -210,3 +204,35 @@ def test_any_optimiser_refines_within_the_budget(views: tuple[float, ...], refin
 def test_too_small_a_budget_is_refused(walker: Walk) -> None:
     with pytest.raises(ValueError, match="evaluations must be at least 300 for exemplars, got 299"):
         walker.track(evaluations=299)
+
+
+QUICK: dict[str, Any] = {"refiner": "none", "smoothing": 0.0}
+
+
+def test_reported_poses_do_not_depend_on_the_number_of_samples(walker: Walk) -> None:
+    plain, sampled = (walker.track(0, 10, seed=3, samples=samples) for samples in (0, 5))
+    for none, some in zip(plain, sampled, strict=True):
+        np.testing.assert_array_equal(none.pose, some.pose)
+        assert none.posterior is None
+        assert some.posterior is not None
+        assert len(some.posterior) == 5
+        assert some.posterior.coherent
+
+
+def sampled_poses(frames: list[Frame]) -> Array:
+    return np.array([frame.posterior.poses for frame in frames if frame.posterior is not None])
+
+
+def test_a_greater_posterior_temperature_spreads_the_samples(walker: Walk) -> None:
+    spreads = [
+        sampled_poses(walker.track(0, 8, samples=40, posterior_temperature=temperature, **QUICK)).std(axis=1).mean()
+        for temperature in (0.5, 4.0, 32.0)
+    ]
+    assert spreads == sorted(set(spreads))
+
+
+def test_a_sampled_path_is_one_movement(walker: Walk) -> None:
+    yaws = sampled_poses(walker.track(samples=12, **QUICK))[:, :, 0]
+    turns = np.abs(wrapped(np.diff(yaws, axis=0)))
+    assert np.median(turns) < np.radians(5.0)
+    assert float(np.mean(turns > np.radians(30.0))) < 0.05

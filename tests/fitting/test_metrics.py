@@ -1,5 +1,7 @@
 """Metrics by numbers worked by hand, and by law."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +13,7 @@ from posefit.fitting import metrics
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.motion import built_in
+from tests.cases import each
 
 seeds = st.integers(0, 2**32 - 1)
 rotations = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(lambda angles: rotation_from_joint_angles(np.array(angles)))
@@ -133,38 +136,26 @@ def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(joints: Array, s
     np.testing.assert_array_equal(moved, swapped)
 
 
-def test_joints_and_poses_are_checked() -> None:
-    joints, poses = np.zeros((2, 27, 3)), np.zeros((2, 66))
-    holed_joints, holed_poses = joints.copy(), poses.copy()
-    holed_joints[1, 3, 0], holed_poses[1, :2] = np.nan, np.inf
-    for metric in (metrics.mpjpe_mm, metrics.pa_mpjpe_mm, metrics.swapped, metrics.swap_rate):
-        with pytest.raises(ValueError, match="joints must be finite, got 1 that are not"):
-            metric(joints, holed_joints)
-        with pytest.raises(ValueError, match=r"truth must have shape \(T, 27, 3\), got \(0, 27, 3\)"):
-            metric(joints[:0], joints[:0])
-    for metric in (metrics.pose_error_degrees, metrics.geodesic_degrees):
-        with pytest.raises(ValueError, match="truth must be finite, got 2 that are not"):
-            metric(holed_poses, poses)
-        with pytest.raises(ValueError, match=r"estimate must have the truth's shape \(2, 66\), got \(2, 65\)"):
-            metric(poses, poses[:, 1:])
+STILL, POSES = np.zeros((2, 27, 3)), np.zeros((2, 66))
+CHOSEN = "dimensions must be 66 booleans, at least one of them true, got"
 
 
-def test_dimensions_are_checked() -> None:
-    for dimensions, came in (
-        (np.ones(65, bool), r"bool of shape \(65,\), 65 of them not 0"),
-        (np.ones(66), r"float64 of shape \(66,\), 66 of them not 0"),
-        (np.zeros(66, bool), r"bool of shape \(66,\), 0 of them not 0"),
-    ):
-        with pytest.raises(ValueError, match=f"dimensions must be 66 booleans, at least one of them true, got {came}"):
-            metrics.pose_error_degrees(np.zeros((1, 66)), np.zeros((1, 66)), dimensions)
-
-
-def test_sequences_and_areas_are_checked() -> None:
-    for of_errors in (metrics.mean_error, metrics.error_spread):
-        with pytest.raises(ValueError, match=r"errors must have shape \(T,\), at least one frame, got \(0,\)"):
-            of_errors(np.zeros(0))
-    with pytest.raises(ValueError, match=r"mpjpe must have shape \(T,\), at least one frame, got \(2, 1\)"):
-        metrics.lost_rate(np.zeros((2, 1)))
-    for shape in ((3,), (4, 2)):
-        with pytest.raises(ValueError, match=r"areas must have shape \(n, 3\), got \("):
-            metrics.iou(np.zeros(shape, dtype=np.int64))
+@each(
+    ("metric", "values", "message"),
+    [
+        (metrics.mpjpe_mm, (STILL, STILL + np.nan), "joints must be finite, got 162 that are not"),
+        (metrics.pa_mpjpe_mm, (STILL[:0], STILL[:0]), r"truth must have shape \(T, 27, 3\), got \(0, 27, 3\)"),
+        (metrics.swap_rate, (STILL, STILL + np.inf), "joints must be finite, got 162 that are not"),
+        (metrics.geodesic_degrees, (POSES + np.nan, POSES), "truth must be finite, got 132 that are not"),
+        (metrics.pose_error_degrees, (POSES, POSES[:, 1:]), r"estimate must have the truth's shape \(2, 66\), got"),
+        (metrics.pose_error_degrees, (POSES, POSES, np.ones(65, bool)), rf"{CHOSEN} bool of shape \(65,\), 65"),
+        (metrics.pose_error_degrees, (POSES, POSES, np.ones(66)), rf"{CHOSEN} float64 of shape \(66,\), 66"),
+        (metrics.pose_error_degrees, (POSES, POSES, np.zeros(66, bool)), rf"{CHOSEN} bool of shape \(66,\), 0"),
+        (metrics.mean_error, (np.zeros(0),), r"errors must have shape \(T,\), at least one frame, got \(0,\)"),
+        (metrics.lost_rate, (np.zeros((2, 1)),), r"mpjpe must have shape \(T,\), at least one frame, got \(2, 1\)"),
+        (metrics.iou, (np.zeros((4, 2), dtype=np.int64),), r"areas must have shape \(n, 3\), got \(4, 2\)"),
+    ],
+)
+def test_wrong_arrays_are_named(metric: Callable[..., object], values: tuple[Array, ...], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        metric(*values)

@@ -56,12 +56,6 @@ def test_factors_multiply_what_they_name() -> None:
     np.testing.assert_allclose(wide[BONES.index("thorax")], 1.1)
 
 
-def test_stature_scales_and_is_that_of_an_adult() -> None:
-    assert 1.6 < AVERAGE.stature < 1.9
-    assert AVERAGE.scaled(1.1, 1.1).stature == pytest.approx(1.1 * AVERAGE.stature)
-    assert shaped(AVERAGE, np.full(len(NAMES), 1.07), height=1.62).stature == pytest.approx(1.62)
-
-
 def test_varied_people_are_symmetric_and_within_their_percentage() -> None:
     made = varied(AVERAGE, 10.0, np.random.default_rng(3))
     ratio = made.skeleton.lengths / AVERAGE.skeleton.lengths

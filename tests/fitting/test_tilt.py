@@ -15,7 +15,6 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 from tests.cases import each
 
@@ -128,16 +127,6 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
         centres.append(space.centre[2])
         assert centres[-1] == pytest.approx(min(moved, tilt.high[1] - np.radians(15.0)))
     assert centres[-1] == pytest.approx(tilt.high[1] - np.radians(15.0))
-
-
-def test_a_walker_tilts_a_few_degrees_more_than_others_did_at_most() -> None:
-    angles = np.concatenate([walk.poses[:, 3:] for walk in WALKS])
-    tilts = np.concatenate([walk.poses[:, 1:3] for walk in WALKS])
-    for prior in (PCA().fit(angles), Loose().fit(angles)):
-        space = Follower(task_of(*WALKS), prior, Prediction()).space(NOTHING)
-        poses = space.decode(draw_population(space, np.random.default_rng(0), 500))[0]
-        assert (poses[:, 1:3] > tilts.min(axis=0) - np.radians(8.0)).all()
-        assert (poses[:, 1:3] < tilts.max(axis=0) + np.radians(8.0)).all()
 
 
 @each("how", [Prediction(), Prediction(tilt="box")])
