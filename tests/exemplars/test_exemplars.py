@@ -17,6 +17,7 @@ from posefit_exemplars.exemplars import (
     about_vertical,
     exemplars_of,
     mirror_image,
+    thinned_frames,
 )
 from posefit_exemplars.kernels import STRETCH
 
@@ -41,6 +42,12 @@ def test_distances_of_codes_are_those_of_joints_and_never_greater() -> None:
         for i, j in ((0, 1), (0, 15), (7, 22)):
             true = np.sqrt(((joints[i] - joints[j]) ** 2).sum(axis=-1).mean())
             assert true - least < np.linalg.norm(codes[i] - codes[j]) < true + 1e-6
+
+
+def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
+    codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32) * SAME
+    assert thinned_frames(codes).tolist() == [0, 3, 4, 6]
+    assert thinned_frames(codes[:2]).tolist() == [0, 1]
 
 
 def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> None:
@@ -100,13 +107,10 @@ def test_poses_are_drawn_by_the_square_root_of_the_size_of_their_group(two: Exem
 
 
 def test_a_motion_of_one_frame_or_none_is_refused() -> None:
-    walk = built_in.motion("walk-a", frames=1)
-    for motions, message in (
-        ([walk], "walk-a must have at least 2 frames to be followed, got 1"),
-        ([], "exemplars must have motions to learn from, got none"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            Exemplars.of(motions, SKELETON)
+    with pytest.raises(ValueError, match="walk-a must have at least 2 frames to be followed, got 1"):
+        Exemplars.of([built_in.motion("walk-a", frames=1)], SKELETON)
+    with pytest.raises(ValueError, match="exemplars must have motions to learn from, got none"):
+        Exemplars.of([], SKELETON)
 
 
 def test_states_are_made_once_for_the_same_motions() -> None:

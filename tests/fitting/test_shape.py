@@ -17,8 +17,6 @@ from posefit.silhouette.mask import Silhouette
 
 AVERAGE = Body.of(built_in.average_skeleton())
 WALK = built_in.motion("walk", frames=40).frames(0, 40)
-
-
 POSES, PLACES = WALK.poses[::4], WALK.translations[::4]
 
 
