@@ -19,10 +19,10 @@ tracker would commit in Track-v0, `to_sb3_vec_env` adapts a vector environment t
 | FitImage-v0, FitState-v0, Track-v0 | fit_image.py, fit_state.py, track.py |
 | Configure-v0: dynamic algorithm configuration; the population it steers | configure.py, population.py |
 | Modes-v0: niching | modes.py |
-| single and vector environments, checked actions | base.py |
+| single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
 | arguments and numbered instances (as in sweeps: `posefit.footage.instance`) | instance.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
-| rendering; scales of actions, costs and rewards | rendering.py, scales.py |
+| rendering | rendering.py |
 | optimisers that search an environment; references as policies | driving.py, policies.py |
 | a checker of vector environments; Stable-Baselines3 | checker.py, sb3.py |
 """

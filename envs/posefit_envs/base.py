@@ -1,10 +1,9 @@
-"""Base classes: searches side by side, a single environment as a vector of one, checked actions, rendering."""
+"""Base classes: searches side by side, a single environment as a vector of one, checked actions, scales."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import Space, error, logger
 from gymnasium.spaces import Box
@@ -20,12 +19,14 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted
 from posefit_envs.instance import ArgumentError, Episode, Instance, World, checked, instance_number, world_of
-from posefit_envs.rendering import MODES, Picture, Window, check_mode
+from posefit_envs.rendering import MODES, Picture, RenderedEnv, check_mode
 from posefit_envs.stage import Rows, Stage
 
 Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
+Number = TypeVar("Number", float, Array)
 
+LOG_HIGHEST_COST = np.log1p(100.0)
 NOT_BEGUN = "reset must come before anything else"
 ENDED = "the episode has ended: reset before the next step"
 
@@ -70,36 +71,6 @@ class ActionValidator:
                 self._warned = True
             np.clip(values, -1.0, 1.0, out=values)
         return values
-
-
-class RenderedEnv(gym.Env[Any, Any], ABC):
-    """A single environment that can be rendered."""
-
-    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
-
-    def __init__(self, render_mode: str | None) -> None:
-        check_mode(render_mode)
-        self.render_mode = render_mode
-        self._window = Window(self.metadata["render_fps"])
-
-    def render(self) -> Any:
-        """Return the picture (height, width, 3), or show it, as `render_mode` asks."""
-        if self.render_mode is None:
-            return None
-        picture = self._render_frame()
-        return picture if self.render_mode == "rgb_array" else self._window.show(picture)
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._window.close()
-
-    def _update_window(self) -> None:
-        if self.render_mode == "human":
-            self.render()
-
-    @abstractmethod
-    def _render_frame(self) -> Picture:
-        """Return the picture (height, width, 3) of the current state."""
 
 
 class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
@@ -373,3 +344,24 @@ def _reset_mask(options: Mapping[str, Any] | None, count: int, begun: bool) -> F
     if not begun and not mask.all():
         raise error.ResetNeeded("the first reset must be of all environments")
     return mask
+
+
+def scaled(bounds: tuple[float, float], number: Number) -> Number:
+    """Return the value between two bounds at a number from -1, the first bound, to 1, the second."""
+    return bounds[0] + 0.5 * (number + 1.0) * (bounds[1] - bounds[0])
+
+
+def unscaled(bounds: tuple[float, float], value: float) -> float:
+    """Return the number from -1 to 1 whose scaled value this is, but for rounding."""
+    return float(2.0 * (value - bounds[0]) / (bounds[1] - bounds[0]) - 1.0)
+
+
+def log_cost(cost: Number) -> Number:
+    """Return a cost of 0 to 100 on a logarithmic scale of 0 to 1: ln(1 + cost) / ln 101."""
+    shown: Number = np.log1p(cost) / LOG_HIGHEST_COST
+    return shown
+
+
+def log_improvement(before: Array, after: Array) -> Array:
+    """Return the rewards of best costs that fall: ln((1 + before) / (1 + after))."""
+    return np.log1p(before) - np.log1p(after)

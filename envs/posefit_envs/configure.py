@@ -7,7 +7,7 @@ from gymnasium import spaces
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv
+from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, log_improvement
 from posefit_envs.instance import ArgumentError, Episode, World, checked
 from posefit_envs.population import (
     ACTION_NUMBERS,
@@ -21,7 +21,6 @@ from posefit_envs.population import (
     observed_state,
 )
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.scales import log_improvement
 from posefit_envs.stage import Rows
 
 POPULATION_SIZE, ITERATIONS = 40, 60

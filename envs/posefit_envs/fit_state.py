@@ -8,11 +8,20 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
+from posefit_envs.base import (
+    Flags,
+    Infos,
+    Outcome,
+    SearchEnv,
+    SearchVectorEnv,
+    image_spaces,
+    log_cost,
+    log_improvement,
+    scaled,
+)
 from posefit_envs.fit_image import MAX_EVALUATIONS
 from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.scales import log_cost, log_improvement, scaled
 from posefit_envs.stage import Evaluation, Rows
 
 State = NDArray[np.float32]

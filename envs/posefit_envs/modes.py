@@ -11,9 +11,9 @@ from posefit.fitting.check import whole
 from posefit.niching import LEVELS_MM, MIN_PROBABILITY, SIZE, NicheInstance, niche_instance, niche_space, scored
 from posefit.silhouette.cost import project
 from posefit.uncertainty.modes import Posterior
-from posefit_envs.base import ENDED, NOT_BEGUN, ActionValidator, Infos, RenderedEnv
+from posefit_envs.base import ENDED, NOT_BEGUN, ActionValidator, Infos
 from posefit_envs.instance import ArgumentError, Image, backdrop, checked, instance_number, world_of
-from posefit_envs.rendering import Picture, render_frame
+from posefit_envs.rendering import Picture, RenderedEnv, render_frame
 
 MAX_EVALUATIONS = 2000
 MAX_REPORTS = 10

@@ -10,8 +10,8 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space, displacement, draw_population, fold, repair, sample_normal
 from posefit.silhouette.mask import box_of
+from posefit_envs.base import log_cost, scaled, unscaled
 from posefit_envs.instance import World, first_episode
-from posefit_envs.scales import log_cost, scaled, unscaled
 from posefit_envs.stage import Rows
 from posefit_swarm.sapso import COOLING
 from posefit_swarm.swarm import INERTIA as SAPSO_INERTIA

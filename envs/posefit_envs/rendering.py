@@ -1,8 +1,10 @@
 """Pictures of an environment: the silhouettes on each other, the body from its side, and the cost in words."""
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import cv2
+import gymnasium as gym
 import numpy as np
 from gymnasium import error
 from numpy.typing import NDArray
@@ -47,27 +49,36 @@ def render_frame(problem: PoseProblem, pose: Array | None, translation: Array | 
     return np.ascontiguousarray(np.vstack([image, words])[..., ::-1])
 
 
-class Window:
-    """A pygame window, opened when it is first needed."""
+class RenderedEnv(gym.Env[Any, Any], ABC):
+    """A single environment that can be rendered; its pygame window is opened when it is first needed."""
 
-    def __init__(self, fps: int) -> None:
-        self._fps = fps
+    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
+
+    def __init__(self, render_mode: str | None) -> None:
+        check_mode(render_mode)
+        self.render_mode = render_mode
         self._window: Any = None
-        self._clock: Any = None
 
-    def show(self, picture: Picture) -> None:
-        """Show a picture. Raises gymnasium.error.DependencyNotInstalled without pygame or without a display."""
+    def render(self) -> Any:
+        """Return the picture (height, width, 3), or show it, as `render_mode` asks.
+
+        Raises gymnasium.error.DependencyNotInstalled where it cannot be shown, without pygame or without a display.
+        """
+        if self.render_mode is None:
+            return None
+        picture = self._render_frame()
+        if self.render_mode == "rgb_array":
+            return picture
         try:
             import pygame
         except ImportError:
             raise error.DependencyNotInstalled(
                 "render_mode human needs pygame: install it with python -m pip install 'posefit[human]'"
             ) from None
-        size = picture.shape[1], picture.shape[0]
         try:
             if self._window is None:
                 pygame.display.init()
-                self._window = pygame.display.set_mode(size)
+                self._window = pygame.display.set_mode((picture.shape[1], picture.shape[0]))
                 self._clock = pygame.time.Clock()
         except pygame.error as cause:
             raise error.DependencyNotInstalled(
@@ -76,7 +87,8 @@ class Window:
         self._window.blit(pygame.surfarray.make_surface(picture.swapaxes(0, 1)), (0, 0))
         pygame.event.pump()
         pygame.display.flip()
-        self._clock.tick(self._fps)
+        self._clock.tick(self.metadata["render_fps"])
+        return None
 
     def close(self) -> None:
         """Close the window, if it is open."""
@@ -86,3 +98,11 @@ class Window:
             pygame.display.quit()
             pygame.quit()
             self._window = None
+
+    def _update_window(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    @abstractmethod
+    def _render_frame(self) -> Picture:
+        """Return the picture (height, width, 3) of the current state."""

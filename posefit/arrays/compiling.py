@@ -102,7 +102,7 @@ def _source(module: str) -> tuple[bytes, list[str]]:
     file = getattr(sys.modules.get(module), "__file__", None) or ""
     if not file.endswith(".py"):
         return b"", []
-    if Path(file).stat().st_mtime > STARTED:
+    if STARTED < Path(file).stat().st_mtime <= time.time():
         raise RuntimeError(f"{file} has changed")
     text, names = Path(file).read_bytes(), []
     package = module if Path(file).stem == "__init__" else module.rpartition(".")[0]
