@@ -21,7 +21,7 @@ from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs.configure import EVERY, ITERATIONS, POPULATION_SIZE
-from posefit_envs.fit_image import MAX_EVALUATIONS
+from posefit_envs.fit import MAX_EVALUATIONS
 from posefit_envs.instance import first_episode, world_of
 from posefit_envs.policies import (
     Policy,

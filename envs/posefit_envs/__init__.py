@@ -16,7 +16,7 @@ tracker would commit in Track-v0, `to_sb3_vec_env` adapts a vector environment t
 
 | looking for | file |
 |---|---|
-| FitImage-v0, FitState-v0, Track-v0 | fit_image.py, fit_state.py, track.py |
+| FitImage-v0, FitState-v0, Track-v0 | fit.py, track.py |
 | Configure-v0: dynamic algorithm configuration; the population it steers | configure.py, population.py |
 | Modes-v0: niching | modes.py |
 | single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
@@ -49,8 +49,8 @@ _MODULES = {
 __all__ = list(_MODULES)
 
 for _id, _entry in (
-    ("FitImage", "fit_image:FitImage"),
-    ("FitState", "fit_state:FitState"),
+    ("FitImage", "fit:FitImage"),
+    ("FitState", "fit:FitState"),
     ("Track", "track:Track"),
     ("Configure", "configure:Configure"),
 ):

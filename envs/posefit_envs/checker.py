@@ -62,8 +62,10 @@ def check_vector_env(
             own |= {"terminated": terminated[i], "truncated": truncated[i]}
             _same(f"environment {i}, step {step}:", own, expected | {"terminated": ends, "truncated": cut})
             ended[i] = (ends or cut) and mode == AutoresetMode.NEXT_STEP
-    for one in (vector, vector, *singles):
-        one.close()
+    vector.close()
+    vector.close()
+    for single in singles:
+        single.close()
 
 
 def _same(where: str, own: Any, expected: Any) -> None:

@@ -17,8 +17,7 @@ from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_envs.fit_image import FitImageEnv, FitImageVectorEnv
-from posefit_envs.fit_state import FitStateEnv, FitStateVectorEnv
+from posefit_envs.fit import FitImageEnv, FitImageVectorEnv, FitStateEnv, FitStateVectorEnv
 from posefit_envs.policies import WHOLE_WAY
 from posefit_envs.track import TrackEnv, committed_infos
 

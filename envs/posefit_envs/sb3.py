@@ -40,7 +40,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             super().__init__(vector.num_envs, vector.single_observation_space, vector.single_action_space)
 
         def reset(self) -> Any:
-            seeds = None if all(seed is None for seed in self._seeds) else list(self._seeds)
+            seeds: Any = None if all(seed is None for seed in self._seeds) else list(self._seeds)
             observations, infos = vector.reset(seed=seeds, options=self._options[0] or None)
             self.reset_infos = [_row(infos, i) for i in range(self.num_envs)]
             self._reset_seeds()

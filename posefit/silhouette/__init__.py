@@ -6,7 +6,7 @@
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
 | candidates of limbs, each drawn once, and what their combinations cost | limbs.py |
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
-| a body drawn as spans of bits, compiled | rasteriser.py, lanes.py |
+| a body drawn as spans of bits, compiled | rasteriser.py |
 | its pixels counted against silhouettes, and limbs put upon one another, compiled | kernels.py |
 | a person separated from a background, pixel by pixel | foreground.py |
 | what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |

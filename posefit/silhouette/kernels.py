@@ -7,8 +7,7 @@ import numpy as np
 
 from posefit.arrays import inlined, jit
 from posefit.geometry.kernels import Chain
-from posefit.silhouette.lanes import popcount
-from posefit.silhouette.rasteriser import NONE, STRIP_PIXELS, View, draw_pose, scratch
+from posefit.silhouette.rasteriser import NONE, STRIP_PIXELS, View, draw_pose, popcount, scratch
 
 
 @inlined

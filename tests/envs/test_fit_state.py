@@ -6,7 +6,7 @@ import pytest
 from gymnasium import error
 
 import posefit_envs  # noqa: F401, registers it
-from posefit_envs.fit_state import ProposalMemory
+from posefit_envs.fit import ProposalMemory
 from posefit_envs.policies import constant_policy, gaussian_policy, random_search_policy, rollout, uniform_policy
 
 NAME = "posefit/FitState-v0"

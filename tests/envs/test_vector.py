@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode
 import posefit_envs
 from posefit_envs import check_vector_env, to_sb3_vec_env
 from posefit_envs.base import row_of
-from posefit_envs.fit_image import FitImageVectorEnv
+from posefit_envs.fit import FitImageVectorEnv
 from tests.cases import each
 
 FIT: list[dict[str, Any]] = [
@@ -98,7 +98,6 @@ def test_the_checker_works_on_any_vector_and_names_what_is_wrong() -> None:
 @each(
     ("name", "arguments"),
     [
-        ("posefit/FitImage-v0", {}),
         ("posefit/FitImage-v0", {"max_evaluations": 3}),
         ("posefit/FitImage-v0", {"target_cost": 99.0}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, MIRROR, Skeleton, angle_index
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
 from tests.cases import each
 
 WALK = built_in.motion("walk", frames=30)
@@ -95,30 +93,6 @@ def test_exchanged_limbs_leave_everything_else_where_it_is(limbs: str) -> None:
 def test_limbs_that_are_none_are_a_mistake() -> None:
     with pytest.raises(ValueError, match="limbs must be one of legs, arms, got 'wings'"):
         exchanged_limbs(SKELETON, drawn(), "wings")  # type: ignore[arg-type]
-
-
-def overlap(view_degrees: float, operator: Callable[[Skeleton, Array, float], Array], poses: Array) -> float:
-    """Return the mean IoU of the silhouettes of poses, viewed from far away, with those of what they become."""
-    body, place, overlaps = Body.of(SKELETON), np.zeros(3), []
-    for pose in poses:
-        camera = Camera.around(place, pose[0] + np.radians(view_degrees), 30.0, (160, 120), np.radians(6.0))
-        other = operator(SKELETON, pose[None], facing(camera, place))[0]
-        one, two = (project(body, camera, which, place) for which in (pose, other))
-        overlaps.append((one & two).sum() / (one | two).sum())
-    return float(np.mean(overlaps))
-
-
-def test_silhouettes_agree_from_the_named_sides_only() -> None:
-    def named(name: str) -> Callable[[Skeleton, Array, float], Array]:
-        return lambda skeleton, poses, _: OPERATORS[name](skeleton, poses)
-
-    still = np.zeros((1, ANGLES))
-    assert all(overlap(view, reflected_poses, WALK.poses) > 0.97 for view in (0.0, 45.0, 90.0, 200.0))
-    assert all(overlap(90.0, named(name), WALK.poses) > 0.95 for name in ("mirrored", "legs", "arms"))
-    assert overlap(45.0, named("mirrored"), WALK.poses) < overlap(45.0, named("legs"), WALK.poses) < 0.75
-    assert overlap(0.0, named("turned"), still) > 0.9
-    assert 0.7 < overlap(0.0, named("turned"), WALK.poses) < 0.8
-    assert overlap(90.0, named("turned"), WALK.poses) < 0.5
 
 
 def test_facing_is_the_yaw_of_who_looks_at_the_camera() -> None:

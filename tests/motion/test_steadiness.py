@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from posefit.geometry.skeleton import JOINTS
-from posefit.motion import recorded
 from posefit.motion.steadiness import acceleration, slides, standing
 from tests.cases import each
 
@@ -54,14 +53,3 @@ def test_the_lowest_place_of_the_feet_is_the_ground_wherever_that_is() -> None:
     rising = still(300)
     rising[..., 1] += 0.03 * np.arange(300)[:, None] / 30.0  # 30 cm in ten seconds: a track that drifts
     assert standing(rising, 30.0).all()
-
-
-def test_recorded_walkers_stand_half_of_the_time_and_slide_by_about_two_centimetres() -> None:
-    motion = recorded.clip("02_01").motion()
-    joints = motion.skeleton.joints(motion.poses, motion.translations)
-    stands = standing(joints, motion.fps)
-    assert 0.3 < stands.mean() < 0.7
-    lengths = slides(joints, stands)
-    assert 4 <= len(lengths) <= 8
-    assert lengths.mean() < 0.025
-    assert 3.0 < np.nanmean(acceleration(joints, motion.fps)) < 9.0

@@ -13,8 +13,11 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.silhouette.cost import areas, project
+from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
+from posefit.silhouette.sharing import parts_of, work_through
+from tests.cases import each
 from tests.silhouette.twin import TIE, body_distance, hull_distance, random_poses
 
 
@@ -213,3 +216,26 @@ def test_small_images_equal_the_twin_even_uncompiled(body: Body) -> None:
     places = [0.0 * towards, np.array([0.9, 0.5, 0.0]), 3.9 * towards, 9.0 * towards, np.full(3, np.nan)]
     for pose, place in zip(poses, places, strict=True):
         assert_equals_the_twin(body, camera, pose, place)
+
+
+@each("threads", [1, 2])
+def test_what_goes_wrong_in_a_part_is_raised(threads: int) -> None:
+    def work(part: slice) -> None:
+        if part.start <= 500 < part.stop:
+            raise ValueError("row 500")
+
+    with pytest.raises(ValueError, match="row 500"):
+        work_through(parts_of(1000, threads), threads, lambda part: (), work)
+
+
+def test_poses_that_other_threads_draw_are_counted_for_the_one_who_asked() -> None:
+    counts = [PoseCount(), PoseCount()]
+
+    def ask(count: PoseCount, n: int) -> None:
+        with count.counting():
+            work_through(parts_of(n, 3), 3, lambda part: (), lambda part: count_poses(part.stop - part.start))
+
+    with ThreadPoolExecutor(2) as pool:
+        for job in [pool.submit(ask, count, n) for count, n in zip(counts, (1000, 3000), strict=True)]:
+            job.result(timeout=60)
+    assert [count.poses for count in counts] == [1000, 3000]

@@ -12,8 +12,7 @@ from numba import cuda, float32, float64, int32, uint32
 from numba.cuda.extending import overload
 
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.lanes import BLOCK
-from posefit.silhouette.rasteriser import FAR, NEAR
+from posefit.silhouette.rasteriser import BLOCK, FAR, NEAR
 from posefit.silhouette.rasteriser import STRIP_PIXELS as STRIP
 
 THREADS = 64  # of a block

@@ -1,4 +1,4 @@
-"""FitState-v0: one silhouette, an episode of proposals, and the state of the search as observation."""
+"""FitImage-v0 and FitState-v0: one silhouette, an episode of proposals; pictures or the search's state are observed."""
 
 from typing import Any
 
@@ -6,8 +6,9 @@ import numpy as np
 from gymnasium import Space, spaces
 from numpy.typing import NDArray
 
+from posefit import PoseProblem
 from posefit.arrays import Array
-from posefit.fitting.check import whole
+from posefit.fitting.check import finite_number, whole
 from posefit_envs.base import (
     Flags,
     Infos,
@@ -19,16 +20,119 @@ from posefit_envs.base import (
     log_improvement,
     scaled,
 )
-from posefit_envs.fit_image import MAX_EVALUATIONS
-from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
+from posefit_envs.instance import ArgumentError, Episode, Image, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Evaluation, Rows
 
 State = NDArray[np.float32]
 
+MAX_EVALUATIONS = 200
+TARGET_COST = 2.0
 SHOWN = 4  # the best proposals, and the last ones
 LOG_STEP = (-2.0, 0.0)  # powers of ten that the last number of an action stands for
 MAX_STALE = 50.0  # proposals without an improvement that show as 1
+
+
+class FitImageVectorEnv(SearchVectorEnv):
+    """`num_envs` environments as FitImageEnv."""
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        target_cost: float = TARGET_COST,
+        max_evaluations: int = MAX_EVALUATIONS,
+        **arguments: Any,
+    ) -> None:
+        checked(finite_number, "target_cost", target_cost)
+        checked(whole, "max_evaluations", max_evaluations, 2)
+        super().__init__(num_envs, image_spaces, **arguments)
+        self._target, self._budget = float(target_cost), int(max_evaluations)
+        self._best = np.full(num_envs, np.inf)
+        self._last: Evaluation | None = None
+
+    @property
+    def problems(self) -> list[PoseProblem]:
+        """The problem that each environment's proposals are evaluated on."""
+        return [episode.problem for episode in self.episodes]
+
+    def _begin_search(self, i: int, number: int) -> None:
+        self._enter(i, first_episode(self.world, number, self._budget))
+        self._best[i] = np.inf
+
+    def _opened(self, begun: Flags) -> tuple[Image, Infos]:
+        return self._stage.pictures(), {"instance": self._numbers.copy()}
+
+    def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
+        last = self._last = self._stage.evaluate(actions, rows)
+        np.minimum(self._best, last.costs, out=self._best, where=stepping)
+        terminated = stepping & (self._best <= self._target)
+        truncated = ~terminated & (self._steps >= self._budget)
+        infos = self._progress(self._best, self._steps, last.poses, cost=last.costs, areas=last.areas)
+        return Outcome(last.pictures, -last.costs, terminated, infos, {"instance": self._numbers}, truncated)
+
+    def _render_row(self, i: int, episode: Episode) -> Picture:
+        last = self._last
+        if not self._steps[i] or last is None:
+            return render_frame(episode.problem, None, None, f"instance {episode.instance.number}")
+        label = f"cost {last.costs[i]:.1f}, best {self._best[i]:.1f}, {self._steps[i]} evaluations"
+        return render_frame(episode.problem, last.poses[i], last.translations[i], label)
+
+
+class FitImageEnv(SearchEnv):
+    """
+    ## Description
+    A silhouette of a person is observed. Each step proposes a pose; its body is projected, and its mismatch with the
+    silhouette is the cost. The episode is a search for the pose by proposals alone.
+
+    ## Action Space
+    `Box(-1, 1, (d,), float32)`: a proposal, with `prior="pca"` and a known translation d = 9.
+
+    | Num | Meaning | Min and max stand for |
+    |---|---|---|
+    | 0, 1, 2 | root yaw, pitch, roll | 45, 15, 15 degrees to either side of a guess |
+    | 3, 4, 5 | root translation, with `translation="searched"` only | 0.5 m to either side |
+    | the rest | latents of the prior | the range of its training poses |
+
+    Actions outside are clipped, with one warning. float64 is not rounded.
+
+    ## Observation Space
+    `Box(0, 255, (height, width, 2 views), uint8)`, for each view:
+
+    | Channel | Meaning |
+    |---|---|
+    | 0 | the observed silhouette: 255 is the person |
+    | 1 | the silhouette of the last proposal; empty before the first |
+
+    ## Rewards
+    Minus the cost of the proposal, 0 to 100; SAPSO (4).
+
+    ## Starting State
+    An instance: a pose of the motion, its cadence, and the middle of the searched yaw, all from its number. Without
+    `instance` each reset draws a number of the `split`; `reset(options={"instance": 17})` chooses one.
+
+    ## Episode End
+    Terminates when the best cost is at or below `target_cost`; truncates after `max_evaluations` proposals.
+
+    ## Information
+    `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in pixels, `instance`, and unless `errors=False`
+    `error_degrees` of the proposal against the truth; a reset gives `instance` alone.
+
+    ## Arguments
+    - `motion="walk"`: a built-in motion, or an .amc or .bvh file.
+    - `instance=None`: 0 to 19,999. `split="train"` draws of 0 to 9,999, `"test"` of the others, which are held out.
+    - `view_degrees=45.0`: where the camera stands, 0 in front of the person; several for several views.
+    - `prior="pca"`, `train=None`: the prior and the motions it learns from; by default other people's.
+    - `translation="known"`: or "searched" or "aligned".
+    - `size=(64, 48)`: width and height in pixels.
+    - `noise=None`: corruptions of the silhouette and their strengths, such as `{"holes": 0.3, "shadow": 0.5}`; see
+      `posefit.silhouette.corruption`.
+    - `mismatch_percent=0.0`: the largest difference of the fitted body's bones and radii from the person's.
+    - `errors=True`: whether infos hold errors against the truth; a learner that does not read them needs none.
+    - `target_cost=2.0`, `max_evaluations=200`.
+    """
+
+    vector = FitImageVectorEnv
 
 
 class ProposalMemory:
