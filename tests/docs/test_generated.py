@@ -1,4 +1,4 @@
-"""The pages that are made from the code say what the code does."""
+"""The pages and the drawing that are made from the code say what the code does."""
 
 import json
 import re
@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import architecture
 import generator
 import pytest
 from click.testing import CliRunner
@@ -130,3 +131,27 @@ def test_arrays_are_named_as_the_code_names_them() -> None:
     long = "(poses: ~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]], more: dict = <factory>)"
     assert shortened(long) == "(poses: Array, more: dict = ...)"
     assert shortened("ndarray[tuple[Any, ...], dtype[bool]]") == "Array[bool]"
+
+
+def test_a_circle_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    graph = {"a": frozenset("b"), "b": frozenset("cd"), "c": frozenset("a"), "d": frozenset()}
+    assert architecture.circle(graph) == ["a", "b", "c", "a"]
+    monkeypatch.setattr(architecture, "imports", lambda: graph)
+    assert architecture.main([]) == 1
+    assert "a -> b -> c -> a" in capsys.readouterr().err
+
+
+def test_an_arrow_that_others_imply_is_left_out() -> None:
+    graph = {"a": frozenset("bc"), "b": frozenset("c"), "c": frozenset()}
+    assert architecture.reduced(graph) == {"a": frozenset("b"), "b": frozenset("c"), "c": frozenset()}
+
+
+def test_the_drawing_and_the_page_show_every_package() -> None:
+    graph, text = architecture.imports(), architecture.drawing()
+    page = (DOCS / "background" / "architecture.md").read_text("utf-8")
+    for box in graph:
+        assert box.removeprefix("posefit_") in text, box
+        assert box.startswith("posefit_") or f"`{box}`" in page, box
+    arrows, _ = architecture.grouped(architecture.reduced(graph))
+    height = {box: level for level, row in enumerate(architecture.levels(arrows)) for box in row}
+    assert all(height[box] > height[one] for box, lower in arrows.items() for one in lower)
