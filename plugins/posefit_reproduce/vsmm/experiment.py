@@ -100,7 +100,6 @@ def patent_errors(film: Film, frames: Sequence[Frame]) -> dict[str, float]:
     """Return the errors of right elbow and hand, in the image and in space, and of the whole pose."""
     truth, estimate = both_joints(film, frames)
     flat, deep = projected_cm(film, truth, estimate), 100.0 * np.linalg.norm(truth - estimate, axis=-1)
-    poses = np.array([frame.pose for frame in frames])
     values = {
         "elbow_cm": flat[:, ELBOW],
         "hand_cm": flat[:, HAND],
@@ -109,7 +108,7 @@ def patent_errors(film: Film, frames: Sequence[Frame]) -> dict[str, float]:
         "projected_cm": flat,
         "joints_3d_cm": deep,
         "mpjpe_mm": metrics.mpjpe_mm(truth, estimate),
-        "error_degrees": metrics.pose_error_degrees(film.truth.poses, poses),
+        "error_degrees": metrics.pose_error_degrees(film.truth.poses, np.array([frame.pose for frame in frames])),
         "iou": [metrics.iou(frame.areas)[0] for frame in frames],
     }
     return {name: float(np.mean(each)) for name, each in values.items()} | {
