@@ -37,18 +37,12 @@ class EnvObjective:
         self._count = env.num_envs if isinstance(env, VectorEnv) else 1
         self._instances: Any = None
 
-    def begin(self, seed: int, instance: int | Sequence[int] | None) -> list[SearchSpace]:
-        """Reset with an instance for all or for each, or with random ones; return the space that each searches."""
-        _, info = self._env.reset(seed=seed, options={"instance": instance})
-        self._instances = info["instance"]
+    def begin(self, seed: int, instance: int | Sequence[int] | None) -> tuple[list[SearchSpace], list[int]]:
+        """Reset with an instance for all or each, or with random ones; return what each searches, and their numbers."""
+        self._instances = self._env.reset(seed=seed, options={"instance": instance})[1]["instance"]
         bare = self._bare
-        return [bare.search_space] if isinstance(bare, FitImageEnv | FitStateEnv) else bare.search_spaces
-
-    @property
-    def instances(self) -> list[int]:
-        """The number of each environment's instance."""
-        numbers: list[int] = np.atleast_1d(self._instances).tolist()
-        return numbers
+        spaces = [bare.search_space] if isinstance(bare, FitImageEnv | FitStateEnv) else bare.search_spaces
+        return spaces, np.atleast_1d(self._instances).tolist()
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
@@ -89,7 +83,7 @@ def drive(
     budget does not hold one population, and where the environments have several instances: `drive_each` is for those.
     """
     objective = EnvObjective(env, dtype)
-    space, numbers = objective.begin(seed, instance)[0], objective.instances
+    (space, *_), numbers = objective.begin(seed, instance)
     if len(set(numbers)) > 1:
         raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
     if isinstance(optimiser, str):
@@ -119,7 +113,7 @@ def drive_each(
     objective = EnvObjective(env, dtype)
     searches = [
         _stepwise(_optimiser(space, optimiser, seed + i, evaluations, settings), evaluations)
-        for i, space in enumerate(objective.begin(seed, instances))
+        for i, space in enumerate(objective.begin(seed, instances)[0])
     ]
     proposals = np.stack([next(search) for search in searches])
     minima: dict[int, Minimum] = {}

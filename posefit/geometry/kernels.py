@@ -69,7 +69,7 @@ def _place_bone(typing_context: Any, chain: Any, b: Any, sines: Any, cosines: An
 
 @overload(place_bone, inline="always")
 def _place_bone_compiled(chain, b, sines, cosines, frames):  # noqa: ARG001
-    return lambda chain, b, sines, cosines, frames: _place_bone(chain, b, sines, cosines, frames)
+    return lambda chain, b, sines, cosines, frames: _place_bone(chain, b, sines, cosines, frames)  # type: ignore[call-arg]
 
 
 def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -72,7 +72,7 @@ def _ctpop(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba calls
 
 @overload(popcount)
 def _popcount_compiled(bits):  # noqa: ARG001 - numba compares the two signatures
-    return lambda bits: _ctpop(bits)
+    return lambda bits: _ctpop(bits)  # type: ignore[call-arg]
 
 
 def root(x: Any) -> Any:
@@ -98,7 +98,7 @@ def _list_steps(typing_context: Any, blocks: Any, at: Any, first: Any, step: Any
 
 @overload(list_steps, inline="always")
 def _list_steps_compiled(blocks, at, first, step):  # noqa: ARG001
-    return lambda blocks, at, first, step: _list_steps(blocks, at, first, step)
+    return lambda blocks, at, first, step: _list_steps(blocks, at, first, step)  # type: ignore[call-arg]
 
 
 def _build_steps(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -138,7 +138,7 @@ def _set_spans(typing_context: Any, pixels: Any, place: Any, stride: Any, spans:
 
 @overload(set_spans, inline="always")
 def _set_spans_compiled(pixels, place, stride, spans):  # noqa: ARG001
-    return lambda pixels, place, stride, spans: _set_spans(pixels, place, stride, spans)
+    return lambda pixels, place, stride, spans: _set_spans(pixels, place, stride, spans)  # type: ignore[call-arg]
 
 
 def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
