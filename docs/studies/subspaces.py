@@ -33,7 +33,7 @@ from posefit_vsmm.imm import PLACED, Measurement
 from posefit_vsmm.motion import library
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ERROR, YAW_PITCH_ROLL, decode, encode, free_errors
-from posefit_vsmm.switching import Measure
+from posefit_vsmm.switching import Measure, most_probable
 from posefit_vsmm.tracker import VSMM, TrackFilter
 from table import WORKERS, bar, markdown
 
@@ -108,7 +108,7 @@ class SubspaceSearch(joined.Search):
         if not self.chosen:
             return tuple(library().models)
         group = models.group if models.newcomer is None else None
-        return tuple(models.groups[group or models.topology.most_probable(models.active, belief.probabilities)])
+        return tuple(models.groups[group or most_probable(models.topology.groups, models.active, belief.probabilities)])
 
 
 class SubspaceTracker(VSMM):

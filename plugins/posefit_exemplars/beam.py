@@ -148,13 +148,6 @@ def next_states(
     return every.chosen(diverse_best(exemplars, every, every.totals, most))
 
 
-def jump_states(states: Rows, yaws: Array, beam: Beam, steps: Steps) -> Beam:
-    """Return states to which the best of a beam jumps."""
-    best, many = int(beam.totals.argmin()), len(states)
-    places = np.repeat(beam.places[best : best + 1], many, axis=0)
-    return Beam(states, yaws, np.full(many, best), np.full(many, beam.totals[best] + steps.jump), places)
-
-
 def squared_distances(some: Codes, others: Codes) -> Codes:
     """Return the squared distances (n, m) of codes."""
     squares = (some**2).sum(axis=1)[:, None] - 2.0 * (some @ others.T) + (others**2).sum(axis=1)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.alignment import align
+from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs

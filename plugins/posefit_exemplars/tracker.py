@@ -26,7 +26,6 @@ from posefit_exemplars.beam import (
     Transition,
     Transitions,
     diverse_best,
-    jump_states,
     merged,
     next_states,
     root_deviation_costs,
@@ -224,10 +223,13 @@ class ExemplarTracker:
 
     def _started(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
         """Return states that are reached by a jump, or that begin a track."""
+        parent, total, place = -1, 0.0, self.task.anchor
         if before is not None:
-            return jump_states(states, yaws, before, self.steps)
+            parent = int(before.totals.argmin())
+            total, place = before.totals[parent] + self.steps.jump, before.places[parent]
         many = len(states)
-        return Beam(states, yaws, np.full(many, -1), np.zeros(many), np.repeat(self.task.anchor[None], many, axis=0))
+        places = np.repeat(place[None], many, axis=0)
+        return Beam(states, yaws, np.full(many, parent), np.full(many, total), places)
 
     def _poses(self, beam: Beam) -> Array:
         return self.exemplars.turned(beam.states, beam.yaws)

@@ -6,8 +6,8 @@ import numpy as np
 
 from posefit import settings as of_plugins
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.fitting.box import Start
+from posefit.fitting.check import at_least, positive
 from posefit.fitting.optimiser import OptimiserFactory, minimise
 from posefit.fitting.prior import Components
 from posefit.fitting.problem import PoseProblem
@@ -130,9 +130,7 @@ def joined(
         weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
         groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Interpretation V1.
     """
-    if dimensions < 1:
-        raise InputError(f"dimensions must be at least 1, got {dimensions}")
-    if not weight > 0.0:
-        raise InputError(f"weight must be above 0, got {weight}")
+    at_least("dimensions", dimensions, 1)
+    positive("weight", weight)
     search = Search(task, library().reliance, registry().optimiser(optimiser), dimensions, weight)
     return VSMM(task, Settings(groups=groups), search)

@@ -60,16 +60,9 @@ class Topology:
         """Return the models of some groups, each once, in the order of the groups."""
         return tuple(dict.fromkeys(model for name, mine in self.groups.items() if name in names for model in mine))
 
-    def most_probable(self, models: Sequence[str], probabilities: Array) -> str:
-        """Return the group whose models are the most probable together. VSMM step 5."""
-        return _most_probable(self.groups, models, probabilities)
 
-    def activity(self, models: Sequence[str], probabilities: Array) -> str:
-        """Return the activity whose models are the most probable together."""
-        return _most_probable(self.activities, models, probabilities)
-
-
-def _most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array) -> str:
+def most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], probabilities: Array) -> str:
+    """Return the name of the set, a group or an activity, whose models are the most probable together. VSMM step 5."""
     known = dict(zip(models, probabilities, strict=True))
     return max(sets, key=lambda name: sum(known.get(model, 0.0) for model in sets[name]))
 
@@ -284,13 +277,13 @@ class Models:
         after = self.imm.cycle(before, measure)
         self._surprises = [*self._surprises, surprise][-RECENT:]
         if self._how.structure == "all":
-            self.group = self.topology.most_probable(self.active, after.probabilities)
+            self.group = most_probable(self.groups, self.active, after.probabilities)
             return after
         self._cycles += 1
         if self.group is None:
             if self._cycles < FIRST:
                 return after
-            return self._keep(self.topology.most_probable(self.active, after.probabilities), after)  # VSMM 5
+            return self._keep(most_probable(self.groups, self.active, after.probabilities), after)  # VSMM 5
         if self.newcomer is not None:
             return self._judged(after)
         self._rested += 1

@@ -2,9 +2,8 @@
 
 import inspect
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -12,17 +11,17 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
-from posefit.fitting.alignment import align
+from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter, lines_of
 from posefit_vsmm.kernels import minus, plus
 from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
-from posefit_vsmm.motion import STIFF, MotionModel, library, turned
+from posefit_vsmm.motion import STIFF, library, turned
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, ERROR, Reliance, bone_errors, decode, encode, free_errors
-from posefit_vsmm.switching import Models, read_topology
+from posefit_vsmm.switching import Models, most_probable, read_topology
 
 if TYPE_CHECKING:
     from posefit_vsmm.joined import Search
@@ -44,44 +43,6 @@ def matched(task: Task, observation: Observation, reliance: Reliance, states: Ar
     else:
         places = align(*scene, poses, places)
     return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
-
-
-def estimated_state(
-    match: Callable[[Array], tuple[Array, Array]],
-    free: Array,
-    models: Iterable[MotionModel],
-    yaw: float | None,
-    anchor: Array,
-    given: Array | None,
-    budget: int,
-    rng: np.random.Generator,
-) -> tuple[Array, int]:
-    """Return the state (43,) that fits an observation best, and the evaluations that it took, at most the budget.
-
-    `match` is `matched` in it, `free` says which errors (33,) joints allow. `yaw` is about where the person
-    faces, None for anywhere; `given` is a known pose (66,), if there is one.
-    """
-    yaws = ALL_AROUND if yaw is None else yaw + NEAR
-    typical = np.concatenate([model.poses for model in models])
-    turns = [(float(np.cos(0.5 * one)), float(np.sin(0.5 * one))) for one in yaws]
-    states = np.array([[*anchor, *turned(pose[:4], *turn), *pose[4:]] for turn in turns for pose in typical])
-    room = max(1, min(len(states), int(SHARE * budget)) - (given is not None))
-    states = states[np.linspace(0, len(states) - 1, room).astype(np.int64)]
-    if given is not None:
-        states = np.concatenate([encode(given[None], anchor[None]), states])
-    costs, states = match(states)
-    best, least = states[costs.argmin()], float(costs.min())
-    home, used = best, len(states)
-    for turn in range((budget - used) // ROUND):
-        errors = rng.normal(0.0, SPREADS[min(turn, len(SPREADS) - 1)], (ROUND, ERROR))
-        errors[:, :3] = 0.0
-        errors *= free
-        costs, states = match(np.array([plus(best, error) for error in errors]))
-        costs += [((minus(state, home)[3:] / TYPICAL_DEVIATION) ** 2).sum() for state in states]
-        if costs.min() < least:
-            best, least = states[costs.argmin()], float(costs.min())
-        used += ROUND
-    return np.asarray(best), used
 
 
 MAX_BLIND_FRAMES = 15  # frames that the models go on alone without a visible person; then the track is lost
@@ -172,19 +133,41 @@ class TrackFilter:
         return self._frame(pose, place, observation, used + 1, began, details)
 
     def _begin(self, observation: Observation) -> int:
-        """Estimate a pose from this frame alone, with all models equally probable; return the evaluations that took."""
-        task, latest = self._task, self._latest
+        """Take the state (43,) that fits this frame best, with all models equally probable; return its evaluations.
+
+        Typical poses of the models are tried at several yaws, and then draws around the best so far.
+        """
+        task, latest, rng = self._task, self._latest, self._rng
         yaw, anchor, given = task.yaw, task.anchor, None
         if latest is not None:
             yaw, anchor, given = float(latest.pose[0]), latest.translation, latest.pose
         elif task.first_pose is not None:
             given = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
         budget = task.evaluations - 1 if self._searcher is None else task.evaluations // 2
-        match = partial(matched, task, observation, self._reliance)
-        free, models = free_errors(task.body.skeleton), self._models.known.values()
-        state, used = estimated_state(match, free, models, yaw, np.asarray(anchor), given, budget, self._rng)
+        yaws = ALL_AROUND if yaw is None else yaw + NEAR
+        typical = np.concatenate([model.poses for model in self._models.known.values()])
+        turns = [(float(np.cos(0.5 * one)), float(np.sin(0.5 * one))) for one in yaws]
+        states = np.array([[*anchor, *turned(pose[:4], *turn), *pose[4:]] for turn in turns for pose in typical])
+        room = max(1, min(len(states), int(SHARE * budget)) - (given is not None))
+        states = states[np.linspace(0, len(states) - 1, room).astype(np.int64)]
+        if given is not None:
+            states = np.concatenate([encode(given[None], np.asarray(anchor)[None]), states])
+        costs, states = matched(task, observation, self._reliance, states)
+        best, least = states[costs.argmin()], float(costs.min())
+        home, used = best, len(states)
+        free = free_errors(task.body.skeleton)
+        for turn in range((budget - used) // ROUND):
+            errors = rng.normal(0.0, SPREADS[min(turn, len(SPREADS) - 1)], (ROUND, ERROR))
+            errors[:, :3] = 0.0
+            errors *= free
+            drawn = np.array([plus(best, error) for error in errors])
+            costs, states = matched(task, observation, self._reliance, drawn)
+            costs += [((minus(state, home)[3:] / TYPICAL_DEVIATION) ** 2).sum() for state in states]
+            if costs.min() < least:
+                best, least = states[costs.argmin()], float(costs.min())
+            used += ROUND
         self._models.restart()
-        self._belief = self._models.start(state, self._how.initial_noise * np.diag((UNSURE * self._free) ** 2))
+        self._belief = self._models.start(best, self._how.initial_noise * np.diag((UNSURE * self._free) ** 2))
         self._bad = 0
         self._missing = dict.fromkeys(_LIMBS, 0)
         return used
@@ -241,8 +224,8 @@ class TrackFilter:
             self._bad = self._bad + 1 if iou < LOST else 0
         seconds = time.perf_counter() - began
         spent = time.process_time() - self._begun
-        models, belief = self._models, self._belief
-        activity = None if belief is None else models.topology.activity(models.active, belief.probabilities)
+        belief, activities, active = self._belief, self._models.topology.activities, self._models.active
+        activity = None if belief is None else most_probable(activities, active, belief.probabilities)
         figures = pose, place, cost, counts, used, seconds, np.array([cost])
         self._latest = Frame(*figures, details=details, cpu_seconds=spent, activity=activity)
         return self._latest

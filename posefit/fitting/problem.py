@@ -9,7 +9,8 @@ import numpy as np
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
-from posefit.fitting.alignment import align
+from posefit.fitting.check import at_least, between
+from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -25,6 +26,29 @@ from posefit.silhouette.cost import (
 )
 from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
 from posefit.silhouette.sharing import parts_of, work_through
+
+
+def align(
+    body: Body, cameras: Sequence[Camera], silhouettes: Sequence[Silhouette], poses: Array, anchors: Array
+) -> Array:
+    """Return the translations (n, 3) that bring poses (n, 66) to the silhouettes' boxes. Interpretation S4, `aligned`.
+
+    Each border of a box says where the outermost disc of the body must touch, and that is linear in the translation:
+    `focal (x + t_x) +- focal radius = (border - centre) (z + t_z)`. All borders of all views are solved for together,
+    by least squares, starting from anchors (n, 3). A border at the image's edge says nothing and is left out.
+    """
+    translations = writeable(anchors.copy())
+    move_to_borders(
+        writeable(body.skeleton.joints(poses)),
+        body.joint_radii(),
+        np.array([camera.rotation for camera in cameras]),
+        np.array([camera.translation for camera in cameras]),
+        np.array([camera.focal for camera in cameras]),
+        np.array([camera.centre for camera in cameras]),
+        np.array([silhouette.extent for silhouette in silhouettes]),
+        translations,
+    )
+    return translations
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +76,8 @@ class PoseProblem:
                 raise InputError(f"mask must have shape {size}, the camera's, got {silhouette.mask.shape}")
         if not self.blank and not any(silhouette.mask.any() for silhouette in self.silhouettes):
             raise InputError("silhouettes must show a person, got an empty mask")
-        if not 0.0 <= self.beta <= 1.0:
-            raise InputError(f"beta must lie in 0 to 1, got {self.beta}")
-        if self.threads < 1:
-            raise InputError(f"threads must be at least 1, got {self.threads}")
+        between("beta", self.beta, 0.0, 1.0)
+        at_least("threads", self.threads, 1)
 
     def evaluate(self, proposals: Array) -> Array:
         """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""

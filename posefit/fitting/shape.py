@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evolution.strategy import Strategy, default_population_size
-from posefit.fitting.alignment import align
 from posefit.fitting.box import REDRAWS
+from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera

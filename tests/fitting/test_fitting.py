@@ -8,9 +8,9 @@ import pytest
 
 from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
-from posefit.fitting.alignment import align
 from posefit.fitting.box import displacement, draw_population
 from posefit.fitting.optimiser import BudgetError, populations
+from posefit.fitting.problem import align
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.drawn import PoseCount

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from posefit.fitting.alignment import align
+from posefit.fitting.problem import align
 from posefit.fitting.shape import GIRTHS, LENGTHS, NAMES, fit_shape, shaped
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body, varied

@@ -23,7 +23,7 @@ from posefit_vsmm.imm import PLACED
 from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.state import decode, encode
-from posefit_vsmm.switching import Models, read_topology
+from posefit_vsmm.switching import Models, most_probable, read_topology
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, vsmm
 from tests.cases import each
 
@@ -166,8 +166,8 @@ def test_a_file_of_groups_that_is_wrong_is_named(tmp_path: Path, text: str, mess
 
 def test_an_activity_is_as_probable_as_its_models_together() -> None:
     topology, models = read_topology(None, NAMES), ("stiff-walk", "walk", "jacks")
-    assert topology.activity(models, np.array([0.3, 0.3, 0.4])) == "walk"
-    assert topology.activity(models, np.array([0.2, 0.2, 0.6])) == "jacks"
+    assert most_probable(topology.activities, models, np.array([0.3, 0.3, 0.4])) == "walk"
+    assert most_probable(topology.activities, models, np.array([0.2, 0.2, 0.6])) == "jacks"
 
 
 @each(
