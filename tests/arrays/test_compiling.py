@@ -12,10 +12,34 @@ import pytest
 from posefit.arrays.compiling import in_turn
 from tests.cases import each
 
+DEEPER = """
+from numba.extending import overload
+from posefit.arrays import inlined
+FACTOR = 2.0
+
+@inlined
+def deep(x):
+    return x + 1.0
+
+def plain(x):
+    return x
+
+@overload(plain)
+def _compiled(x):
+    return lambda x: x
+"""
+MIDDLE = """
+from deeper import FACTOR, deep, plain
+"""
 # a loop that calls another, one that calls itself, one that calls another twice, one that no type fits, and one that
 # is to become part of others
 LOOPS = """
 from posefit.arrays import inlined, jit
+from middle import FACTOR, deep, plain
+
+@jit
+def changing(x):
+    return FACTOR * deep(plain(x))
 
 @jit
 def outer(values):
@@ -78,8 +102,10 @@ assert loops.halved(9) == 3
 
 @pytest.fixture
 def start():
-    def started(script, tmp_path, **variables):
-        (tmp_path / "loops.py").write_text(LOOPS, encoding="utf-8")
+    def started(script, tmp_path, deeper=DEEPER, **variables):
+        for name, text in (("loops", LOOPS), ("middle", MIDDLE), ("deeper", deeper)):
+            (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+        variables["PYTHONDONTWRITEBYTECODE"] = "1"  # Python takes a file of the same second and size for the same
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0", **variables}
         path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
         return subprocess.Popen(
@@ -151,6 +177,20 @@ def test_each_function_is_compiled_once(start, tmp_path, script, expected):
     (tmp_path / "go").touch()
     assert sorted(compiled(start(script, tmp_path))) == expected
     assert "impossible" in script or compiled(start(script, tmp_path)) == []
+
+
+def test_every_change_of_what_a_module_imports_compiles_it_again_once(start, tmp_path):
+    (tmp_path / "go").touch()
+    assert compiled(start("assert loops.changing(2.0) == 6.0", tmp_path)) == ["changing float64"]
+    for before, after, value in (
+        ("x + 1.0", "x + 2.0", 8.0),  # an inlined function
+        ("lambda x: x", "lambda x: x + 1.0", 8.0),  # what numba knows of a plain one
+        ("FACTOR = 2.0", "FACTOR = 3.0", 9.0),  # a constant
+    ):
+        assert before in DEEPER
+        for expected in (["changing float64"], []):
+            script = f"assert loops.changing(2.0) == {value}"
+            assert compiled(start(script, tmp_path, DEEPER.replace(before, after))) == expected
 
 
 def test_without_a_folder_or_room_for_the_cache_every_process_compiles(start, tmp_path):

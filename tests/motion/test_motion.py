@@ -81,12 +81,9 @@ def test_a_root_that_turns_on_and_on_keeps_its_turns() -> None:
 
 def test_a_motion_is_not_resampled_to_more_frames_than_fit_into_memory() -> None:
     motion = clip(100, fps=0.1)
-    with pytest.raises(
-        ValueError, match="must have at most 200000 frames when it is resampled, got .* frames at 1000 fps"
-    ):
-        motion.resampled(1000.0)
-    with pytest.raises(ValueError, match=r"fps must lie in 0.001 to 1e\+06, got 1e-300"):
-        motion.resampled(1e-300)
+    for fps, message in ((1000.0, "must have at most 200000 frames when it is resampled"), (1e-300, "fps must lie in")):
+        with pytest.raises(ValueError, match=message):
+            motion.resampled(fps)
 
 
 LEFT, RIGHT = JOINTS.index("lfoot"), JOINTS.index("rfoot")

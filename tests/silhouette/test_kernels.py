@@ -147,22 +147,6 @@ def test_cones_by_hand() -> None:
     )
 
 
-def test_single_cones_of_every_kind_equal_the_twin() -> None:
-    rng = np.random.default_rng(12)
-    for k in range(600):
-        (u, v), (du, dv) = rng.uniform(-30.0, 150.0, 2), rng.normal(0.0, 40.0, 2)
-        r0, r1 = rng.uniform(0.1, 30.0, 2)
-        kind = k % 6
-        du, dv = (0.0 if kind in (0, 5) else du), (0.0 if kind in (1, 5) else dv)  # standing, lying, a point
-        if kind == 2:
-            r1 = r0
-        elif kind == 3:
-            du, dv = 0.05 * du, 0.05 * dv  # one disc is mostly within the other
-        elif kind == 4:
-            u, v, du, dv = (round(value * 2.0) / 2.0 + 0.01 for value in (u, v, du, dv))
-        assert_equals_the_twin(*flat_cone(u, v, du, dv, r0, r1))
-
-
 def test_counted_areas_equal_the_masks_for_any_size_and_place(body: Body) -> None:
     for depth in [3.0, 0.9, 0.2]:
         for size in [(1, 1), (63, 40), (64, 8), (65, 9), (127, 61), (130, 7), (321, 50), (1920, 1080)]:

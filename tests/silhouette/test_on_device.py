@@ -19,7 +19,7 @@ from posefit.registry import registry
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.cuda.device import moved_to
 from posefit.silhouette.drawn import PoseCount
-from posefit.silhouette.mask import Silhouette, coarser_silhouette
+from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import pose_problem, walking_angles
 from tests.cases import each
 from tests.silhouette.twin import random_poses
@@ -105,11 +105,3 @@ def test_proposals_that_a_device_decodes_cost_what_they_cost_on_a_cpu(
     np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))
     with pytest.raises(ValueError, match="proposals must be finite, got nan or infinity"):
         on_device.evaluate(np.full((2, space.dimensions), np.nan))
-
-
-def test_a_smaller_picture_stays_on_its_device_and_has_its_borders_there() -> None:
-    silhouette = moved_to(Silhouette.of(np.eye(8)[::-1, 2:]), "cuda")
-    assert coarser_silhouette(silhouette, 2).device == "cuda"
-    small = coarser_silhouette(Silhouette.of(np.eye(12)[3:9]), 2)
-    assert moved_to(small, "cuda").extent == small.extent != Silhouette.of(small.mask).extent
-    assert moved_to(silhouette, "cpu").device == "cpu"
