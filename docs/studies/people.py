@@ -48,8 +48,9 @@ CHANGES: dict[str, Mapping[str, Any]] = {
 }
 # the same without one of the tracker's steps
 STEPS: dict[str, Mapping[str, Any]] = {
-    "the path alone": {"settings": {"exemplars.refiner": "none", "exemplars.smoothing": 0.0}},
-    "refined, not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
+    "the path alone": {"settings": {"exemplars.refiner": "none", "exemplars.parts": False, "exemplars.smoothing": 0.0}},
+    "no parts": {"settings": {"exemplars.parts": False}},
+    "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
     "no mirror images": {"settings": {"exemplars.mirrored": False}},
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")

@@ -9,7 +9,8 @@ Toyama and Blake, Probabilistic tracking in a metric space, 2001.
 - `beam` has the states that a frame may be in, and the costs of steps between them; `kernels` has its loop.
 - `frame_costs` has the costs of poses in a frame.
 - `window` is the likeliest path through the last frames, the weights of states, and sampled paths.
-- `refinement` searches around the path, `smoothing` filters the estimates over time.
+- `refinement` searches around the path, `parts` lets trunk, legs and arms come from different clips, `smoothing`
+  filters the estimates over time.
 - `lost_model` makes the posterior's intervals hold, and gives the probability that a frame is lost.
 - `tracker` has the settings, and processes one frame after the other.
 

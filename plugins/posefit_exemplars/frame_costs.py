@@ -7,6 +7,7 @@ from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs
+from posefit.silhouette.limbs import Limb
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 
 SMALL = 40  # pixels: no side of a small picture is shorter
@@ -48,6 +49,10 @@ class FrameCosts:
     def full(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses."""
         return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
+
+    def limb(self, limb: Limb, pose: Array, place: Array, angles: Array) -> Array:
+        """Return the costs (n,) of a pose with each of the `angles` (n, k) of a limb."""
+        return limb.costs(*self._scene[1:], pose, place, angles)
 
     def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""

@@ -34,6 +34,7 @@ from posefit_exemplars.beam import (
 from posefit_exemplars.exemplars import Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
+from posefit_exemplars.parts import Composer, composed
 from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.smoothing import SMOOTHED, Estimate, smoothed
 from posefit_exemplars.window import FrameStates, Sampler, frame_states, mean_near, state_weights, viterbi_state
@@ -41,7 +42,9 @@ from posefit_exemplars.window import FrameStates, Sampler, frame_states, mean_ne
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 WIDTH = 400  # states of a beam
 FULL = 0.35  # share of the budget that is for full-size costs of states
-REFINED = 0.45  # share that is for refining
+REFINED = 0.2  # share that is for refining
+COMPOSED = 0.25  # share that is for composing poses of parts; without parts it is for refining, too
+TOGETHER = 7  # frames that are composed at once
 AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere
 GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated; in the first frame more
 FIRST_GROUPS = 200
@@ -79,6 +82,7 @@ class ExemplarTracker:
         mirrored: whether the mirror images of all clips are learned from as well.
         refiner: the optimiser that searches around the path, or "none".
         pull: cost of a standard deviation away from the path, beside the silhouette, 0 or more.
+        parts: whether trunk, legs and arms may each come from another pose; none: where several cameras see them.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
         samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
@@ -100,6 +104,7 @@ class ExemplarTracker:
         mirrored: bool = True,
         refiner: str = "cma",
         pull: float = 0.3,
+        parts: bool | None = None,
         smoothing: float = 1.0,
         transitions: str = "clips",
         samples: int = 24,
@@ -126,14 +131,25 @@ class ExemplarTracker:
         self.power = temperature / posterior_temperature  # of the likelihoods in the posterior
         # the number of waiting frames that are only for smoothing
         self.ahead = min(math.ceil(SMOOTHED * self.smoothing), lag)
+        if parts is None:
+            parts = len(task.cameras) > 1
+        self.delay = min(TOGETHER - 1, (lag - self.ahead) // 2) if parts else 0  # frames that wait to be composed
+        self.composer: Composer | None = None
+        if parts:
+            self.composer = Composer.of(self.exemplars, task.body, self.steps, self.temperature, 1.0 / task.fps)
+        self.refined = int((REFINED if parts else REFINED + COMPOSED) * task.evaluations)  # evaluations of a frame
         self.make: Make | None = None  # the optimiser that refines
         if refiner != "none":
             factory = registry().optimiser(refiner)
-            self.make = partial(factory, **settings.planned(factory, {}, int(REFINED * task.evaluations)))
+            self.make = partial(factory, **settings.planned(factory, {}, self.refined))
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        frames = smoothed(self._refined(observations, rng), self.smoothing, self.ahead)
+        estimates = self._refined(observations, rng)
+        if self.composer is not None:
+            own, budget = rng.spawn(1)[0], COMPOSED * self.task.evaluations
+            estimates = composed(estimates, self.composer, budget, self.delay, own)
+        frames = smoothed(estimates, self.smoothing, self.ahead)
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
     def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
@@ -147,7 +163,7 @@ class ExemplarTracker:
             latest, used = self._evaluated(look, latest, rng)
             seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
             waiting.append(_PendingFrame(latest, look, used, seconds, cpu_seconds))
-            if len(waiting) > self.lag - self.ahead:
+            if len(waiting) > self.lag - self.ahead - self.delay:
                 estimate, off = self._estimated(waiting, off, sampler, rng)
                 yield estimate
         while waiting:
@@ -166,7 +182,7 @@ class ExemplarTracker:
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         full = int(FULL * self.task.evaluations)
         last = 3 + look.cameras  # the reported pose, its twins, and what is left of a small picture's share
-        small = int(((1.0 - REFINED) * self.task.evaluations - full - last) / look.share)
+        small = int(((1.0 - REFINED - COMPOSED) * self.task.evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
@@ -258,13 +274,12 @@ class ExemplarTracker:
         path, place, code = mean_near(row, likely, codes, self._poses(beam), beam.places)
         pose = path + off if look.usable else path
         if self.make is not None and look.usable:
-            count = int(REFINED * self.task.evaluations)
             space = surroundings(self.exemplars, path, code, off)
 
             def cost(poses: Array) -> Array:
                 return look.full(poses, look.placed(poses, np.repeat(place[None], len(poses), axis=0)))
 
-            pose, used = refined(space, cost, self.make, self.pull, count, rng)
+            pose, used = refined(space, cost, self.make, self.pull, self.refined, rng)
             evaluations += used
             off = wrapped(pose - path)
         if look.usable:

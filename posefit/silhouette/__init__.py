@@ -4,10 +4,10 @@
 |---|---|
 | a mask, its unknown pixels, both as bits, and at half or quarter size | mask.py |
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
-| candidates of limbs, each drawn once, and what their combinations cost | limbs.py |
+| one limb of a pose, with the rest as it is | limbs.py |
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
 | a body drawn as spans of bits, compiled | rasteriser.py |
-| its pixels counted against silhouettes, and limbs put upon one another, compiled | kernels.py |
+| its pixels counted against silhouettes, and what it leaves of them, compiled | kernels.py |
 | a person separated from a background, pixel by pixel | foreground.py |
 | what goes wrong with a mask on its way from a camera, made on purpose | corruption.py |
 """

@@ -50,7 +50,7 @@ def uncounted() -> Iterator[None]:
         _current.reset(token)
 
 
-def count_poses(poses: int, silhouette: Silhouette | None = None) -> None:
+def count_poses(poses: float, silhouette: Silhouette | None = None) -> None:
     """Add poses that are drawn now to the current count; in a smaller picture by its share of the pixels."""
     count = _current.get()
     if count is not None:

@@ -95,87 +95,24 @@ def add_mismatch(areas, scale, beta, costs):
 
 
 @jit
-def draw_bones(chain, radii, view, poses, translations, images, boxes):
-    """Write the bit images (n, strips, words) and boxes (n, 4) of poses (n, 66), whose bones have radii (n, 26, 2).
+def rest_of(chain, radii, view, pose, place, joint, observed, valid):
+    """Return where a joint of a pose is (3,) and its frame (3, 3), and what the bones with radii leave of bit images.
 
-    A box is as `rasteriser` makes it.
+    These are `observed` and `valid`; last come the pixels B and Y that are taken.
     """
-    work = scratch(view, chain.parents.size, poses.shape[1])
-    for i in range(poses.shape[0]):
-        image, box = draw_pose(chain, radii[i], view, poses[i], translations[i], work)
-        for w in range(box[2], box[3] + 1):
-            images[i, w][box[0] : box[1]] = image[w][box[0] : box[1]]
-            image[w][box[0] : box[1]] = NONE
-        for k in range(4):
-            boxes[i, k] = box[k]
-
-
-@jit
-def put(limb, image, added, observed, valid):
-    """OR a limb's words into an image; return how many pixels are new, of those known and of those observed.
-
-    The new pixels are written to `added`.
-    """
-    body, overlap = NONE, NONE
-    for i in range(limb.size):
-        new = limb[i] & ~image[i]
-        added[i] = new
-        image[i] |= new
-        body += np.uint64(popcount(new & valid[i]))
-        overlap += np.uint64(popcount(new & observed[i]))
-    return body, overlap
-
-
-@jit
-def would_add(limb, image, observed, valid):
-    """Return what `put` would, and put nothing."""
-    body, overlap = NONE, NONE
-    for i in range(limb.size):
-        new = limb[i] & ~image[i]
-        body += np.uint64(popcount(new & valid[i]))
-        overlap += np.uint64(popcount(new & observed[i]))
-    return body, overlap
-
-
-@jit
-def take_away(image, added):
-    """Clear the pixels of an image that `put` has added."""
-    for i in range(image.size):
-        image[i] ^= added[i]
-
-
-@jit
-def count_combinations(images, spans, first, combinations, order, observed, valid, areas):
-    """Write the areas (m, 3) -Y, B, Y of combinations (m, L): image 0 with, of each limb, the candidate of that index.
-
-    `images` (1 + candidates, words) has limb k's candidates from index `first[k]` on, and their pixels lie in `spans`
-    (1 + candidates, 2). In the given order (m,), limbs are put one upon the other, the last one only counted; those
-    that a combination shares with the one before it, from the first on, stay.
-    """
-    limbs = combinations.shape[1]
-    image, added = images[0].copy(), np.empty((limbs, images.shape[1]), np.uint64)
-    body, overlap = np.zeros(limbs + 1, np.uint64), np.zeros(limbs + 1, np.uint64)
-    held = np.full(limbs, -1)
-    body[0], overlap[0] = would_add(image, np.zeros_like(image), observed, valid)
-    standing = 0
-    for i in order:
-        shared = 0
-        while shared < standing and combinations[i, shared] == held[shared]:
-            shared += 1
-        for k in range(standing - 1, shared - 1, -1):
-            a, b = spans[first[k] + held[k]]
-            take_away(image[a:b], added[k, a:b])
-        for k in range(shared, limbs):
-            at = first[k] + combinations[i, k]
-            a, b = spans[at]
-            if k < limbs - 1:
-                held[k] = combinations[i, k]
-                more, shown = put(images[at, a:b], image[a:b], added[k, a:b], observed[a:b], valid[a:b])
-            else:
-                more, shown = would_add(images[at, a:b], image[a:b], observed[a:b], valid[a:b])
-            body[k + 1], overlap[k + 1] = body[k] + more, overlap[k] + shown
-        standing = limbs - 1
-        y = np.int64(overlap[limbs])
-        areas[i, 0] = -y
-        areas[i, 1] = np.int64(body[limbs]) - y
-        areas[i, 2] = y
+    work = scratch(view, chain.parents.size, pose.size)
+    image, _ = draw_pose(chain, radii, view, pose, place, work)
+    frames = work[0][2]
+    body, overlap = 0, 0
+    left = np.empty_like(observed), np.empty_like(valid)
+    for s in range(image.shape[0]):
+        for i in range(image.shape[1]):
+            left[0][s, i], left[1][s, i] = observed[s, i] & ~image[s, i], valid[s, i] & ~image[s, i]
+            body += popcount(valid[s, i] & image[s, i])
+            overlap += popcount(observed[s, i] & image[s, i])
+    origin, frame = np.empty(3), np.empty((3, 3))
+    for i in range(3):
+        origin[i] = frames[joint, 3, i]
+        for k in range(3):
+            frame[i, k] = frames[joint, k, i]
+    return origin, frame, left, (body - overlap, overlap)

@@ -1,0 +1,91 @@
+"""Poses composed of parts: what steps cost, which candidates are chosen, and people as no clip shows them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from posefit.geometry.limbs import LIMBS, turns_of
+from posefit.geometry.skeleton import BONES
+from posefit.motion import built_in
+from posefit_exemplars.exemplars import Exemplars
+from posefit_exemplars.parts import HIGHEST, OUTER, PARTS, part_steps, parts_of
+from posefit_exemplars.tracker import ExemplarTracker
+from tests.exemplars.conftest import Walk, walk_of
+
+YAW = 0.4  # metres that a radian counts
+
+
+def test_every_bone_and_every_angle_is_in_one_part(two: Exemplars) -> None:
+    assert sorted(bone for bones in PARTS.values() for bone in bones) == sorted(BONES)
+    assert sorted(np.concatenate([part.turns for part in parts_of(two, YAW)])) == list(range(66))
+
+
+def test_a_part_is_as_far_from_another_as_its_joints_are(two: Exemplars) -> None:
+    trunk, *limbs = parts_of(two, YAW)
+    for name, part in zip(OUTER, limbs, strict=True):
+        poses = np.zeros((2, 66))
+        poses[:, part.turns] = part.angles[[0, 20]]
+        joints = two.coding.skeleton.joints(poses)
+        codes = part.coded(part.angles[[0, 20]])
+        # the other joints are at rest in both
+        expected = np.sqrt(((joints[0] - joints[1]) ** 2).sum(axis=1).mean())
+        np.testing.assert_allclose(np.linalg.norm(codes[0] - codes[1]), expected, rtol=1e-4, err_msg=name)
+    turned = np.repeat(trunk.angles[:1], 2, axis=0)
+    turned[1, 0] += 0.5
+    np.testing.assert_allclose(np.linalg.norm(np.diff(trunk.coded(turned), axis=0)), 0.5 * YAW, rtol=1e-5)
+
+
+def test_rates_are_those_of_the_clip_and_groups_hold_every_state_once(two: Exemplars) -> None:
+    for part in parts_of(two, YAW):
+        rows = np.arange(1, two.lasts[0])  # of the first clip, inside
+        apart = part.codes[rows + 1] - part.codes[rows - 1]
+        if part.yaw:  # states face the same way; their rates do not
+            apart, rates = apart[:, :-1], part.rates[rows, :-1]
+        else:
+            rates = part.rates[rows]
+        np.testing.assert_allclose(rates, apart / (two.times[rows + 1] - two.times[rows - 1])[:, None], atol=1e-3)
+        assert sorted(np.concatenate(part.members)) == list(range(len(part.angles)))
+        assert all(centre in members for centre, members in zip(part.centres, part.members, strict=True))
+
+
+def test_what_steps_cost_by_hand() -> None:
+    def cost(code: float, rate: float, later: float, later_rate: float) -> float:
+        numbers = [np.array([[value]], dtype=np.float32) for value in (code, rate, later, later_rate)]
+        return float(part_steps(0.03, *numbers)[0, 0])
+
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-6)  # it goes on as it does
+    np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-6)
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.0, 0.06), 0.3, atol=1e-6)  # it stops for a frame, at speed 0
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.03, 0.06), 0.1, atol=1e-6)  # half as fast
+    # off by a spread at speed 1, a half; at the speed 1.4 it is off by 0.09 - 0.084, which is 0.02, and 0.15
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.17, atol=1e-6)
+    # at rest, then at a spread's rate: 0.015 off and the rates a spread apart, an eighth and a half; at speed 0.5,
+    # 0.0075 off and half the rates, 1/32 and 1/8, and 0.1
+    np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-6)
+    assert cost(0.0, 0.0, 1.0, 0.0) == HIGHEST
+
+
+def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
+    # nobody in the training clips walks with such arms
+    walk, other = built_in.motion("walk-a", frames=12), built_in.motion("jump", frames=40)
+    arms = np.concatenate([turns_of(LIMBS["left arm"]), turns_of(LIMBS["right arm"])])
+    poses = walk.poses.copy()
+    poses[:, arms] = other.poses[14:26, arms]
+    scene = walk_of(replace(walk, name="both", poses=poses), (0.0, 70.0))
+    training = [*scene.task.training, replace(other, skeleton=walk.skeleton)]
+    scene = replace(scene, task=replace(scene.task, training=training, evaluations=2440))
+    errors = {
+        parts: np.mean([scene.errors_mm(scene.track(parts=parts, seed=seed)).mean() for seed in range(3)])
+        for parts in (False, True)
+    }
+    assert errors[True] < 0.7 * errors[False]
+
+
+def test_a_composed_pose_is_reported_at_most_lag_frames_later_within_the_budget(walker: Walk) -> None:
+    for lag in (0, 4, 15):
+        taken = iter(range(len(walker.observations)))
+        stream = (walker.observations[k] for k in taken)
+        tracker = ExemplarTracker(replace(walker.task, evaluations=1000), lag=lag, parts=True)
+        for k, frame in enumerate(tracker.track(stream, np.random.default_rng(0))):
+            assert len(walker.observations) - taken.__length_hint__() - 1 - k <= lag
+            assert 500 < frame.evaluations <= 1000
