@@ -79,6 +79,8 @@ def design(method: str, quick: bool) -> Iterator[Task]:
         for clip, view in product(clips[: 2 if quick else None], views[1:2] if quick else views):
             line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
             yield Task("groups", line, clip, view)
+            if len(view) > 1:
+                yield Task("groups", f"{line}, no parts", clip, view, {"settings": {"exemplars.parts": False}})
             if group == WALKS and len(view) == 1 and not quick:
                 yield from (Task("groups", line, clip, view, {"seed": seed}) for seed in SEEDS)
     changed = [*product(GROUPS[WALKS][: 1 if quick else CHANGED_WALKS], SIDES[1:2] if quick else SIDES[:3])]
