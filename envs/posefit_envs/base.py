@@ -28,6 +28,7 @@ Number = TypeVar("Number", float, Array)
 
 LOG_HIGHEST_COST = np.log1p(100.0)
 NOT_BEGUN = "reset must come before anything else"
+_ONE, _NONE, _FIRST = np.ones(1, dtype=bool), np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int64)
 ENDED = "the episode has ended: reset before the next step"
 
 
@@ -39,7 +40,7 @@ class Outcome(NamedTuple):
     terminated: Flags
     infos: Infos  # (n, ...) by name
     reset_infos: Infos  # those that a reset gives too
-    truncated: Flags = np.zeros(1, dtype=bool)  # (n,) or (1,), by a budget of the environment's own
+    truncated: Flags = _NONE  # (n,) or (1,), by a budget of the environment's own
     row_infos: Mapping[int, Infos] = {}  # further ones of some rows
 
 
@@ -155,9 +156,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
         """Step each environment; one whose episode has ended resets instead."""
-        return self._stepped(self._validator.check(actions, self._shape))
-
-    def _stepped(self, actions: Array) -> tuple[Any, Array, Flags, Flags, Infos]:
+        actions = self._validator.check(actions, self._shape)
         assert self.episodes
         stepping = ~self._ended
         for i in np.flatnonzero(self._ended).tolist():
@@ -245,19 +244,27 @@ class SearchEnv(RenderedEnv):
         """Begin with an instance; `options={"instance": 17}` chooses it."""
         super().reset(seed=seed)
         self._vector._generators[0] = self.np_random
-        observations, infos = self._vector.reset(options=options)
+        chosen = options.get("instance") if options else None
+        self._vector._begin(0, None if chosen is None else instance_number(chosen))
+        observations, infos = self._vector._opened(_ONE)
         self._update_window()
         return row_of(observations, 0), _single_infos(infos)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
         """Make one step. Raises gymnasium.error.ResetNeeded where the episode has ended."""
         vector = self._vector
-        if vector.episodes and vector._ended[0]:
+        if not vector._episodes:
+            raise error.ResetNeeded(NOT_BEGUN)
+        if vector._ended[0]:
             raise error.ResetNeeded(ENDED)
-        actions = vector._validator.check(action, self._shape)[None]
-        observations, rewards, terminated, truncated, infos = vector._stepped(actions)
+        action = vector._validator.check(action, self._shape)
+        vector._steps += 1
+        outcome = vector._advance(action[None], _ONE, _FIRST)
+        terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
+        vector._ended[0] = terminated or truncated
         self._update_window()
-        return row_of(observations, 0), float(rewards[0]), bool(terminated[0]), bool(truncated[0]), _single_infos(infos)
+        infos = _single_infos(outcome.infos) | outcome.row_infos.get(0, {})
+        return row_of(outcome.observations, 0), float(outcome.rewards[0]), terminated, truncated, infos
 
     def _render_frame(self) -> Picture:
         return self._vector._render_row(0, self._vector.episodes[0])
@@ -278,11 +285,7 @@ def image_spaces(world: World) -> tuple[Box, Box]:
 
 
 def _single_infos(infos: Infos) -> Infos:
-    return {
-        name: values[0].item() if values.ndim == 1 else values[0]
-        for name, values in infos.items()
-        if not name.startswith("_")
-    }
+    return {name: values[0].item() if values.ndim == 1 else values[0] for name, values in infos.items()}
 
 
 def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
