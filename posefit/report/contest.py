@@ -231,6 +231,4 @@ def mean(values: Array) -> float | None:
 
 def _means(values: Array) -> Array:
     """Return the mean over methods (instances, seeds), of those that have a value."""
-    known = np.isfinite(values)
-    total, count = np.where(known, values, 0.0).sum(axis=0), known.sum(axis=0)
-    return np.asarray(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
+    return np.asarray(np.ma.masked_invalid(values).mean(axis=0).filled(np.nan))

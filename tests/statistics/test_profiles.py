@@ -25,14 +25,6 @@ def test_attained_is_the_share_of_runs_and_targets():
     assert attained(evaluations, [1, 10, 150, 1e9]).tolist() == [1 / 6, 3 / 6, 4 / 6, 5 / 6]
 
 
-def test_attained_is_the_empirical_distribution_of_a_slow_twin():
-    rng = np.random.default_rng(0)
-    evaluations = np.where(rng.random((20, 30)) < 0.2, np.inf, rng.integers(1, 50, (20, 30)))
-    grid = np.arange(1.0, 60.0)
-    twin = [np.mean([[hit <= budget for hit in row] for row in evaluations]) for budget in grid]
-    assert np.allclose(attained(evaluations, grid), twin)
-
-
 def test_expected_running_time_counts_what_failed_runs_used():
     evaluations = [[10.0, 40.0, np.inf], [20.0, np.inf, np.inf]]
     # 30 / 2; (40 + 60) / 1; never

@@ -125,11 +125,6 @@ def test_blocks_without_a_difference_count_against_one():
     assert pair.p_value != without.p_value
 
 
-def test_holm_by_hand():
-    # sorted 0.005, 0.01, 0.03, 0.04 times 4, 3, 2, 1 = 0.02, 0.03, 0.06, 0.04, which may not fall: 0.06
-    assert holm([0.01, 0.04, 0.03, 0.005]).tolist() == pytest.approx([0.03, 0.06, 0.06, 0.02])
-
-
 def test_holm_is_that_of_statsmodels():
     p_values = np.random.default_rng(0).beta(0.3, 2.0, 40)
     assert np.allclose(holm(p_values), multipletests(p_values, method="holm")[1])

@@ -16,7 +16,6 @@ from tests.sweep.chaos import Chaos
 from tests.sweep.fake import LIMITS, STARTS, starts
 
 ROOT = Path(__file__).parents[2]
-CELLS, WORKER_KILLS, DRIVER_KILLS = 300, 5, 2
 ENGINES = ["processes", pytest.param("dask", marks=pytest.mark.slow)]
 
 
