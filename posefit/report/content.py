@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
+from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
+from posefit.motion.built_in import average_skeleton
 from posefit.reading import counted
 from posefit.registry import claimed_orders
 from posefit.report import curves
@@ -106,6 +107,7 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
         "methods": [{"name": name, **fields} for name, fields in zip(runs.methods, runs.variants, strict=True)],
         "joints": [place.replace("_", " ") for place in PLACES],
         "parents": PARENTS,
+        "rest": np.round(average_skeleton().joints(np.zeros(ANGLES))[:, :2], 3).tolist(),  # (27, 2) from in front
         "sides": SIDES,
         "colours": COLOURS,
         "warnings": warnings,

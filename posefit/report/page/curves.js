@@ -112,11 +112,27 @@ function spread(wanted, gap, low, high) {
   return places;
 }
 
+// The body of a method from in front, at rest, each joint as large as its error; the person's left is on the right.
+function errorBody(m, values, most) {
+  const [left, top] = [0, 1].map((k) => Math.max(...D.rest.map((point) => point[k])));
+  const at = ([x, y]) => [90 * (left + x) + 8, 90 * (top - y) + 10];
+  const height = 90 * (top - Math.min(...D.rest.map(([, y]) => y))) + 20;
+  const bones = BONES.map(([parent, joint]) => drawLine(...at(D.rest[parent]), ...at(D.rest[joint]), { class: "axis" }));
+  const marks = D.rest.map((point, j) =>
+    mark(m, ...at(point), 1 + (7 * values[j]) / most, `${METHODS[m]}, ${D.joints[j]}: ${number(values[j], 1)} mm`),
+  );
+  const svg = drawing(180 * left + 16, height, `errors of ${METHODS[m]} on a body`);
+  svg.append(...bones, ...marks);
+  return make("figure", {}, svg, make("figcaption", {}, METHODS[m]));
+}
+
 function joints() {
   drawn($("joint-errors"), (width) => {
     const shown = visible();
     const row = 20;
     const to = 1.05 * Math.max(1, ...shown.flatMap(([, place]) => [...D.joint_errors[place].values]));
+    const bodies = shown.map(([m, place]) => errorBody(m, D.joint_errors[place].values, to));
+    $("joint-bodies").replaceChildren(...bodies);
     const box = { width, height: row * D.joints.length + 44, left: 112, right: 14, top: 4, bottom: 40 };
     const x = { to, marks: steps(0, to, Math.max(3, width / 110)), show: whole, label: "mm", rules: true };
     const { svg, at } = axes({ ...box, name: "error of each joint" }, x);
