@@ -13,6 +13,7 @@ from posefit.sweep.driver import Driver
 from posefit.sweep.ledger import ROWS, Ledger
 from posefit.sweep.log import Writer
 from tests.effort import Effort, effort
+from tests.report.browser import row_of
 from tests.sweep.fake import cells, leased
 
 ROOT = Path(__file__).parents[2]
@@ -35,21 +36,7 @@ print(json.dumps([len(table), traces, opened, taken, 1024 * int(status["VmHWM"].
 def real(cell: TrackCell) -> CellResult:
     """Return a result as large as that of a real cell."""
     trace = {"evaluations": list(range(40, 2480, 40)), "cost": [float(f"{20.0 / k:.6g}") for k in range(1, 62)]}
-    figures = dict.fromkeys(("mpjpe_mm", "pa_mpjpe_mm", "iou", "cost", "swap_rate", "lost_rate"), cell.seed / 7.0)
-    kinds = {
-        name: dict.fromkeys(("mean_pose", "persistence", "nearest"), 1.0 / 3.0)
-        for name in ("skill", "baselines_degrees")
-    }
-    row = {
-        "key": cell.key,
-        "spec": cell.spec,
-        "status": "done",
-        **figures,
-        **kinds,
-        "warnings": [],
-        "mode_reliability": [],
-    }
-    return CellResult({**row, "joint_errors_mm": [cell.seed / 3.0] * 27, "trace": trace, "seconds": 1.0}, b"\0" * 1000)
+    return CellResult(row_of(cell, cell.seed / 7.0, trace=trace), b"\0" * 1000)
 
 
 def filled(folder: Path, count: int) -> Path:
