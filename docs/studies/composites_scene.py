@@ -425,7 +425,7 @@ DISTANCE, HEIGHT = 8.0, 0.95  # metres of a camera from the middle, and above th
 ACROSS = np.radians(36.0)  # that a camera sees
 PLACES: Mapping[int, Sequence[float]] = {1: (0.0,), 2: (-30.0, 30.0), 4: (-30.0, 30.0, 150.0, 210.0)}  # degrees
 REACH = {1: 3.4, 2: 5.2, 4: 5.2}  # metres to either side, where nobody is seen any more
-EMPTY, AWAY = 10, 20  # frames without anybody: before and after, and until somebody comes back
+BARE, AWAY = 10, 20  # frames without anybody: before and after, and until somebody comes back
 FARTHER = 1.5  # that whoever passes aside goes to either side, for each metre aside
 NEARER = 0.7  # metres from the middle, of each of two who pass
 MIRRORED = [joint - 1 for joint in MIRROR[1:]]  # of each bone, the one on the other side
@@ -513,14 +513,14 @@ def _dressed(motion: Motion, seed: int) -> tuple[Motion, Body]:
 def _walker(name: str, views: int, seed: int, *, back: bool = False, aside: float = 0.0) -> Actor:
     motion, body = _dressed(frames_of(name), seed)
     walk = through(motion, body, REACH[views] + FARTHER * abs(aside), back=back, aside=aside)
-    whole, present = one_after_other([EMPTY, walk, EMPTY])
+    whole, present = one_after_other([BARE, walk, BARE])
     return Actor(body, whole, present, seed)
 
 
 def _returning(name: str, views: int, seed: int, *, back: bool) -> Actor:
     motion, body = _dressed(frames_of(name), seed)
     first, second = (through(motion, body, REACH[views], back=way) for way in (False, back))
-    whole, present = one_after_other([EMPTY, first, AWAY, second, EMPTY])
+    whole, present = one_after_other([BARE, first, AWAY, second, BARE])
     return Actor(body, whole, present, seed)
 
 

@@ -148,7 +148,8 @@ class Case(NamedTuple):
     @property
     def spec(self) -> dict[str, Any]:
         """The fields of the cell, without the noise of masks."""
-        return cell_fields(self.clip, self.views, FRAMES, **CONDITIONS[self.condition])
+        settings = {"exemplars.parts": False}
+        return cell_fields(self.clip, self.views, FRAMES, settings=settings, **CONDITIONS[self.condition])
 
 
 def cases(quick: bool) -> list[Case]:

@@ -72,7 +72,7 @@ class Case(NamedTuple):
     @property
     def spec(self) -> dict[str, Any]:
         """The fields of the cell."""
-        own = {"exemplars.posterior_temperature": self.temperature}
+        own = {"exemplars.posterior_temperature": self.temperature, "exemplars.parts": False}
         settings = own if self.method == METHOD else dict(OTHERS[self.method])
         fields = {"method": self.method, "translation": self.translation, "settings": settings}
         return cell_fields(self.clip, self.views, self.frames, **fields)
