@@ -78,7 +78,7 @@ class ExemplarTracker:
         straying: distance of an aligned root from where its clip goes on, to the side or up, metres; above 0.
         depth: the same towards or away from a single camera, metres; above 0.
         pace: distance of a known root from where its clip goes on, metres; above 0.
-        lag: later frames that are used before a pose is reported, 0 or more.
+        lag: later frames that are used before a pose is reported, 0 or more; parts use 6 more.
         mirrored: whether the mirror images of all clips are learned from as well.
         refiner: the optimiser that searches around the path, or "none".
         pull: cost of a standard deviation away from the path, beside the silhouette, 0 or more.
@@ -126,14 +126,15 @@ class ExemplarTracker:
         self.transitions: Transitions = partial(transition_costs, steps=self.steps)
         if transitions != "clips":
             self.transitions = partial(_checked, _named(transitions))
-        self.temperature, self.lag, self.pull, self.samples = temperature / intervals, lag, pull, samples
+        self.temperature, self.pull, self.samples = temperature / intervals, pull, samples
         self.smoothing = smoothing * task.fps / 30.0  # frames
         self.power = temperature / posterior_temperature  # of the likelihoods in the posterior
         # the number of waiting frames that are only for smoothing
         self.ahead = min(math.ceil(SMOOTHED * self.smoothing), lag)
         if parts is None:
             parts = len(task.cameras) > 1
-        self.delay = min(TOGETHER - 1, (lag - self.ahead) // 2) if parts else 0  # frames that wait to be composed
+        self.delay = TOGETHER - 1 if parts and lag else 0  # frames that wait to be composed
+        self.lag = lag + self.delay
         self.composer: Composer | None = None
         if parts:
             self.composer = Composer.of(self.exemplars, task.body, self.steps, self.temperature, 1.0 / task.fps)
