@@ -117,7 +117,9 @@ function errorBody(m, values, most) {
   const [left, top] = [0, 1].map((k) => Math.max(...D.rest.map((point) => point[k])));
   const at = ([x, y]) => [90 * (left + x) + 8, 90 * (top - y) + 10];
   const height = 90 * (top - Math.min(...D.rest.map(([, y]) => y))) + 20;
-  const bones = BONES.map(([parent, joint]) => drawLine(...at(D.rest[parent]), ...at(D.rest[joint]), { class: "axis" }));
+  const bones = BONES.map(([parent, joint]) =>
+    drawLine(...at(D.rest[parent]), ...at(D.rest[joint]), { class: "axis" }),
+  );
   const marks = D.rest.map((point, j) =>
     mark(m, ...at(point), 1 + (7 * values[j]) / most, `${METHODS[m]}, ${D.joints[j]}: ${number(values[j], 1)} mm`),
   );
