@@ -1,5 +1,6 @@
 """The data of a track's page: bodies, figures, intervals, and words."""
 
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -94,11 +95,13 @@ def track_data(
 
 
 def _made(summary: dict[str, Any]) -> str:
-    """Return the method and how far it is off, in a sentence."""
+    """Return the method, the date of the page and how far the track is off, in a sentence."""
+    made = f"Tracked by {summary['method']}, written on {time.strftime('%d %B %Y')}"
     if summary["mpjpe_mm"] is None:
-        return f"Tracked by {summary['method']}."
-    lost = "" if summary["lost_rate"] is None else f", {100.0 * summary['lost_rate']:.0f} % of the frames lost"
-    return f"Tracked by {summary['method']}, {summary['mpjpe_mm']:.0f} mm off the truth{lost}."
+        return f"{made}."
+    rate = summary["lost_rate"]
+    lost = "" if rate is None else f", {100.0 * rate:.0f}\N{NO-BREAK SPACE}% of the frames lost"
+    return f"{made}: {summary['mpjpe_mm']:.0f} mm off the truth{lost}."
 
 
 def _verdict(summary: dict[str, Any]) -> str:
