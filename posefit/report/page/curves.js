@@ -123,8 +123,10 @@ function errorBody(m, values, most) {
   const marks = D.rest.map((point, j) =>
     mark(m, ...at(point), 1 + (7 * values[j]) / most, `${METHODS[m]}, ${D.joints[j]}: ${number(values[j], 1)} mm`),
   );
-  const svg = drawing(180 * left + 16, height, `errors of ${METHODS[m]} on a body`);
-  svg.append(...bones, ...marks);
+  const width = 180 * left + 16;
+  const sides = [drawText(0, height - 8, "right", { class: "soft" }), drawText(width, height - 8, "left", END)];
+  const svg = drawing(width, height, `errors of ${METHODS[m]} on a body`);
+  svg.append(...bones, ...marks, ...sides);
   return make("figure", {}, svg, make("figcaption", {}, METHODS[m]));
 }
 

@@ -60,10 +60,8 @@ function standing(width) {
   bases.forEach((row, k) => {
     const [text, y] = [`${row.name} ${scored(row[of])}`, 16 * (bases.length - 1 - k)];
     const place = Math.min(at(row[of]) + 5, width - textWidth(text) - 4);
-    svg.append(
-      drawLine(at(row[of]), y + 2, at(row[of]), bottom, { class: "baseline" }),
-      drawText(place, y + 12, text, { class: "soft over" }),
-    );
+    svg.prepend(drawLine(at(row[of]), y + 2, at(row[of]), bottom, { class: "baseline" }));
+    svg.append(drawText(place, y + 12, text, { class: "soft over" }));
   });
   rows.forEach((row, k) => {
     const y = top + step * (k + 0.5) + (narrow ? 8 : 0);
