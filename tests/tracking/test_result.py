@@ -1,5 +1,6 @@
 """What people do with masks in Python: arrays in, joints, angles, tables, pictures and files out."""
 
+import time
 import webbrowser
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,7 @@ def test_a_mask_is_fitted() -> None:
 def test_files_and_the_page_come_afterwards_too(
     track: posefit.Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(time, "strftime", lambda _: "1 July 2026")  # no midnight between the two
     track.save(tmp_path / "out")
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", opened.append)
