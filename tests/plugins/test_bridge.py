@@ -32,9 +32,9 @@ def fails(space: Toy, rng: np.random.Generator, objective: Any) -> None:
     raise OSError("out of paper")
 
 
-def bridges() -> int:
+def bridges() -> set[threading.Thread]:
     gc.collect()
-    return sum(thread.name == "posefit_scipy bridge" for thread in threading.enumerate())
+    return {thread for thread in threading.enumerate() if thread.name == "posefit_scipy bridge"}
 
 
 def test_a_library_is_asked_and_told_until_it_ends() -> None:
@@ -68,14 +68,14 @@ def test_no_thread_outlives_its_search_or_an_error_in_it() -> None:
             proposals = optimiser.ask()
             optimiser.tell(proposals, sphere(proposals))
     del optimiser
-    assert bridges() == before
+    assert bridges() <= before
 
     def breaks(proposals: Array) -> Array:
         raise RuntimeError("the cost failed")
 
     with pytest.raises(RuntimeError, match="the cost failed"):
         minimise(breaks, Bridged(Toy(3), np.random.default_rng(0), climbs), 100)
-    assert bridges() == before
+    assert bridges() <= before
 
 
 def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
