@@ -16,7 +16,7 @@ from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, si
 
 MODES = ("rgb_array", "human")
 HEIGHT = 240  # pixels
-STRIP = 24  # pixels for the words below
+STRIP = 30  # pixels for the words below
 
 Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
 
@@ -45,7 +45,7 @@ def render_frame(problem: PoseProblem, pose: Array | None, translation: Array | 
         panels.append(np.full((HEIGHT, HEIGHT, 3), BACKGROUND, dtype=np.uint8))
     image = np.hstack(panels)
     words = np.full((STRIP, image.shape[1], 3), BACKGROUND, dtype=np.uint8)
-    cv2.putText(words, label, (8, 17), cv2.FONT_HERSHEY_SIMPLEX, 0.45, TEXT, 1, cv2.LINE_AA)
+    cv2.putText(words, label, (8, 21), cv2.FONT_HERSHEY_SIMPLEX, 0.6, TEXT, 1, cv2.LINE_AA)
     return np.ascontiguousarray(np.vstack([image, words])[..., ::-1])
 
 

@@ -45,13 +45,21 @@ def probability_figure(film: Film, states: Sequence[State]) -> Figure:
     for k, one in enumerate(states):
         for model, probability in zip(one["models"], one["probabilities"], strict=True):
             values[names.index(model), k] = probability
-    figure = Figure(figsize=(10.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4.0, 1.0))
     seconds = np.arange(len(states)) / FPS
     for name, series in zip(names, values, strict=True):
         upper.plot(seconds, series, linewidth=1.2, label=name)
     upper.set(ylabel="probability", ylim=(0.0, 1.14))
-    upper.legend(fontsize=7, frameon=False, ncols=len(names), loc="upper center", bbox_to_anchor=(0.5, 1.14))
+    upper.legend(
+        fontsize=8.5,
+        frameon=False,
+        ncols=len(names),
+        columnspacing=1.2,
+        handlelength=1.4,
+        loc="upper center",
+        bbox_to_anchor=(0.5, 1.18),
+    )
     groups = list(states[0]["groups"])
     for row, group in enumerate(groups):
         force = [k for k, one in enumerate(states) if group in (one["group"], one["newcomer"]) or one["group"] is None]
@@ -71,13 +79,13 @@ def error_figure(film: Film, frames: Sequence[Frame], states: Sequence[State]) -
         "to the truth, cm": projected_cm(film, truth, estimate),
         "in space, cm": 100.0 * np.linalg.norm(truth - estimate, axis=-1),
     }
-    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
+    figure = Figure(figsize=(7.0, 6.0), layout="constrained")
     seconds = np.arange(len(frames)) / FPS
     for axes, (label, values) in zip(figure.subplots(3, 1, sharex=True), errors.items(), strict=True):
         for name, series in zip(("right elbow", "right hand"), values.T, strict=True):
             axes.plot(seconds, series, linewidth=1.0, label=f"{name}, mean {np.nanmean(series):.1f}")
         axes.set(ylabel=label, ylim=(0.0, None))
-        axes.legend(fontsize=7, frameon=False)
+        axes.legend(fontsize=8.5, frameon=False)
         _activities(axes, film, label=False)
         if label != "in space, cm":
             axes.axhspan(*PATENT_CM, color="0.5", alpha=0.2)
@@ -90,7 +98,7 @@ def _activities(axes: Any, film: Film, label: bool) -> None:
     for k, one in zip(switches, ACTIVITIES, strict=True):
         axes.axvline(k / FPS, color="0.7", linewidth=0.8, linestyle=":")
         if label:
-            axes.text(k / FPS + 0.1, 1.06, one.label, fontsize=7, color="0.35")
+            axes.text(k / FPS + 0.1, 1.06, one.label, fontsize=8.5, color="0.35")
     axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -117,7 +125,7 @@ def _still(film: Film, frame: Frame, state: State, k: int) -> Image:
             cv2.line(drawn, _pixel(pixels[parent]), _pixel(pixels[joint]), (90, 255, 90), 1, cv2.LINE_AA)
     side = side_view(film.body, film.camera, frame.pose, frame.translation, drawn.shape[0])
     middle = slice(drawn.shape[1] // 5, -drawn.shape[1] // 5)
-    cv2.putText(marked, f"{k}", (marked.shape[1] // 5 + 8, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (240, 240, 240), 1)
+    cv2.putText(marked, f"{k}", (middle.start + 8, 44), cv2.FONT_HERSHEY_SIMPLEX, 1.3, (240, 240, 240), 2, cv2.LINE_AA)
     parts = (marked[:, middle], drawn[:, middle], side)
     height = drawn.shape[0] // 2
     small = [cv2.resize(p, (round(p.shape[1] / 2), height), interpolation=cv2.INTER_AREA) for p in parts]
