@@ -51,7 +51,8 @@ def probability_figure(film: Film, states: Sequence[State]) -> Figure:
     for name, series in zip(names, values, strict=True):
         upper.plot(seconds, series, linewidth=1.2, label=name)
     upper.set(ylabel="probability", ylim=(0.0, 1.14))
-    upper.legend(
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, 1.18)}
+    upper.legend(fontsize=8.5, frameon=False, ncols=len(names), columnspacing=1.2, handlelength=1.4, **place)
         fontsize=8.5,
         frameon=False,
         ncols=len(names),
