@@ -53,14 +53,6 @@ def probability_figure(film: Film, states: Sequence[State]) -> Figure:
     upper.set(ylabel="probability", ylim=(0.0, 1.14))
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, 1.18)}
     upper.legend(fontsize=8.5, frameon=False, ncols=len(names), columnspacing=1.2, handlelength=1.4, **place)
-        fontsize=8.5,
-        frameon=False,
-        ncols=len(names),
-        columnspacing=1.2,
-        handlelength=1.4,
-        loc="upper center",
-        bbox_to_anchor=(0.5, 1.18),
-    )
     groups = list(states[0]["groups"])
     for row, group in enumerate(groups):
         force = [k for k, one in enumerate(states) if group in (one["group"], one["newcomer"]) or one["group"] is None]
