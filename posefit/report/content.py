@@ -21,6 +21,7 @@ from posefit.report.contest import (
     Contest,
     baseline_rows,
     contest_of,
+    function_shares,
     leaderboard,
     paired_tests,
     resamples,
@@ -191,7 +192,8 @@ def _search_curves(contest: Contest) -> dict[str, Any]:
     most = min(1.0, 1.1 * max(0.05, *(float(shares[-1]) for _, values in charts for shares in values)))
     under = "evaluations for each dimension"
     return {
-        "sections": ["leaderboard", "curves", "times"],
+        "sections": ["leaderboard", "curves", *(["by-function"] if len(charts) > 1 else []), "times"],
+        "by_function": function_shares(contest),
         "evaluations": evaluations,
         "charts": [_shares_chart(f"chart-{k}", title, under, shares, most) for k, (title, shares) in enumerate(charts)],
         "above": SHOWN,

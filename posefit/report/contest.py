@@ -16,6 +16,7 @@ from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, TRIMMED, iqm_
 from posefit.statistics.means import mean_interval
 from posefit.statistics.pairing import Shared, most_shared
 from posefit.statistics.ranks import LEVEL, compact_letters, friedman, wilcoxon
+from posefit.suites.functions import suite_function
 from posefit.tracking.measures import BASELINES
 
 BOOTSTRAP_SEED = 2013
@@ -136,14 +137,30 @@ def _error_intervals(contest: Contest) -> dict[int, dict[str, float]]:
     return {m: {"low": low, "high": high} for m, low, high in ends}
 
 
-def _search_intervals(contest: Contest) -> dict[int, dict[str, float]]:
-    """Return each method's mean share of targets, with the interval that other instances would give."""
-    strata, clusters = ([place[name] for place in contest.places()] for name in ("function", "instance"))
+def _search_intervals(contest: Contest, function: int | None = None) -> dict[int, dict[str, float]]:
+    """Return each method's mean share of targets, of all or of one function, with the interval of other instances."""
+    places = contest.places()
+    own = [k for k, place in enumerate(places) if function in (None, place["function"])]
+    strata, clusters = ([places[k][name] for k in own] for name in ("function", "instance"))
     ends = {}
-    for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2), strict=True):
+    for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2)[:, own], strict=True):
         share = mean_interval(shares, strata, clusters)
         ends[m] = {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
     return ends
+
+
+def function_shares(contest: Contest) -> list[dict[str, Any]]:
+    """Return the functions of a suite's searches, each with a row for each method, the best first."""
+    return [
+        {
+            "name": f"{function} {suite_function(function).name}",
+            "rows": sorted(
+                ({"method": m, **share} for m, share in _search_intervals(contest, function).items()),
+                key=lambda row: -row["reached"],
+            ),
+        }
+        for function in sorted({place["function"] for place in contest.places()})
+    ]
 
 
 def _rank(row: dict[str, Any]) -> tuple[Any, ...]:

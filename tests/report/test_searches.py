@@ -90,6 +90,8 @@ def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> Non
     assert together[0] == 0.0  # the first target falls at the tenth evaluation, 1.1 for each dimension
     assert together[-1] == pytest.approx(39.0 / (4.0 * 29.0))
     assert first[-1] == pytest.approx(20.0 / (2.0 * 29.0))
+    shares = [(part["name"], part["rows"][0]["reached"]) for part in data["by_function"]]
+    assert shares == [("1 single image", pytest.approx(2000 / 58)), ("5 mismatched body", pytest.approx(1900 / 58))]
     half = int(np.searchsorted(data["evaluations"], 5.0))
     assert together[half] == pytest.approx(min(int(data["evaluations"][half] * 9.0 / 10.0), 9) / 29.0)
     # +16 is the fifth target, at the 50th evaluation; +4 the 13th, which no run reaches

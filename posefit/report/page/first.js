@@ -29,12 +29,19 @@ function chips() {
 }
 
 function standing(width) {
-  const { name: of, digits, unit, better } = D.score;
+  const { name: of } = D.score;
   const rows = D.leaderboard.filter((row) => row.taking_part && given(row[of])).slice(0, MAX_METHODS);
   const bases = D.baselines
     .filter((row) => given(row[of]))
     .map((row) => ({ ...row, name: D.baseline_names[row.baseline] }))
     .sort((a, b) => a[of] - b[of]);
+  const best = (row, k) => k === 0 || D.not_worse.includes(row.method);
+  return forest(width, rows, bases, best);
+}
+
+// A row a method with its interval, and a line a baseline; `end` is the scale's where it is not of these rows.
+function forest(width, rows, bases, isBest, end) {
+  const { name: of, digits, unit, better } = D.score;
   const narrow = width < 480;
   const step = narrow ? 38 : 26;
   const left = narrow ? 14 : 24 + Math.max(...rows.map((row) => textWidth(shortened(row.name, 27), 700)));
@@ -44,7 +51,7 @@ function standing(width) {
   const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((one) => one > 0));
   const [least, most] = [Math.min(...values), Math.max(...values)];
   const log = better === "less" && most > 15 * least;
-  const [from, to] = log ? [0.8 * least, 1.15 * most] : [0, 1.05 * most || 1];
+  const [from, to] = log ? [0.8 * least, 1.15 * most] : [0, end ?? (1.05 * most || 1)];
   const marks = log ? logSteps(from, to) : steps(0, to, Math.max(3, (width - left - right) / 90));
   const x = { from, to, log, marks, rules: true, show: (value) => `${rounded(value)}${unit}` };
   x.label = `${D.score.axis}${log ? ", on a logarithmic scale" : ""}; ${better} is better`;
@@ -65,7 +72,7 @@ function standing(width) {
   });
   rows.forEach((row, k) => {
     const y = top + step * (k + 0.5) + (narrow ? 8 : 0);
-    const best = k === 0 || D.not_worse.includes(row.method) ? "best" : "";
+    const best = isBest(row, k) ? "best" : "";
     const short = shortened(row.name, narrow ? 34 : 27);
     if (narrow)
       svg.append(drawText(left, y - 11, `${short}  ${scored(row[of])}${lost(row)}`, { class: `over ${best}` }));
@@ -80,6 +87,17 @@ function standing(width) {
     svg.append(mark(row.method, at(row[of]), y, 5.5, titles[k]));
   });
   return svg;
+}
+
+// The shares of a suite's targets on each of its functions.
+function functionShares() {
+  const most = Math.max(...D.by_function.flatMap(({ rows }) => rows.map((row) => row.high ?? row.reached)));
+  for (const { name, rows } of D.by_function) {
+    const box = make("div", { class: "chart" });
+    $("functions").append(make("figure", {}, make("figcaption", {}, name), box));
+    const named = rows.slice(0, MAX_METHODS).map((row) => ({ ...row, name: METHODS[row.method] }));
+    drawn(box, (width) => forest(width, named, [], (_, k) => k === 0, 1.05 * most));
+  }
 }
 
 // Three tracks of the leader, which move.

@@ -7,6 +7,7 @@ const SECTIONS = {
   comparison,
   selection,
   curves,
+  "by-function": functionShares,
   joints,
   certainty,
   times: runningTimes,
