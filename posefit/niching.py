@@ -36,9 +36,8 @@ from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
-from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, angle_index
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, LIMBS, angle_index
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in, recorded
 from posefit.silhouette.cost import project

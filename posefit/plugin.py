@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 from posefit import hookimpl as hookimpl
 from posefit.arrays import Array as Array
-from posefit.fitting.adapter import Adapter as Adapter
 from posefit.fitting.box import Space as Space
 from posefit.fitting.box import Start as Start
 from posefit.fitting.box import converted as converted
@@ -36,6 +35,7 @@ from posefit.fitting.check import choices as choices
 from posefit.fitting.check import one_of as one_of
 from posefit.fitting.check import positive as positive
 from posefit.fitting.check import whole as whole
+from posefit.fitting.optimiser import Adapter as Adapter
 from posefit.fitting.optimiser import Filter as Filter
 from posefit.fitting.optimiser import Niching as Niching
 from posefit.fitting.optimiser import Optimiser as Optimiser

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
-from posefit.geometry.limbs import LIMBS, turns_of
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, LIMBS, Skeleton, turns_of
 from posefit.silhouette.limbs import SHARE, Limb
 from posefit_exemplars.beam import Steps, squared_distances
 from posefit_exemplars.exemplars import Codes, Exemplars, Rows, groups

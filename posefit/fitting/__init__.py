@@ -6,8 +6,7 @@
 | proposals as poses: root angles, translation, a prior's coordinates | space.py |
 | what a prior is: poses as fewer numbers, and which of them are feasible; the tilt of the root with them | prior.py |
 | where a body stands; the cost of proposals for one observation, and at smaller sizes. SAPSO (5) | problem.py |
-| what an optimiser is, and the loop that drives one | optimiser.py |
-| the base of adapters of other libraries | adapter.py |
+| what an optimiser is, the base of adapters of other libraries, and the loop that drives them | optimiser.py |
 | what a tracker is; the search a frame around a prediction. SAPSO section 4 | tracker.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
 | what plugins return is checked and their frames are audited | validation.py |

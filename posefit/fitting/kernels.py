@@ -75,32 +75,26 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
 
 
 @jit
-def unpack_proposals(proposals, centre, half, anchor, first, poses, translations, latents):
-    """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite."""
+def unpack_proposals(proposals, centre, half, anchor, first, mean, poses, translations, latents):
+    """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
+
+    Pitch and roll are added to the tilt that goes with the latents, which `mean` (3 + m, 2) says as `Tilt` does.
+    """
     total = 0.0
     for i in range(proposals.shape[0]):
         for j in range(3):
             poses[i, j] = centre[j] + half[j] * proposals[i, j]
             translations[i, j] = centre[3 + j] + half[3 + j] * proposals[i, 3 + j] if first > 3 else anchor[j]
             total += poses[i, j] + translations[i, j]
+        pitch, roll = mean[2, 0], mean[2, 1]
         for j in range(latents.shape[1]):
             latents[i, j] = centre[first + j] + half[first + j] * proposals[i, first + j]
             total += latents[i, j]
-    return np.isfinite(total)
-
-
-@jit
-def unpack_tilted(proposals, centre, half, anchor, first, mean, poses, translations, latents):
-    """As `unpack_proposals`, but that pitch and roll are added to the mean (3 + m, 2) that goes with the latents."""
-    finite = unpack_proposals(proposals, centre, half, anchor, first, poses, translations, latents)
-    for i in range(proposals.shape[0]):
-        pitch, roll = mean[2, 0], mean[2, 1]
-        for j in range(latents.shape[1]):
             pitch += mean[3 + j, 0] * latents[i, j]
             roll += mean[3 + j, 1] * latents[i, j]
         poses[i, 1] += min(max(pitch, mean[0, 0]), mean[1, 0])
         poses[i, 2] += min(max(roll, mean[0, 1]), mean[1, 1])
-    return finite
+    return np.isfinite(total)
 
 
 @jit

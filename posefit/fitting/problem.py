@@ -153,7 +153,7 @@ class PoseProblem:
 
     def _cost_on_device(self, proposals: Array) -> Array:
         """Return the cost (n,) of proposals (n, d), which a GPU decodes where it can."""
-        from posefit.fitting.cuda.evaluating import areas_of_proposals, decodes
+        from posefit.fitting.cuda import areas_of_proposals, decodes
 
         if decodes(self.space):
             counts = areas_of_proposals(self.body, self.cameras, self.silhouettes, self.space, proposals)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Start
-from posefit.fitting.kernels import unpack_proposals, unpack_tilted, within
+from posefit.fitting.kernels import unpack_proposals, within
 from posefit.fitting.prior import Latents, Tilt
 from posefit.geometry.rotation import wrapped, yaw_first
 from posefit.geometry.skeleton import ANGLES
@@ -71,6 +71,11 @@ class SearchSpace:
         """How many coordinates a proposal has."""
         return len(self.centre)
 
+    @property
+    def tilt_mean(self) -> Array:
+        """Pitch and roll that go with the latents (3 + m, 2), as a `Tilt` has them; 0 where there is none."""
+        return np.zeros((3 + len(self.prior.low), 2)) if self.tilt is None else self.tilt.mean
+
     def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
         """Return the space whose yaw range, and searched translation, are centred on coordinates (d,).
 
@@ -105,10 +110,8 @@ class SearchSpace:
             raise InputError(f"proposals must have shape (n, {d}), got {proposals.shape}")
         n, first = len(proposals), d - m
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
-        box, filled = (proposals, self.centre, self.half, self.anchor, first), (poses, translations, latents)
-        tilt = self.tilt
-        finite = unpack_proposals(*box, *filled) if tilt is None else unpack_tilted(*box, tilt.mean, *filled)
-        if not finite:
+        box = self.centre, self.half, self.anchor, first, self.tilt_mean
+        if not unpack_proposals(proposals, *box, poses, translations, latents):
             raise InputError("proposals must be finite, got nan or infinity")
         if self.root_order == "xyz":
             poses[:, :3] = yaw_first(poses[:, :3])

@@ -2,8 +2,7 @@
 
 | looking for | file |
 |---|---|
-| 27 joints, 26 bones, 66 angles, and where the joints of a pose are | skeleton.py |
-| which bones, and which angles of a pose, belong to a limb | limbs.py |
+| 27 joints, 26 bones, 66 angles, limbs, and where the joints of a pose are | skeleton.py |
 | cones around the bones, and builds | body.py |
 | root and joint angles as rotations. Interpretation S3 | rotation.py |
 | poses with nearly the same silhouette: mirrored, turned, reflected, limbs exchanged | symmetry.py |

@@ -5,7 +5,7 @@ Following Acclaim, a joint is named after the bone that ends in it, and the angl
 bone about the joint it starts from. The five end bones have no freedom. SAPSO section 2.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -17,28 +17,22 @@ from posefit.arrays import Array, frozen, writeable
 from posefit.errors import InputError
 from posefit.geometry import kernels
 
-# The chains of bones that the tree consists of, each with the joint it starts from; l and r are left and right.
-_CHAINS = (
-    ("root", "lhipjoint lfemur ltibia lfoot ltoes"),
-    ("root", "rhipjoint rfemur rtibia rfoot rtoes"),
-    ("root", "lowerback upperback thorax lowerneck upperneck head"),
-    ("thorax", "lclavicle lhumerus lradius lwrist lhand"),
-    ("thorax", "rclavicle rhumerus rradius rwrist rhand"),
-)
+# The chains of bones between the joints where several begin; l and r are left and right.
+LIMBS: Mapping[str, Sequence[str]] = {
+    "left leg": ("lhipjoint", "lfemur", "ltibia", "lfoot", "ltoes"),
+    "right leg": ("rhipjoint", "rfemur", "rtibia", "rfoot", "rtoes"),
+    "left arm": ("lclavicle", "lhumerus", "lradius", "lwrist", "lhand"),
+    "right arm": ("rclavicle", "rhumerus", "rradius", "rwrist", "rhand"),
+    "head": ("lowerneck", "upperneck", "head"),
+}
+_LEGS, _ARMS = (LIMBS["left leg"], LIMBS["right leg"]), (LIMBS["left arm"], LIMBS["right arm"])
+_TORSO = ("lowerback", "upperback", "thorax", *LIMBS["head"])
+_PARENT = {"root": "root"}  # of each joint, parents before children
+for _start, *_chain in (*(("root", *leg) for leg in _LEGS), ("root", *_TORSO), *(("thorax", *arm) for arm in _ARMS)):
+    _PARENT.update(zip(_chain, [_start, *_chain], strict=False))
 
-
-def _tree() -> tuple[tuple[str, ...], tuple[int, ...]]:
-    names, parents = ["root"], [-1]
-    for start, chain in _CHAINS:
-        above = names.index(start)
-        for name in chain.split():
-            names.append(name)
-            parents.append(above)
-            above = len(names) - 1
-    return tuple(names), tuple(parents)
-
-
-JOINTS, PARENTS = _tree()  # 27 names, parents before children; PARENTS[0] is -1
+JOINTS = tuple(_PARENT)  # 27 names, parents before children
+PARENTS = (-1, *map(JOINTS.index, [*_PARENT.values()][1:]))  # PARENTS[0] is -1
 BONES = JOINTS[1:]  # bone b runs from joint PARENTS[b + 1] to joint b + 1
 ENDS = tuple(j for j in range(len(JOINTS)) if j not in PARENTS)
 INNER = tuple(j for j in range(1, len(JOINTS)) if j in PARENTS)
@@ -85,6 +79,11 @@ def channel_angles(bone: str, channels: Sequence[str]) -> list[int]:
     """Return where in a pose (66,) the angles of a bone stand, such as `rx` and `rz`; none for one without angles."""
     start = angle_index(JOINTS.index(bone)) if bone in JOINTS else -1
     return [start + "xyz".index(channel[1]) for channel in channels] if start > 0 else []
+
+
+def turns_of(bones: Sequence[str]) -> NDArray[np.intp]:
+    """Return where in a pose (66,) the angles stand that turn bones."""
+    return np.array([angle for bone in bones for angle in channel_angles(bone, ("rx", "ry", "rz"))], dtype=np.intp)
 
 
 # (26,) of each bone: the joint it starts from, and where its angles are in a pose

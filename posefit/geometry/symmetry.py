@@ -15,9 +15,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera
-from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles, wrapped
-from posefit.geometry.skeleton import INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.geometry.skeleton import INNER, JOINTS, LIMBS, MIRROR, Skeleton, angle_index
 from posefit.reading import quoted
 
 Limbs = Literal["legs", "arms"]

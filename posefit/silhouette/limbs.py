@@ -12,9 +12,8 @@ from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import Chain
-from posefit.geometry.limbs import LIMBS, turns_of
 from posefit.geometry.rotation import root_angles_from_rotation
-from posefit.geometry.skeleton import BONES, PARENTS
+from posefit.geometry.skeleton import BONES, LIMBS, PARENTS, turns_of
 from posefit.reading import quoted
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.cost import Areas, areas, mean_cost, view_of

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.fitting.tracker import Observation
-from posefit.geometry.limbs import LIMBS, turns_of
-from posefit.geometry.skeleton import BONES
+from posefit.geometry.skeleton import BONES, LIMBS, turns_of
 from posefit.motion import built_in
 from posefit_exemplars.exemplars import Exemplars
 from posefit_exemplars.parts import HIGHEST, OUTER, PARTS, part_steps, parts_of

@@ -8,13 +8,13 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.kernels import sines_cosines
-from posefit.geometry.limbs import LIMBS, turns_of
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import (
     ANGLES,
     BONES,
     INNER,
     JOINTS,
+    LIMBS,
     MIRROR,
     PARENTS,
     SIDES,
@@ -23,6 +23,7 @@ from posefit.geometry.skeleton import (
     both,
     kind,
     side,
+    turns_of,
 )
 from posefit.motion.built_in import average_skeleton
 from tests.cases import each

@@ -7,9 +7,8 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.geometry.camera import Camera
-from posefit.geometry.limbs import LIMBS
 from posefit.geometry.rotation import rotation_from_root_angles
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, MIRROR, Skeleton, angle_index
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, LIMBS, MIRROR, Skeleton, angle_index
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion import built_in
 from tests.cases import each

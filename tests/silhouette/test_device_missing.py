@@ -88,8 +88,8 @@ def test_the_loops_compile_and_fuse_four_products_in_single_precision_and_no_oth
 
     whole, number = t.int64[::1], t.float64[:, ::1]
     body = (whole, whole, t.boolean[::1], t.float64[:, :, ::1], number, number)
-    seen = (t.uint32[:, :, ::1], t.uint32[:, :, ::1], whole)
-    signature = (*body, t.float64[::1], t.int64, t.int64, *seen, number, number, t.int32[:, :, ::1])
+    seen = (t.uint32[:, ::1], t.uint32[:, ::1], whole)
+    signature = (*body, t.float64[::1], t.int64, t.int64, *seen, number, number, t.int32[:, ::1])
     code = compiled(count_on_device, signature, monkeypatch)
     # two tangents and two discs, as on a CPU with FMA; no other product of a row that could be rounded otherwise
     assert len(re.findall(r"\bfma\.rn\.f32", code)) == 4

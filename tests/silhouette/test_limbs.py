@@ -7,8 +7,7 @@ import pytest
 
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.limbs import LIMBS
-from posefit.geometry.skeleton import ANGLES
+from posefit.geometry.skeleton import ANGLES, LIMBS
 from posefit.silhouette.cost import areas, pose_costs, project
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.limbs import SHARE, Limb

@@ -94,7 +94,7 @@ def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
 def test_proposals_that_a_device_decodes_cost_what_they_cost_on_a_cpu(
     name: str, translation: Translation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("posefit.fitting.cuda.evaluating.PART", 3)
+    monkeypatch.setattr("posefit.fitting.cuda.PART", 3)
     one = pose_problem().coarser(4)
     prior = registry().prior(name)().fit(walking_angles(), one.body.skeleton)
     walks = [built_in.motion(style) for style in built_in.other_styles("walk")]

@@ -5,7 +5,7 @@ Bodies, cameras and silhouettes are copied to the device once, and stay there as
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -18,7 +18,6 @@ from posefit.geometry.camera import Camera
 from posefit.silhouette.cuda.launch import THREADS, count_on_device
 from posefit.silhouette.mask import Silhouette
 
-T = TypeVar("T")
 _held: WeakKeyDictionary[Any, Sequence[Any]] = WeakKeyDictionary()
 PART = 65_536  # poses: 35 MB; two parts at a time are on the device, however many there are
 
@@ -30,29 +29,13 @@ def areas_on_device(
 
     Shapes are checked by the callers.
     """
-    out = np.empty((len(poses), 3), dtype=np.int64)
-    _count(drawing_on_device(body, camera, silhouette), poses, translations, out)
-    return out
-
-
-def launched(drawing: Sequence[Any], poses: Any, translations: Any, stream: Any = 0) -> Any:
-    """Return R, B, Y (n, 1, 3), int32, on the device, as its arrays of poses and translations are.
-
-    It returns before anything is counted; copying the result waits for it.
-    """
-    areas = cuda.device_array((len(poses), 1, 3), np.int32, stream=stream)
-    if len(poses):
-        count_on_device[len(poses), THREADS, stream](*drawing, poses, translations, areas)
-    return areas
-
-
-def _count(drawing: Sequence[Any], poses: Array, translations: Array, out: NDArray[np.int64]) -> None:
+    out, drawing = np.empty((len(poses), 3), dtype=np.int64), drawing_on_device(body, camera, silhouette)
     streams, waiting = (cuda.stream(), cuda.stream()), deque[tuple[slice, Any, Any]]()
     cuda.synchronize()  # what the drawing is made of has arrived
 
     def collect() -> None:
         part, areas, stream = waiting.popleft()
-        out[part] = areas.copy_to_host(stream=stream)[:, 0]
+        out[part] = areas.copy_to_host(stream=stream)
 
     for k, first in enumerate(range(0, len(poses), PART)):
         part, stream = slice(first, first + PART), streams[k % 2]
@@ -62,32 +45,32 @@ def _count(drawing: Sequence[Any], poses: Array, translations: Array, out: NDArr
             collect()
     while waiting:
         collect()
+    return out
 
 
-def held(owner: T, arrays: Callable[[T], Sequence[NDArray[Any]]]) -> Sequence[Any]:
-    """Return the arrays of an owner on the device, given to it at the first call."""
-    arrays_there = _held.get(owner)
-    if arrays_there is None:
-        arrays_there = _held[owner] = tuple(cuda.to_device(np.array(one, order="C")) for one in arrays(owner))
-    return arrays_there
+def launched(drawing: Sequence[Any], poses: Any, translations: Any, stream: Any = 0) -> Any:
+    """Return R, B, Y (n, 3), int32, on the device, as its arrays of poses and translations are.
+
+    It returns before anything is counted; copying the result waits for it.
+    """
+    areas = cuda.device_array((len(poses), 3), np.int32, stream=stream)
+    if len(poses):
+        count_on_device[len(poses), THREADS, stream](*drawing, poses, translations, areas)
+    return areas
 
 
 def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
     """Return the arguments of `count_on_device` that come before the poses."""
-    scene = *held(body, _body), *held(camera, _camera), camera.width, camera.height
-    return *scene, *held(silhouette, _silhouette)
-
-
-def _body(body: Body) -> Sequence[NDArray[Any]]:
     chain = body.skeleton.chain
-    return chain.parents, chain.angles, chain.turned, chain.turns, chain.offsets, body.radii
+    view = (camera.rotation.ravel(), camera.translation, camera.focal, camera.centre)
+    person = _there(body, lambda: (chain.parents, chain.angles, chain.turned, chain.turns, chain.offsets, body.radii))
+    seen_by = _there(camera, lambda: (np.concatenate(view),))
+    words = _there(silhouette, lambda: (*(bits.view(np.uint32) for bits in silhouette.bits), [silhouette.pixels]))
+    return *person, *seen_by, camera.width, camera.height, *words
 
 
-def _camera(camera: Camera) -> Sequence[NDArray[Any]]:
-    return [np.concatenate([camera.rotation.ravel(), camera.translation, camera.focal, camera.centre])]
-
-
-def _silhouette(silhouette: Silhouette) -> Sequence[NDArray[Any]]:
-    """Return the observed and the known pixels (1, strips, rows) of 32-bit words, and how many are observed (1,)."""
-    observed, valid = (bits.view(np.uint32)[None] for bits in silhouette.bits)
-    return observed, valid, np.array([silhouette.pixels], dtype=np.int64)
+def _there(owner: Any, arrays: Callable[[], Sequence[Any]]) -> Sequence[Any]:
+    """Return the arrays of an owner on the device, given to it at the first call."""
+    if owner not in _held:
+        _held[owner] = tuple(cuda.to_device(np.array(one, order="C")) for one in arrays())
+    return _held[owner]

@@ -16,7 +16,6 @@ from posefit.silhouette.rasteriser import BLOCK, FAR, NEAR
 from posefit.silhouette.rasteriser import STRIP_PIXELS as STRIP
 
 THREADS = 64  # of a block
-MOST = 32  # silhouettes that one launch compares a drawing with
 WORDS = 4  # of a row that a thread fills at a time
 _ANGLES, _BONES, _JOINTS = ANGLES, len(BONES), len(JOINTS)
 _PI_HIGH, _PI_LOW = 3.141592653589793, 1.2246467991473532e-16  # pi in two parts, as on a CPU
@@ -289,16 +288,15 @@ def bound(b, bounds, box):
 
 @cuda.jit(device=True)
 def add_counts(row, strip, strips, words, observed, valid, counts):
-    """Add how many pixels of some words of a row are known, and how many are the person's, for each silhouette."""
-    for s in range(observed.shape[0]):
-        body, overlap = np.int32(0), np.int32(0)
-        for k in range(WORDS):
-            if words[k] != np.uint32(0) and strip + k < strips:
-                body += np.int32(cuda.popc(np.uint32(words[k] & valid[s, strip + k, row])))
-                overlap += np.int32(cuda.popc(np.uint32(words[k] & observed[s, strip + k, row])))
-        if body > 0:
-            cuda.atomic.add(counts, (s, 0), body)
-            cuda.atomic.add(counts, (s, 1), overlap)
+    """Add how many pixels of some words of a row are known, and how many are the person's."""
+    body, overlap = np.int32(0), np.int32(0)
+    for k in range(WORDS):
+        if words[k] != np.uint32(0) and strip + k < strips:
+            body += np.int32(cuda.popc(np.uint32(words[k] & valid[strip + k, row])))
+            overlap += np.int32(cuda.popc(np.uint32(words[k] & observed[strip + k, row])))
+    if body > 0:
+        cuda.atomic.add(counts, 0, body)
+        cuda.atomic.add(counts, 1, overlap)
 
 
 @cuda.jit
@@ -319,11 +317,11 @@ def count_on_device(
     translations,
     areas,
 ):
-    """Write the areas (n, silhouettes, 3) R, B, Y of poses (n, 66), one a block, each drawn once.
+    """Write the areas (n, 3) R, B, Y of poses (n, 66), one a block.
 
     First come the fields of `Chain`, then radii, then a view (16,): rotation, translation, focal lengths, centre.
-    `observed` and `valid` (silhouettes, strips, rows) are bit images as `rasteriser` makes them, in 32-bit words;
-    of each silhouette's pixels there are so many (silhouettes,).
+    `observed` and `valid` (strips, rows) are bit images as `rasteriser` makes them, in 32-bit words; of the observed
+    silhouette's pixels there are so many (1,).
     """
     sines = cuda.shared.array(_ANGLES, float64)
     cosines = cuda.shared.array(_ANGLES, float64)
@@ -332,16 +330,15 @@ def count_on_device(
     lines = cuda.shared.array((LINES, _BONES), float32)
     bounds = cuda.shared.array((BOUNDS, _BONES), int32)
     box = cuda.shared.array(4, int32)
-    counts = cuda.shared.array((MOST, 2), int32)
+    counts = cuda.shared.array(2, int32)
     words = cuda.local.array(WORDS, uint32)
     i, thread, threads = cuda.blockIdx.x, cuda.threadIdx.x, cuda.blockDim.x
-    strips = observed.shape[1]
+    strips = observed.shape[0]
 
     for a in range(thread, _ANGLES, threads):
         write_sine(a, poses[i, a], sines, cosines)
-    for s in range(thread, MOST, threads):
-        counts[s, 0] = counts[s, 1] = 0
     if thread == 0:
+        counts[0] = counts[1] = 0
         box[0], box[1], box[2], box[3] = height, 0, strips, -1
     cuda.syncthreads()
     if thread < 3:
@@ -361,8 +358,8 @@ def count_on_device(
         fill(row, strip, strips, lines, bounds, words)
         add_counts(row, strip, strips, words, observed, valid, counts)
     cuda.syncthreads()
-    for s in range(thread, observed.shape[0], threads):
-        body, overlap = counts[s, 0], counts[s, 1]
-        areas[i, s, 0] = pixels[s] - overlap
-        areas[i, s, 1] = body - overlap
-        areas[i, s, 2] = overlap
+    if thread == 0:
+        body, overlap = counts[0], counts[1]
+        areas[i, 0] = pixels[0] - overlap
+        areas[i, 1] = body - overlap
+        areas[i, 2] = overlap
