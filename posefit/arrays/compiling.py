@@ -25,8 +25,6 @@ from importlib.util import resolve_name
 from pathlib import Path
 from typing import Any
 
-PATIENCE = 120.0  # seconds that another process may take over a function, until this one compiles it itself
-LOOK = 0.02  # seconds between two looks whether it is done
 STARTED = time.time()  # before the modules were loaded that are compiled
 # whose versions are numba's affair
 _FOREIGN = sys.stdlib_module_names | {"cv2", "llvmlite", "numba", "numpy", "scipy"}
@@ -128,8 +126,8 @@ def uncollected() -> Iterator[None]:
 
 
 @contextmanager
-def in_turn(path: Path | None, patience: float = PATIENCE) -> Iterator[None]:
-    """Hold the lock of a path in the body; where that takes too long, or there is none, go on without it."""
+def in_turn(path: Path | None) -> Iterator[None]:
+    """Hold the lock of a path in the body; where there is none to be had, go on without it."""
     if path is None or path in _held:  # a function that calls itself
         yield
         return
@@ -142,25 +140,11 @@ def in_turn(path: Path | None, patience: float = PATIENCE) -> Iterator[None]:
         return
     _held.add(path)
     try:
-        _wait(file, time.monotonic() + patience)
+        with suppress(OSError):  # a disk without locks
+            fcntl.flock(file, fcntl.LOCK_EX)
         yield
     finally:
         _held.discard(path)
         with suppress(OSError):
             fcntl.flock(file, fcntl.LOCK_UN)  # a process that was forked meanwhile may hold it open
         os.close(file)
-
-
-def _wait(file: int, until: float) -> None:
-    import fcntl
-
-    while True:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
-        except BlockingIOError:
-            if time.monotonic() > until:
-                return
-            time.sleep(LOOK)
-        except OSError:  # a disk without locks
-            return
