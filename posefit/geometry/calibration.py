@@ -24,12 +24,10 @@ from posefit.geometry.camera import Camera
 from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
-LARGEST_FILE = 1_000_000  # bytes
+LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 MESSAGE = 300  # characters of what is wrong
 DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
 BLOCK = 16  # pixels: codecs fill pictures up to a multiple of it
-LARGEST_YAML = 500_000  # characters: PyYAML reads some 100,000 a second
-NUMBERS = 100  # of a matrix; a calibration has 14 at most
 # the letters of OpenCV's element types whose numbers are rounded when they are read
 _ROUNDED = {"f": np.float32, "h": np.float16}
 _TYPE = re.compile(r"([1-9]?)([ucwsifdh])")
@@ -266,20 +264,14 @@ def _stored_values(text: str) -> dict[str, Any]:
     values = _xml(text) if start == "<" else parsed_json(text) if start == "{" else _yaml(text)
     if not isinstance(values, dict):
         raise InputError(f"a file without names, {quoted(values)}")
-    return {str(name): value for name, value in values.items()}
+    return values
 
 
 def _matrix_of(value: Any) -> Array:
     """Return a matrix, or numbers in one row. Raises ValueError where there are none, too many, or another number."""
     stated = value if isinstance(value, dict) and "data" in value else {"data": value}
-    listed = stated["data"][: 40 * NUMBERS].split() if isinstance(stated["data"], str) else stated["data"]
-    rows = listed if isinstance(listed, list) else [listed]
-    flat = [
-        number for row in rows[: NUMBERS + 1] for number in (row if isinstance(row, list) else [row])[: NUMBERS + 1]
-    ]
-    if len(flat) > NUMBERS:
-        raise InputError(f"a matrix of more than {NUMBERS} numbers")
-    numbers = np.array([_number_of(number) for number in flat], dtype=np.float64)
+    cells = np.array(stated["data"].split() if isinstance(stated["data"], str) else stated["data"], dtype=object)
+    numbers = np.array([_number_of(cell) for cell in cells.flat], dtype=np.float64)
     match = _TYPE.fullmatch(str(stated.get("dt", "d")))
     if match is None:
         raise InputError(f"a matrix of the type {quoted(stated['dt'])}")
@@ -287,39 +279,25 @@ def _matrix_of(value: Any) -> Array:
         numbers = numbers.astype(_ROUNDED[match[2]]).astype(np.float64)
     sides = [stated["rows"], stated["cols"]] if {"rows", "cols"} <= stated.keys() else stated.get("sizes")
     if sides is None:
-        even = rows and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows)
-        return numbers.reshape(len(rows), -1) if even else numbers
-    shape = [_count(side) for side in (sides if isinstance(sides, list) else [sides])[:4]]
-    shape += [int(match[1])] if match[1] else []  # channels
-    if numbers.size != math.prod(shape):
-        raise InputError(f"a matrix of {' x '.join(map(str, shape))} with {numbers.size} numbers")
-    return numbers.reshape(shape)
+        return numbers.reshape(cells.shape)
+    shape = [*map(_number_of, sides if isinstance(sides, list) else [sides]), *map(float, filter(None, [match[1]]))]
+    if not all(side.is_integer() and side > 0 for side in shape) or numbers.size != math.prod(shape):
+        raise InputError(f"a matrix of {' x '.join(f'{side:g}' for side in shape)} with {numbers.size} numbers")
+    return numbers.reshape([int(side) for side in shape])
 
 
 def _number_of(value: Any) -> float:
-    """Return a number, which may be written as YAML writes it. Raises ValueError where it is none."""
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise InputError(f"{quoted(value)} where a number should be")
-    text = value.lower().replace(".inf", "inf").replace(".nan", "nan") if isinstance(value, str) else value
+    """Return a number, which may be text. Raises ValueError where it is none."""
     try:
-        return float(text)
-    except (ValueError, OverflowError):
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{quoted(value)} where a number should be") from None
-
-
-def _count(value: Any) -> int:
-    number = _number_of(value)
-    if not 1.0 <= number <= NUMBERS or number != int(number):
-        raise InputError(f"a matrix with {quoted(value)} rows or columns")
-    return int(number)
 
 
 def _yaml(text: str) -> Any:
     """Return what a YAML text holds: texts, lists and dictionaries alone, whatever tags it has."""
     import yaml
 
-    if len(text) > LARGEST_YAML:
-        raise InputError(f"YAML of {len(text)} characters, more than {LARGEST_YAML}")
     # OpenCV writes %YAML:1.0 where the directive is %YAML 1.0
     text = re.sub(r"\A\s*%YAML[^\n]*\n", "", text)
     try:
@@ -333,14 +311,7 @@ def _xml(text: str) -> dict[str, Any]:
     root = _xml_of(text)
     if root.tag != "opencv_storage":
         raise InputError(f"XML of {quoted(root.tag)}")
-    return {child.tag: _content(child) for child in root}
-
-
-def _content(element: Any) -> Any:
-    if len(element) == 0:
-        words = (element.text or "").split()
-        return words[0] if len(words) == 1 else words
-    return {child.tag: (child.text or "").strip() for child in element}
+    return {one.tag: {part.tag: (part.text or "").strip() for part in one} or (one.text or "").strip() for one in root}
 
 
 def _xml_of(text: str) -> Any:

@@ -121,14 +121,14 @@ HIDDEN = "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(
     ("before", "after", "message"),
     [
         ("   cols: 3", "   cols: 3x", "'3x' where a number should be"),  # OpenCV's own reader corrupted memory
-        ("   cols: 3", "   cols: -3", "a matrix with '-3' rows or columns"),
+        ("   cols: 3", "   cols: -3", "a matrix of 3 x -3 with 9 numbers"),
         ("   rows: 3", "   rows: 4", "a matrix of 4 x 3 with 9 numbers"),
         ("   dt: d", "   dt: 99d", "a matrix of the type '99d'"),
         ("data: [", "data: [ [[[1]]],", "where a number should be"),
         ("---", "--- !!python/object/apply:os.system ['true']", "YAML that is broken"),
         ("image_width", "a0: &a0 {b: 1}\n" + HIDDEN + "image_width", None),  # merges are not expanded
         ("image_width", "a: " + "[" * 9000 + "\nimage_width", "YAML that is broken"),
-        ("image_width", "# " + "a" * 500_000 + "\nimage_width", "YAML of 500"),
+        ("image_width", "# " + "a" * 500_000 + "\nimage_width", "expected at most 0.5 MB"),
     ],
 )
 def test_a_hostile_yaml_is_read_as_far_as_it_goes_or_refused(
