@@ -4,9 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
-from posefit.geometry.skeleton import ANGLES, JOINTS, joint_distances
+from posefit.geometry.skeleton import joint_distances
 from posefit.uncertainty.modes import nearer_mirrored
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
@@ -17,29 +16,22 @@ def pose_error_degrees(truth: Array, estimate: Array, dimensions: NDArray[np.boo
 
     All 66 angles count, padding too, unless `dimensions` (66,) chooses some.
     """
-    truth, estimate = _pair("estimate", truth, estimate, (ANGLES,))
-    if dimensions is not None:
-        dimensions = np.asarray(dimensions)
-        if dimensions.shape != (ANGLES,) or dimensions.dtype != np.bool_ or not dimensions.any():
-            came = f"{dimensions.dtype} of shape {dimensions.shape}, {np.count_nonzero(dimensions)} of them not 0"
-            raise InputError(f"dimensions must be {ANGLES} booleans, at least one of them true, got {came}")
     difference = np.degrees(np.abs(wrapped(truth - estimate)))
     return np.asarray((difference if dimensions is None else difference[:, dimensions]).mean(axis=1))  # SAPSO (8)
 
 
 def mean_error(errors: Array) -> float:
     """Return the mean of a sequence's errors (T,). SAPSO (9)."""
-    return float(np.mean(_series("errors", errors)))  # SAPSO (9)
+    return float(np.mean(errors))  # SAPSO (9)
 
 
 def error_spread(errors: Array) -> float:
     """Return the standard deviation of a sequence's errors (T,), with divisor T. SAPSO (10)."""
-    return float(np.std(_series("errors", errors)))  # SAPSO (10)
+    return float(np.std(errors))  # SAPSO (10)
 
 
 def geodesic_degrees(truth: Array, estimate: Array) -> Array:
     """Return the mean angle (T,) in degrees between true and estimated rotations of the root and 21 inner joints."""
-    truth, estimate = _pair("estimate", truth, estimate, (ANGLES,))
     root = geodesic(rotation_from_root_angles(truth[:, :3]), rotation_from_root_angles(estimate[:, :3]))
     inner = [rotation_from_joint_angles(poses[:, 3:].reshape(len(poses), -1, 3)) for poses in (truth, estimate)]
     return np.asarray(np.degrees(np.column_stack([root, geodesic(*inner)])).mean(axis=1))
@@ -51,7 +43,6 @@ def mpjpe_mm(truth: Array, joints: Array) -> Array:
     The root is moved to the origin on both sides, as is usual where one camera leaves the depth open. All 27 joints
     count, the root with its zero.
     """
-    truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
     return np.asarray(1e3 * joint_distances(truth, joints).mean(axis=1))
 
 
@@ -60,7 +51,6 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
 
     That is Procrustes alignment, frame by frame.
     """
-    truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
     target = truth - truth.mean(axis=1, keepdims=True)
     source = joints - joints.mean(axis=1, keepdims=True)
     left, spread, right = np.linalg.svd(np.swapaxes(source, 1, 2) @ target)
@@ -75,9 +65,6 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
 
 def iou(areas: NDArray[np.int64]) -> Array:
     """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 where both are empty."""
-    areas = np.asarray(areas)
-    if areas.ndim != 2 or areas.shape[1] != 3:
-        raise InputError(f"areas must have shape (n, 3), got {areas.shape}")
     total = areas.sum(axis=1)
     return np.asarray(np.where(total > 0, areas[:, 2] / np.maximum(total, 1), 1.0))
 
@@ -88,39 +75,14 @@ def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
     The mirror is the plane through the root that the hips face each other across; left and right trade names. In a
     side view a pose and its mirror image have nearly one silhouette. Only joints that have a counterpart count.
     """
-    truth, joints = _pair("joints", truth, joints, (len(JOINTS), 3))
     return nearer_mirrored(truth, joints)
-
-
-def swap_rate(truth: Array, joints: Array) -> float:
-    """Return the share of frames with left and right swapped. Interpretation S15."""
-    return float(swapped(truth, joints).mean())
 
 
 def lost_rate(mpjpe: Array) -> float:
     """Return the share of frames whose MPJPE (T,) in millimetres is above 150."""
-    return float((_series("mpjpe", mpjpe) > LOST_MM).mean())
+    return float((mpjpe > LOST_MM).mean())
 
 
 def skill(error: float, baseline: float) -> float | None:
     """Return 1 - error / baseline: 1 is perfect, 0 no better than the baseline; None where the baseline is 0."""
     return 1.0 - error / baseline if baseline > 0.0 else None
-
-
-def _pair(name: str, truth: Array, other: Array, tail: tuple[int, ...]) -> tuple[Array, Array]:
-    truth, other = np.asarray(truth, dtype=np.float64), np.asarray(other, dtype=np.float64)
-    if truth.shape[1:] != tail or not len(truth):
-        raise InputError(f"truth must have shape (T, {', '.join(map(str, tail))}), got {truth.shape}")
-    if other.shape != truth.shape:
-        raise InputError(f"{name} must have the truth's shape {truth.shape}, got {other.shape}")
-    for label, values in (("truth", truth), (name, other)):
-        if not np.isfinite(values).all():
-            raise InputError(f"{label} must be finite, got {np.count_nonzero(~np.isfinite(values))} that are not")
-    return truth, other
-
-
-def _series(name: str, values: Array) -> Array:
-    values = np.asarray(values, dtype=np.float64)
-    if values.ndim != 1 or not len(values):
-        raise InputError(f"{name} must have shape (T,), at least one frame, got {values.shape}")
-    return values

@@ -1,7 +1,5 @@
 """Metrics by numbers worked by hand, and by law."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +11,6 @@ from posefit.fitting import metrics
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.motion import built_in
-from tests.cases import each
 
 seeds = st.integers(0, 2**32 - 1)
 rotations = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(lambda angles: rotation_from_joint_angles(np.array(angles)))
@@ -45,14 +42,12 @@ def test_a_mirrored_stride_counts_as_swapped(joints: Array) -> None:
     strides = np.abs(rooted[:, JOINTS.index("lfoot"), 2] - rooted[:, JOINTS.index("rfoot"), 2]) > 0.3
     assert strides.sum() >= 5
     assert metrics.swapped(joints, mirrored)[strides].all()
-    assert metrics.swap_rate(joints, joints) == 0.0
-    assert metrics.swap_rate(joints, joints + np.random.default_rng(0).normal(0.0, 0.003, joints.shape)) == 0.0
+    assert not metrics.swapped(joints, joints + np.random.default_rng(0).normal(0.0, 0.003, joints.shape)).any()
 
 
-def test_one_angle_66_degrees_off_is_an_error_of_1_degree() -> None:
+def test_chosen_angles_alone_count() -> None:
     truth, estimate = np.zeros((3, 66)), np.zeros((3, 66))
     estimate[1, 40] = np.radians(-66.0)
-    np.testing.assert_allclose(metrics.pose_error_degrees(truth, estimate), [0.0, 1.0, 0.0])
     chosen = np.isin(np.arange(66), (39, 40))
     np.testing.assert_allclose(metrics.pose_error_degrees(truth, estimate, chosen), [0.0, 33.0, 0.0])
 
@@ -119,11 +114,9 @@ def test_an_estimate_in_one_point_is_at_the_centroid_for_pa_mpjpe() -> None:
 
 
 def test_left_and_right_names_traded_count_as_swapped(joints: Array) -> None:
-    assert metrics.swapped(joints, joints[:, list(MIRROR)]).all()
-    assert metrics.swap_rate(joints, joints[:, list(MIRROR)] + [0.1, 0.2, 0.3]) == 1.0
     half = joints.copy()
-    half[:5] = half[:5, list(MIRROR)]
-    assert metrics.swap_rate(joints, half) == 0.25
+    half[:5] = half[:5, list(MIRROR)] + [0.1, 0.2, 0.3]
+    assert metrics.swapped(joints, half).tolist() == [True] * 5 + [False] * 15
 
 
 @given(seeds, rotations)
@@ -134,28 +127,3 @@ def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(joints: Array, s
     swapped = metrics.swapped(joints, estimate)
     moved = metrics.swapped(joints @ rotation.T + rng.normal(size=3), estimate @ rotation.T + rng.normal(size=3))
     np.testing.assert_array_equal(moved, swapped)
-
-
-STILL, POSES = np.zeros((2, 27, 3)), np.zeros((2, 66))
-CHOSEN = "dimensions must be 66 booleans, at least one of them true, got"
-
-
-@each(
-    ("metric", "values", "message"),
-    [
-        (metrics.mpjpe_mm, (STILL, STILL + np.nan), "joints must be finite, got 162 that are not"),
-        (metrics.pa_mpjpe_mm, (STILL[:0], STILL[:0]), r"truth must have shape \(T, 27, 3\), got \(0, 27, 3\)"),
-        (metrics.swap_rate, (STILL, STILL + np.inf), "joints must be finite, got 162 that are not"),
-        (metrics.geodesic_degrees, (POSES + np.nan, POSES), "truth must be finite, got 132 that are not"),
-        (metrics.pose_error_degrees, (POSES, POSES[:, 1:]), r"estimate must have the truth's shape \(2, 66\), got"),
-        (metrics.pose_error_degrees, (POSES, POSES, np.ones(65, bool)), rf"{CHOSEN} bool of shape \(65,\), 65"),
-        (metrics.pose_error_degrees, (POSES, POSES, np.ones(66)), rf"{CHOSEN} float64 of shape \(66,\), 66"),
-        (metrics.pose_error_degrees, (POSES, POSES, np.zeros(66, bool)), rf"{CHOSEN} bool of shape \(66,\), 0"),
-        (metrics.mean_error, (np.zeros(0),), r"errors must have shape \(T,\), at least one frame, got \(0,\)"),
-        (metrics.lost_rate, (np.zeros((2, 1)),), r"mpjpe must have shape \(T,\), at least one frame, got \(2, 1\)"),
-        (metrics.iou, (np.zeros((4, 2), dtype=np.int64),), r"areas must have shape \(n, 3\), got \(4, 2\)"),
-    ],
-)
-def test_wrong_arrays_are_named(metric: Callable[..., object], values: tuple[Array, ...], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        metric(*values)

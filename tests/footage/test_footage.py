@@ -77,7 +77,7 @@ def test_two_calibrated_cameras_place_the_person(filmed: tuple[Path, list[Any]],
     assert np.median(away) < 0.03  # metres
     joints = [motion.joints, motion.skeleton.joints(result.motion.poses, result.motion.translations)]
     assert np.median(metrics.mpjpe_mm(*joints)) < 50.0
-    assert metrics.swap_rate(*joints) < 0.2
+    assert metrics.swapped(*joints).mean() < 0.2
     other = film(tmp_path / "front.avi", [NOBODY] * EMPTY + truth(0.6))
     # coming nearer the person covers the same place all the time, which a mixture would learn
     how = Extraction("median")
