@@ -10,6 +10,7 @@ from posefit import Body, Camera, PoseProblem, SearchSpace, Silhouette, minimise
 from posefit.arrays import Array
 from posefit.fitting.box import displacement, draw_population
 from posefit.fitting.optimiser import BudgetError, populations
+from posefit.fitting.prior import Tilt
 from posefit.fitting.problem import align
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
@@ -35,9 +36,12 @@ def drawn(problem: PoseProblem, count: int) -> Array:
     return draw_population(problem.space, np.random.default_rng(0), count)
 
 
-@each("translation", ["known", "searched", "aligned"])
-def test_a_cost_has_the_same_bits_whatever_stands_beside_it(problem: PoseProblem, translation: str) -> None:
-    problem = replace(problem, space=replace(problem.space, translation=translation))
+@each(("translation", "tilted"), [("known", False), ("searched", True), ("aligned", False)])
+def test_a_cost_has_the_same_bits_whatever_stands_beside_it(
+    problem: PoseProblem, translation: str, tilted: bool
+) -> None:
+    tilt = Tilt.of(problem.space.prior, [built_in.motion("walk-a")], 0.99, 0.1) if tilted else None  # type: ignore[arg-type]
+    problem = replace(problem, space=replace(problem.space, translation=translation, tilt=tilt))
     proposals = drawn(problem, 1000)
     costs = problem.evaluate(proposals)
     for threads in (1, 3):

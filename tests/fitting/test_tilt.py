@@ -7,7 +7,6 @@ import pytest
 
 from posefit import SearchSpace, Task
 from posefit.arrays import Array
-from posefit.fitting.box import draw_population
 from posefit.fitting.prior import Tilt
 from posefit.fitting.tracker import Follower, Observation, Prediction, SynthesisTracker
 from posefit.geometry.body import Body
@@ -63,14 +62,6 @@ def test_bent_hips_tilt_as_in_training() -> None:
     np.testing.assert_allclose(poses[:, 2], -0.1 * shrunk * np.array([-1.0, 1.0]), rtol=1e-9)
     lost = 0.9 * (1.0 - shrunk / 0.8)  # what the ridge leaves to the range
     np.testing.assert_allclose([tilt.low[0], tilt.high[0]], [-lost - 2.0 * DEGREE, lost + 2.0 * DEGREE])
-
-
-def test_what_is_proposed_is_added_to_what_goes_with_the_latents() -> None:
-    hip = np.linspace(-1.0, 1.0, 50)
-    space = space_of(Tilt.of(Hip(), [bending(hip, 0.0 * hip, hip)], 1.0, 0.1), reach=0.5)
-    mean, added = space.decode(np.array([[0.0, 0.0, 0.0, 0.4], [0.0, 0.6, -0.2, 0.4]]))[0]
-    np.testing.assert_allclose(added[:3] - mean[:3], [0.0, 0.3, -0.1], atol=1e-12)
-    np.testing.assert_array_equal(added[3:], mean[3:])
 
 
 def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None:
@@ -166,19 +157,6 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
     assert tilt(TrackOptions(prior=learned)) is None
     assert tilt(TrackOptions(prior=learned, settings={"tracker.tilt": "learned"})) is not None
-
-
-def test_a_row_has_the_same_bits_whatever_stands_beside_it() -> None:
-    prior = PCA().fit(np.concatenate([walk.poses[:, 3:] for walk in WALKS]))
-    space = Follower(task_of(*WALKS), prior, Prediction()).space(NOTHING)
-    proposals = draw_population(space, np.random.default_rng(0), 60)
-    poses = space.decode(proposals)[0]
-    np.testing.assert_array_equal(poses[7:8], space.decode(proposals[7:8])[0])
-    np.testing.assert_array_equal(poses[::-1], space.decode(proposals[::-1])[0])
-    np.testing.assert_allclose(space.proposals(space.coordinates(proposals)), proposals, atol=1e-12)
-    proposals[3, 1] = np.nan
-    with pytest.raises(ValueError, match="proposals must be finite, got nan or infinity"):
-        space.decode(proposals)
 
 
 @each(

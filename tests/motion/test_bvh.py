@@ -9,46 +9,15 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, PARENTS
 from posefit.motion import built_in, bvh
-from posefit.motion.bvh import read_bvh, write_bvh
+from posefit.motion.bvh import NAMES, read_bvh, write_bvh
 from tests.cases import each
 from tests.geometry.turns import about
 
 pytest.importorskip("pybvh")
 
-# Acclaim's name, cgspeed's name, parent; written out, so that a slip in the reader's table shows
-TREE = [
-    entry.split(":")
-    for entry in [
-        "root:Hips:-",
-        "lhipjoint:LHipJoint:root",
-        "lfemur:LeftUpLeg:lhipjoint",
-        "ltibia:LeftLeg:lfemur",
-        "lfoot:LeftFoot:ltibia",
-        "ltoes:LeftToeBase:lfoot",
-        "rhipjoint:RHipJoint:root",
-        "rfemur:RightUpLeg:rhipjoint",
-        "rtibia:RightLeg:rfemur",
-        "rfoot:RightFoot:rtibia",
-        "rtoes:RightToeBase:rfoot",
-        "lowerback:LowerBack:root",
-        "upperback:Spine:lowerback",
-        "thorax:Spine1:upperback",
-        "lowerneck:Neck:thorax",
-        "upperneck:Neck1:lowerneck",
-        "head:Head:upperneck",
-        "lclavicle:LeftShoulder:thorax",
-        "lhumerus:LeftArm:lclavicle",
-        "lradius:LeftForeArm:lhumerus",
-        "lwrist:LeftHand:lradius",
-        "lhand:LeftFingerBase:lwrist",
-        "rclavicle:RightShoulder:thorax",
-        "rhumerus:RightArm:rclavicle",
-        "rradius:RightForeArm:rhumerus",
-        "rwrist:RightHand:rradius",
-        "rhand:RightFingerBase:rwrist",
-    ]
-]
+TREE = [(name, NAMES[name], JOINTS[above] if above >= 0 else "-") for name, above in zip(JOINTS, PARENTS, strict=True)]
 ORDERS = ("ZYX", "ZXY", "XYZ", "YZX")
 
 

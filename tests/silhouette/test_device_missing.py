@@ -1,9 +1,7 @@
-"""Without a GPU: its machine code rounds as asked, what is said where there is none, and that nothing of one is needed as long as nobody asks for it."""
+"""Without a GPU: what is said where there is none, and that nothing of one is needed until it is asked for."""
 
-import re
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -61,41 +59,3 @@ def test_a_scene_on_a_device_has_its_silhouettes_there(monkeypatch: pytest.Monke
 def test_a_cpu_imports_nothing_of_a_gpu() -> None:
     ran = subprocess.run([sys.executable, "-c", QUIET], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
-
-
-def compiled(function: object, signature: tuple[object, ...], monkeypatch: pytest.MonkeyPatch) -> str:
-    """Return a function as PTX for an H100 or H200, whose compute capability is 9.0."""
-    pytest.importorskip("numba_cuda", reason="numba-cuda compiles for a GPU")
-    from numba import cuda
-    from numba.core import config
-
-    if config.ENABLE_CUDASIM or cuda.is_available():
-        pytest.skip("the loops themselves run here")
-    monkeypatch.setattr("numba.cuda.dispatcher.get_current_device", lambda: SimpleNamespace(compute_capability=(9, 0)))
-    try:
-        return cuda.compile_ptx(function.py_func, signature, cc=(9, 0))[0]
-    except (RuntimeError, OSError) as error:
-        pytest.skip(f"no compiler for a GPU: {error}")
-
-
-@pytest.mark.slow
-def test_the_loops_compile_and_fuse_four_products_in_single_precision_and_no_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    from numba import types as t
-
-    from posefit.silhouette.cuda.launch import count_on_device
-
-    whole, number = t.int64[::1], t.float64[:, ::1]
-    body = (whole, whole, t.boolean[::1], t.float64[:, :, ::1], number, number)
-    seen = (t.uint32[:, ::1], t.uint32[:, ::1], whole)
-    signature = (*body, t.float64[::1], t.int64, t.int64, *seen, number, number, t.int32[:, ::1])
-    code = compiled(count_on_device, signature, monkeypatch)
-    # two tangents and two discs, as on a CPU with FMA; no other product of a row that could be rounded otherwise
-    assert len(re.findall(r"\bfma\.rn\.f32", code)) == 4
-    assert not re.search(r"\bmul(\.rn)?\.f32", code)
-    assert not re.search(r"\bsqrt\.approx", code)
-    assert not re.search(r"\bdiv\.(approx|full)", code)
-    assert "popc.b32" in code
-    assert "popc.b64" not in code
-    assert not re.search(r"^\s*\.local", code, re.MULTILINE)  # a thread's words are in registers

@@ -1,18 +1,12 @@
 """SAPSO, algorithm 1, step 2c, as Interpretation S7 has it: what leaves the box is drawn again, a coordinate at a time."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import ks_2samp
 
 from posefit.arrays import Array
-from posefit.testing.toy import Toy
 from posefit_swarm import kernels
-from posefit_swarm import swarm as swarm_module
-from posefit_swarm.swarm import SwarmState, speed_limits
 
 OMEGA, ACCELERATION = 0.9, 2.0
 REACH = 0.5  # the largest speed
@@ -93,39 +87,3 @@ def test_a_coordinate_is_out_of_reach_if_no_rand_could_keep_it_in_the_box() -> N
         assert reachable == (min(ends) <= 1.0 and max(ends) >= -1.0)
         found.add(reachable)
     assert found == {False, True}
-
-
-@pytest.fixture
-def swarm(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, int, int], SwarmState]:
-    """Return what makes a swarm whose block of spare numbers serves one particle."""
-    monkeypatch.setattr(swarm_module, "SPARE", 0)
-
-    def make(dimensions: int, count: int, redraws: int) -> SwarmState:
-        space, rng = Toy(dimensions), np.random.default_rng(0)
-        state = SwarmState(space, rng, count, speed_limits(space, REACH, "symmetric"), redraws, "dimension")
-        # 0.95 + 0.3 * 0.1 + 2 rand() * 0.02, twice: uniform from 0.98, in the box if r1 + r2 <= 0.5, 1 in 8
-        state.position[:], state.best[:], state.velocity[:] = 0.95, 0.97, 0.1
-        return state
-
-    return make
-
-
-def test_a_swarm_that_runs_out_of_numbers_draws_more(swarm: Any) -> None:  # Interpretation S7
-    state = swarm(4, 50, 100)
-    state.move(0.3, ACCELERATION, state.best[0])
-    assert len(state._spare) == 2 * 100 * 4
-    assert (state.velocity > 0.0).all()  # so none was stopped
-    assert state.moved.min() >= 0.98
-    assert state.moved.max() <= 1.0
-    assert len(np.unique(state.moved)) == 200
-
-
-def test_a_particle_whose_redraws_all_fail_is_stopped_in_the_box(swarm: Any) -> None:  # Interpretation S7
-    state = swarm(2, 400, 2)
-    state.position[:, 1], state.best[:, 1], state.velocity[:, 1] = 0.0, 0.0, 0.01
-    state.move(0.3, ACCELERATION, state.best[0])
-    stopped = (state.velocity == 0.0).all(axis=1)
-    assert stopped.mean() == pytest.approx((7 / 8) ** 3, abs=0.08)
-    np.testing.assert_array_equal(state.moved[stopped, 0], 1.0)  # clipped
-    np.testing.assert_allclose(state.moved[:, 1], 0.003)  # where it flew
-    assert (state.velocity[~stopped] > 0.0).all()
