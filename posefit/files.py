@@ -50,7 +50,7 @@ def new_folder(path: str | Path) -> AbstractContextManager[Path]:
 
     Raises InputError where `path` exists or cannot be written, a full disk included.
     """
-    return _new(Path(path), _created_folder, shutil.rmtree, Path.rename)
+    return _built(Path(path), check_new, _created_folder, Path.rename)
 
 
 def new_file(path: str | Path) -> AbstractContextManager[Path]:
@@ -58,41 +58,39 @@ def new_file(path: str | Path) -> AbstractContextManager[Path]:
 
     It has the suffix of `path`. Raises InputError where `path` exists or cannot be written, a full disk included.
     """
-    return _new(Path(path), _created, Path.unlink, _named)
+    return _built(Path(path), check_new, _created, _named)
 
 
-@contextmanager
-def _new(
-    target: Path, make: Callable[[Path], Path], remove: Callable[[Path], None], name: Callable[[Path, Path], Any]
-) -> Iterator[Path]:
-    with _as_input_error(target):
-        check_new(target)
-        building = make(target)
-        with _undone(lambda: remove(building)):
-            yield building
-            try:
-                name(building, target)
-            except OSError as error:  # another writer's has come meanwhile
-                if error.errno in _TAKEN:
-                    raise _exists(target) from None
-                raise
-
-
-@contextmanager
-def replaced_file(path: str | Path, mark: bytes) -> Iterator[Path]:
+def replaced_file(path: str | Path, mark: bytes) -> AbstractContextManager[Path]:
     """Yield an empty file to write, which takes the place of an earlier one where nothing fails; else that one stays.
 
     Only a file that begins with `mark` is replaced, and no link. Raises InputError where something else has the name,
     or it cannot be written, a full disk included.
     """
-    target = Path(path)
-    with _as_input_error(target):
+
+    def check(target: Path) -> None:
         if not replaceable(target, mark):
             raise InputError(f"{target}: expected a new name or an earlier file of this kind, got something else")
-        building = _created(target)
-        with _undone(building.unlink):
+
+    return _built(Path(path), check, _created, Path.replace)
+
+
+@contextmanager
+def _built(
+    target: Path, check: Callable[[Path], None], make: Callable[[Path], Path], name: Callable[[Path, Path], Any]
+) -> Iterator[Path]:
+    """Yield what `make` creates beside a target, and give it its name; whatever fails, nothing of it is left."""
+    try:
+        check(target)
+        building = make(target)
+        with _undone(building):
             yield building
-            building.replace(target)
+            try:
+                name(building, target)
+            except OSError as error:  # another writer's has come meanwhile
+                raise _exists(target) if error.errno in _TAKEN else error from None
+    except OSError as error:
+        raise InputError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
 
 
 def replaceable(path: str | Path, mark: bytes) -> bool:
@@ -122,11 +120,10 @@ class Unfinished:
         """Return a new folder, whose mark holds `info`. Raises OSError where there is no room."""
         target.parent.mkdir(parents=True, exist_ok=True)
         path = _created_folder(target)
-        with _undone(lambda: shutil.rmtree(path)):
+        with _undone(path):
             file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
-            with _undone(lambda: os.close(file)):
-                _locked(file)
-                (path / MARK).write_text(json.dumps({"target": target.name, "info": info}), encoding="utf-8")
+            _locked(file)
+            (path / MARK).write_text(json.dumps({"target": target.name, "info": info}), encoding="utf-8")
         return cls(target, path, file, info)
 
     @classmethod
@@ -234,21 +231,13 @@ def create_once(path: Path, content: object) -> bool:
 
 
 @contextmanager
-def _as_input_error(target: Path) -> Iterator[None]:
-    """Raise an error of the operating system as an InputError."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{target}: expected a place to write to, got {error.strerror or error}") from error
-
-
-@contextmanager
-def _undone(remove: Callable[[], None]) -> Iterator[None]:
+def _undone(path: Path) -> Iterator[None]:
+    """Remove a file or a folder where the body fails."""
     try:
         yield
     except BaseException:
         with suppress(OSError):
-            remove()
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
         raise
 
 
@@ -286,7 +275,7 @@ def _named(building: Path, target: Path) -> None:
         raise
     except (OSError, AttributeError, NotImplementedError):
         os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        with _undone(target.unlink):
+        with _undone(target):
             building.replace(target)
     else:
         building.unlink()

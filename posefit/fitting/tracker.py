@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
-from posefit.fitting.check import between, choices, positive, whole
+from posefit.fitting.check import at_least, between, choices, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
@@ -149,22 +149,15 @@ class Prediction:
         if self.variant == "paper":
             for name, value in PAPER.items():
                 object.__setattr__(self, name, value)
-        positive("floor", self.floor)
-        positive("modes_share", self.modes_share)
-        positive("posterior_temperature", self.posterior_temperature)
-        whole("modes", self.modes, 0)
-        if self.relocalise_gap is not None:
-            whole("relocalise_gap", self.relocalise_gap, 0)
-        if not self.spread >= 0.0:
-            raise InputError(f"spread must be 0 or more, got {self.spread}")
-        for name in ("root_range_degrees", "translation_range"):
-            if not (np.isfinite(getattr(self, name)).all() and np.min(getattr(self, name)) >= 0.0):
-                raise InputError(f"{name} must be 0 or more to either side, got {getattr(self, name)}")
-        if not 0.0 < self.tilt_share <= 1.0:
-            raise InputError(f"tilt_share must be above 0 and at most 1, got {self.tilt_share}")
-        if not 0.0 <= self.tilt_margin_degrees < np.inf:
-            raise InputError(f"tilt_margin_degrees must be 0 or more, got {self.tilt_margin_degrees}")
+        for name in ("floor", "modes_share", "posterior_temperature", "tilt_share"):
+            positive(name, getattr(self, name))
+        between("tilt_share", self.tilt_share, 0.0, 1.0)
         between("beta", self.beta, 0.0, 1.0)
+        for name in ("spread", "tilt_margin_degrees", "root_range_degrees", "translation_range"):
+            for value in np.atleast_1d(getattr(self, name)):
+                at_least(name, value, 0.0)
+        whole("modes", self.modes, 0)
+        whole("relocalise_gap", self.relocalise_gap or 0, 0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""

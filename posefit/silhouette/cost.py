@@ -100,11 +100,8 @@ def mean_cost(counts: Areas | Sequence[Areas], silhouettes: Sequence[Silhouette]
 
 
 def mean_over_views(costs: Sequence[Array]) -> Array:
-    """Return the mean (n,) of costs (n,), one array a view. The first of them is overwritten."""
-    total = costs[0]
-    for more in costs[1:]:
-        total += more
-    return total if len(costs) == 1 else total / len(costs)
+    """Return the mean (n,) of costs (n,), one array a view."""
+    return costs[0] if len(costs) == 1 else np.mean(costs, axis=0)
 
 
 def known_views(views: Sequence[T], silhouettes: Sequence[Silhouette]) -> Sequence[T]:

@@ -86,7 +86,7 @@ def test_a_range_is_not_negative(problem: PoseProblem) -> None:
         SearchSpace(space.prior, np.zeros(3), -np.ones(3), space.anchor)
     with pytest.raises(ValueError, match="translation_range must be 3 numbers of 0 or more"):
         SearchSpace(space.prior, np.zeros(3), np.ones(3), space.anchor, translation_range=np.full(3, -0.5))
-    with pytest.raises(ValueError, match="root_range_degrees must be 0 or more to either side"):
+    with pytest.raises(ValueError, match="root_range_degrees must be at least 0, got -15"):
         Prediction(root_range_degrees=(45.0, -15.0, 15.0))
 
 
