@@ -46,6 +46,37 @@ def joint_angles_from_rotation(rotations: Array) -> Array:
     return angles_about(JOINT_ORDER, rotations)[..., ::-1].copy()
 
 
+def along_y(directions: Array) -> Array:
+    """Return rotations (..., 3, 3) that take y to directions (..., 3); any where a direction is 0."""
+    y = np.asarray(directions, dtype=np.float64)
+    length = np.linalg.norm(y, axis=-1, keepdims=True)
+    y = np.where(length > 0.0, y, (0.0, 1.0, 0.0)) / np.where(length > 0.0, length, 1.0)
+    x = np.cross(y, np.where(np.abs(y[..., 2:]) < 0.9, (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def quaternions(rotations: Array) -> Array:
+    """Return unit quaternions (T, 4) x, y, z, w of successive rotations (T, 3, 3), each on the side of the one before.
+
+    The largest of the four numbers comes from the diagonal, so that none is divided by a small one.
+    """
+    flat = rotations.reshape(-1, 9)
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = flat.T
+    rows = [
+        [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
+        [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
+        [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
+        [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
+    ]
+    products = np.moveaxis(np.array(rows), -1, 0)  # 4 times the products of each two numbers
+    largest = np.diagonal(products, axis1=1, axis2=2).argmax(axis=1)
+    chosen = products[np.arange(len(flat)), largest]
+    chosen /= np.linalg.norm(chosen, axis=1, keepdims=True)
+    turned = np.where((chosen[1:] * chosen[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    return np.asarray(chosen * np.cumprod(np.append(1.0, turned))[:, None])
+
+
 def wrapped(angles: Array) -> Array:
     """Return angles brought to [-pi, pi). Interpretation S13."""
     angles = np.asarray(angles, dtype=np.float64)

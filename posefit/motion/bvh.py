@@ -15,13 +15,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.rotation import (
-    angles_about,
-    joint_angles_from_rotation,
-    root_angles_from_rotation,
-    rotation_from_joint_angles,
-    rotation_from_root_angles,
-)
+from posefit.geometry.rotation import angles_about, joint_angles_from_rotation, root_angles_from_rotation
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
 from posefit.motion.amc import SIZE_LIMIT, VALUES
 from posefit.motion.asf import LARGEST, checked_unit, lines_of, mistake
@@ -169,13 +163,6 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
     Joint names are those of the CMU conversions, as `read_bvh` takes them. Angles are counted in other axes there, so
     the poses that come back differ, and the joints do not.
     """
-    axes = motion.skeleton.axes
-    rotations = np.tile(np.eye(3), (len(JOINTS), len(motion), 1, 1))
-    rotations[0] = rotation_from_root_angles(motion.poses[:, :3])
-    for joint in range(1, len(JOINTS)):
-        if joint not in ENDS:
-            turned = rotation_from_joint_angles(motion.poses[:, angle_index(joint) : angle_index(joint) + 3])
-            rotations[joint] = axes[joint - 1] @ turned @ axes[joint - 1].T
     lines, order = ["HIERARCHY"], []
 
     def visit(joint: int, depth: int) -> None:
@@ -194,7 +181,9 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
         lines.append(f"{tab}}}")
 
     visit(0, 0)
-    angles = np.degrees(angles_about((2, 0, 1), rotations[order]))  # ZXY; at a gimbal lock any of the solutions will do
+    angles = np.degrees(
+        angles_about((2, 0, 1), motion.turns()[order])
+    )  # ZXY; at a gimbal lock any of the solutions will do
     angles = np.swapaxes(angles.reshape(len(order), len(motion), 3), 0, 1).reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
     lines += [_plain(row) for row in np.hstack([motion.translations, angles])]

@@ -36,9 +36,10 @@ from posefit.uncertainty.calibration import LEVELS
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import Posterior
 
-_MOTION_FILES = ("poses.npz", "track.amc", "skeleton.asf", "track.bvh", "track.trc", "camera.json", "track.c3d")
-_TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json")
-FILES = (*_MOTION_FILES, *_TABLES, "overlay.mp4", "summary.png", "track.html")
+_MOTION_FILES = ("poses.npz", "track.amc", "skeleton.asf", "track.bvh", "track.glb", "track.trc", "track.c3d")
+_OPENSIM = ("track.mot", "model.osim")
+_TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json", "camera.json")
+FILES = (*_MOTION_FILES, *_OPENSIM, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 # The arrays of a recorded frame: their shape, -1 for any, and whether they may be missing
@@ -322,6 +323,8 @@ def _write_formats(
     from posefit.motion.amc import write_amc
     from posefit.motion.asf import write_asf
     from posefit.motion.bvh import write_bvh
+    from posefit.motion.gltf import write_glb
+    from posefit.motion.opensim import write_mot, write_osim
 
     estimate = motion_of(scene, frames)
     np.savez_compressed(
@@ -338,6 +341,9 @@ def _write_formats(
     write_asf(folder / "skeleton.asf", estimate.skeleton)
     write_amc(folder / "track.amc", estimate)
     write_bvh(folder / "track.bvh", estimate)
+    write_glb(folder / "track.glb", estimate, scene.body.radii)
+    write_osim(folder / "model.osim", scene.body, PLACES)
+    write_mot(folder / "track.mot", estimate)
     blank = unseen(rows)
     gait = gait_of(estimate, blank)
     write_trc(folder / "track.trc", estimate, blank)

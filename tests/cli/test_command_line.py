@@ -29,8 +29,8 @@ from tests.plugins.test_registry import point
 FEW = ["--population-size", "10", "--iterations", "4"]
 QUICK = [*FEW, "--size", "120x90"]
 FILES = {
-    "poses.npz", "track.amc", "track.bvh", "track.trc", "track.c3d", "angles.csv", "gait.csv", "skeleton.asf",
-    "camera.json", "frames.csv", "summary.json", "overlay.mp4", "summary.png", "track.html",
+    "poses.npz", "track.amc", "track.bvh", "track.trc", "track.c3d", "track.glb", "track.mot", "model.osim",
+    "angles.csv", "gait.csv", "skeleton.asf", "camera.json", "frames.csv", "summary.json", "overlay.mp4", "summary.png", "track.html",
 }  # fmt: skip
 TIMES = {"seconds_per_frame", "cpu_seconds_per_frame", "evaluations_per_second"}
 KEYS = TIMES | {

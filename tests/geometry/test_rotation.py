@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import (
+    along_y,
     geodesic,
     joint_angles_from_rotation,
+    quaternions,
     root_angles_from_rotation,
     rotation_from_joint_angles,
     rotation_from_root_angles,
@@ -86,3 +89,20 @@ def test_wrapping_by_hand() -> None:
     np.testing.assert_allclose(
         np.degrees(wrapped(angles)), [0.0, -180.0, -180.0, -170.0, 170.0, -180.0, 5.0], atol=1e-9
     )
+
+
+def test_quaternions_are_scipys_and_do_not_jump() -> None:
+    turns = np.linspace(0.0, 4.0 * np.pi, 33)[:, None] * [0.6, 0.0, -0.8]  # twice around, through half turns
+    rotations = Rotation.from_rotvec(turns).as_matrix()
+    found = quaternions(rotations)
+    np.testing.assert_allclose(Rotation.from_quat(found).as_matrix(), rotations, atol=1e-12)
+    assert np.linalg.norm(np.diff(found, axis=0), axis=1).max() < 0.2
+
+
+def test_y_is_taken_to_any_direction() -> None:
+    directions = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, -3.0], [1.0, -1.0, 0.5], [0.0, 0.0, 0.0]])
+    rotations = along_y(directions)
+    np.testing.assert_allclose(np.linalg.det(rotations), 1.0)
+    np.testing.assert_allclose(rotations @ np.swapaxes(rotations, -1, -2), np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
+    lengths = np.linalg.norm(directions, axis=1)
+    np.testing.assert_allclose(lengths[:, None] * rotations[..., 1], directions, atol=1e-12)
