@@ -86,7 +86,7 @@ class _Buffer:
         view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": raw.nbytes}
         self.views.append(view if target is None else {**view, "target": target})
         kind = "SCALAR" if indices or raw.shape[1] == 1 else f"VEC{raw.shape[1]}"
-        accessor = {"bufferView": len(self.views) - 1, "componentType": SHORT if indices else FLOAT}
+        accessor: dict[str, Any] = {"bufferView": len(self.views) - 1, "componentType": SHORT if indices else FLOAT}
         accessor |= {"count": len(raw), "type": kind}
         if bounds:
             accessor |= {"min": raw.min(axis=0).tolist(), "max": raw.max(axis=0).tolist()}

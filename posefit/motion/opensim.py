@@ -138,7 +138,7 @@ def _limits(name: str, skeleton: Skeleton) -> Iterable[float]:
     angle = coordinates(skeleton).get(name, 0)
     if skeleton.limits is None or angle < 3:
         return (-10.0, 10.0) if name in _ROOT[3:] else (-2.0 * np.pi, 2.0 * np.pi)
-    return skeleton.limits[angle - 3]
+    return map(float, skeleton.limits[angle - 3])
 
 
 def _frame(parent: Element, name: str, of: str, at: Array, axes: Array) -> Element:
