@@ -19,6 +19,7 @@ RIVAL_AREA = 0.4  # of the largest person's area: something so large may be anot
 ABOVE_GAP = 0.3  # of the height of both: parts of a person that stand above each other are no farther apart
 MERGED_AREA = 1.5  # times the typical area: two people who touch
 MEMORY = 0.8  # of the last step and area that is kept with each frame
+CUT_SHOWN = 0.5  # of the person's area: where the picture's edge leaves less of it, there is too little to search
 LEAP = 1.0  # times the height: farther than a person goes in a frame
 
 
@@ -26,14 +27,16 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
     """Return the masks of one person, and warnings; the bits of `masks` are overwritten.
 
     The largest person of the first frame that shows one is followed, then the nearest to their last place. Frames that
-    show no person before a background are not usable. Holes of at most the share `holes` of the person are filled.
-    Raises InputError naming the first mask where no frame shows a person.
+    show no person before a background are not usable, nor are those in which the picture's edge leaves only a little
+    of the person. Holes of at most the share `holes` of the person are filled. Raises InputError naming the first mask
+    where no frame shows a person.
     """
     warnings = []
     inverted = _is_inverted(masks)
     if inverted:
         warnings.append(f"{name}: most of the border is marked, so that the masks seem inverted: they are turned round")
     usable, crowded, follower = np.zeros(len(masks), dtype=bool), 0, _Follower()
+    areas, cut = np.zeros(len(masks)), np.zeros(len(masks), dtype=bool)
     for k in range(len(masks)):
         silhouette = masks.silhouette(k)
         if inverted:
@@ -45,6 +48,7 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
             crowded += len(people) > 1
             mask = people[follower.next(people, masks.names[k])]
             mask = without_holes(mask, HOLE if holes is None else holes) & silhouette.valid
+            areas[k], cut[k] = mask.sum(), any(edge.any() for edge in (mask[0], mask[-1], mask[:, 0], mask[:, -1]))
         else:
             follower.skip()
         masks.masks[k] = np.packbits(mask)
@@ -58,6 +62,9 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
             f"{name}: several people in {crowded} of {len(masks)} masks; the largest of the first is followed, then "
             f"the nearest to the last{leaps}"
         )
+    whole = np.flatnonzero(usable & ~cut)
+    for k in np.flatnonzero(usable & cut) if len(whole) else ():
+        usable[k] = areas[k] >= CUT_SHOWN * areas[whole[np.abs(whole - k).argmin()]]
     return replace(masks, usable=usable), warnings
 
 

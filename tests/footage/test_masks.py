@@ -241,6 +241,17 @@ def blob(*middles: tuple[int, int], wide: int = 16, tall: int = 60) -> Any:
     return mask
 
 
+def test_a_frame_that_the_edge_leaves_little_of_is_not_usable(tmp_path: Path) -> None:
+    masks = np.zeros((5, 40, 60), dtype=bool)
+    for k, left in enumerate((30, 40, 52, 55, 57)):  # ten columns wide: 10, 10, 8, 5 and 3 of them in the picture
+        masks[k, 10:34, left : left + 10] = True
+    read_, _ = read(folder(tmp_path / "out", 255 * masks.astype(np.uint8)))
+    assert read_.usable.tolist() == [True, True, True, True, False]
+    bust = np.pad(masks[:, 10:34], ((0, 0), (16, 0), (0, 0)))  # cut by the lower edge in all of them
+    read_, _ = read(folder(tmp_path / "bust", 255 * bust.astype(np.uint8)))
+    assert read_.usable.all()
+
+
 def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Path) -> None:
     walker, stander = [(40 + 4 * k, 60) for k in range(25)], (100, 58)
     masks = [blob(place, tall=64) | blob(stander) for place in walker]  # they touch for a while
