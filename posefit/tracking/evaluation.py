@@ -151,9 +151,9 @@ def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> 
     measures = {
         "coverage": _by_level(inside),
         "interval_mm": _by_level(radii_mm),
-        "unknown_rate": _mean(sides),
-        "swapped_known_rate": None if swapped is None else _mean(swapped[sides == 0.0]),
-        "lost_said_rate": _mean((lost[np.isfinite(lost)] >= LOST).astype(np.float64)),
+        "unknown_rate": mean_known(sides),
+        "swapped_known_rate": None if swapped is None else mean_known(swapped[sides == 0.0]),
+        "lost_said_rate": mean_known((lost[np.isfinite(lost)] >= LOST).astype(np.float64)),
     }
     return {"unknown_sides": sides, "lost": lost}, measures
 
@@ -167,8 +167,8 @@ def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
 def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     """Return the measures of how joints accelerate and standing feet slide."""
     joints, fps = motion_of(scene, frames).joints, scene.fps
-    mean, true_joints = _mean(acceleration(joints, fps)), None if scene.truth is None else scene.truth.joints
-    true_mean = None if true_joints is None else _mean(acceleration(true_joints, fps))
+    mean, true_joints = mean_known(acceleration(joints, fps)), None if scene.truth is None else scene.truth.joints
+    true_mean = None if true_joints is None else mean_known(acceleration(true_joints, fps))
     slid = slides(joints, standing(joints if true_joints is None else true_joints, fps))
     return {
         "acceleration": mean,
@@ -177,7 +177,7 @@ def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     }
 
 
-def _mean(values: Array) -> float | None:
+def mean_known(values: Array) -> float | None:
     """Return the mean of what is known of values (T,); None where nothing is."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else None

@@ -16,13 +16,7 @@ from posefit.tracking.outputs import Output
 from posefit.tracking.restarts import GAP, SEARCHED, RelocalisingTracker, initial_guess, retrack_spins, stream
 from posefit.tracking.trajectory import trajectory_cost, typical_speed, with_total_effort
 
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """A track from one initial guess."""
-
-    guess: str
-    frames: list[Frame] = field(repr=False)
+Hypothesis = tuple[str, list[Frame]]  # a track from one initial guess, and what that is called
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +36,7 @@ def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, 
     for number in range(total):
         name, task = SEARCHED, guess.task
         if number:
-            first = _first_usable(scene, hypotheses[0].frames)
+            first = _first_usable(scene, hypotheses[0][1])
             name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", first)
         frames = list(earlier[number * count : (number + 1) * count])
         rng = stream(options.seed, "hypothesis", number) if number else np.random.default_rng(options.seed)
@@ -55,7 +49,7 @@ def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, 
             task = replace(task, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(frames))
         elif which and not frames:
             progress.log(f"track {number + 1} of {total}: {name}")
-        hypotheses.append(Hypothesis(name, frames))
+        hypotheses.append((name, frames))
         if len(frames) < count:
             rest = (scene.observations[k] for k in range(len(frames), count))
             for frame in progress.steps(tracker_of(method, scene, task).track(rest, rng), count - len(frames)):
@@ -89,14 +83,14 @@ def retrack(
 def _cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], task: Task) -> tuple[list[Frame], list[dict[str, Any]]]:
     """Return the frames of the hypothesis whose trajectory costs least, and of several what the summary holds."""
     if len(hypotheses) == 1:
-        return hypotheses[0].frames, []
+        return hypotheses[0][1], []
     usable, speed = [observation.usable for observation in scene.observations], typical_speed(task.training)
-    tracks = [hypothesis.frames for hypothesis in hypotheses]
+    tracks = [frames for _, frames in hypotheses]
     costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
     kept = min(range(len(costs)), key=lambda k: costs[k].total)
     table = [
-        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == kept}
-        for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
+        {"guess": guess, "cost": cost.cost, "motion": cost.motion, "kept": k == kept}
+        for k, ((guess, _), cost) in enumerate(zip(hypotheses, costs, strict=True))
     ]
     return with_total_effort(tracks, kept), table
 

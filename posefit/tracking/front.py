@@ -17,7 +17,7 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
-from posefit.tracking.identity import ArgumentDigest
+from posefit.tracking.identity import Digest, digest_of
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
 from posefit.tracking.outputs import Output, OutputFolder
@@ -134,13 +134,13 @@ def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage])
         raise InputError("restarts must be at least 1 for a motion, where it is 1 by default, got 0")
 
 
-def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]) -> dict[str, ArgumentDigest]:
+def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]) -> dict[str, Digest]:
     """Return what a track must have in common with one that it goes on with."""
     values = {option.name: getattr(options, option.name) for option in fields(options) if declared(option).identifies}
     values |= {"source": sources, "train": train, "version": __version__}
     named = kind_of(sources[0]) == "motion" and sources[0] in built_in.names()  # a folder of that name is not read
     return {
-        name: ArgumentDigest.of(value, files=name in _FILES and not (named and name == "source"))
+        name: digest_of(value, files=name in _FILES and not (named and name == "source"))
         for name, value in values.items()
     }
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,29 +13,19 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.reading import cut
 
-
-@dataclass(frozen=True)
-class ArgumentDigest:
-    """One argument of a track: its text in a message, and the SHA-256 of its content."""
-
-    text: str
-    digest: str
-
-    @classmethod
-    def of(cls, value: Any, files: bool = False) -> "ArgumentDigest":
-        """Return what a value is; with `files`, a text that names a file or folder is what that holds."""
-        content = json.dumps(_plain(value, files), sort_keys=True, separators=(",", ":"))
-        return cls(cut(repr(value)), hashlib.sha256(content.encode()).hexdigest())
-
-    def as_json(self) -> dict[str, str]:
-        """Return it as JSON holds it."""
-        return {"text": self.text, "digest": self.digest}
+Digest = dict[str, str]  # of one argument of a track: its "text" in a message, the SHA-256 of its content as "digest"
 
 
-def difference(before: Mapping[str, Mapping[str, str]], now: Mapping[str, ArgumentDigest]) -> str | None:
+def digest_of(value: Any, files: bool = False) -> Digest:
+    """Return what a value is; with `files`, a text that names a file or folder is what that holds."""
+    content = json.dumps(_plain(value, files), sort_keys=True, separators=(",", ":"))
+    return {"text": cut(repr(value)), "digest": hashlib.sha256(content.encode()).hexdigest()}
+
+
+def difference(before: Mapping[str, Digest], now: Mapping[str, Digest]) -> str | None:
     """Return a sentence about the first argument in which two tracks differ, or None where there is none."""
     for name in sorted(before.keys() | now.keys()):
-        earlier, later = before.get(name, {}), now[name].as_json() if name in now else {}
+        earlier, later = before.get(name, {}), now.get(name, {})
         expected, came = earlier.get("text"), later.get("text")
         if earlier.get("digest") != later.get("digest"):
             if expected == came:

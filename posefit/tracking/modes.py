@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import tee
 from typing import Self, cast
 
 import numpy as np
@@ -71,47 +72,32 @@ def further(
     temperature: float,
 ) -> tuple[Posterior, int]:
     """Return the posterior of a problem after a first search, by so many more, and the evaluations that it took."""
-    spared = int(OTHER_SEARCHES * evaluations)
-    others = elsewhere(problem, make, spared, rng, min(searches, spared // MIN_EVALUATIONS))
+    anywhere, others, left = replace(problem.space, start=None), list[Searched](), int(OTHER_SEARCHES * evaluations)
+    count = min(searches, left // MIN_EVALUATIONS)
+    for k in range(count):
+        with suppress(BudgetError):  # a part that does not hold a population is left to those that come after
+            others.append(search(problem, make(anywhere, rng), left // (count - k)))
+            left -= len(others[-1][1])
     used = sum(len(costs) for _, costs in others)
     landscape = Landscape(problem.space, problem.evaluate)
     symmetric = symmetric_proposals(problem, first[0][np.nanargmin(first[1])])
     searched = [first, *others, *([(symmetric, landscape.costs(symmetric))] if len(symmetric) else [])]
     left = evaluations - used - landscape.evaluations
     sample = weighed(landscape, searched, temperature, rng, evaluations=left)
-    return _posterior_of(problem, *sample.even(POSTERIOR_POSES, rng)), used + landscape.evaluations
-
-
-def elsewhere(
-    problem: PoseProblem, make: MakeOptimiser, evaluations: int, rng: np.random.Generator, searches: int
-) -> list[Searched]:
-    """Return what several searches evaluated that start anywhere in the problem's space, and share a budget.
-
-    One whose part does not hold a population leaves it to those that come after.
-    """
-    anywhere, searches_done, left = replace(problem.space, start=None), list[Searched](), evaluations
-    for k in range(searches):
-        with suppress(BudgetError):
-            searches_done.append(search(problem, make(anywhere, rng), left // (searches - k)))
-            left -= len(searches_done[-1][1])
-    return searches_done
+    proposals, weights = sample.even(POSTERIOR_POSES, rng)
+    return Posterior(*problem.decode(proposals), weights), used + landscape.evaluations
 
 
 def search(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> Searched:
     """Return all proposals (n, d) that an optimiser had evaluated within a budget, and their costs (n,)."""
-    return gathered(
-        [(np.array(proposals), costs) for proposals, costs in populations(optimiser, problem.evaluate, evaluations)]
-    )
+    found = populations(optimiser, problem.evaluate, evaluations)
+    return gathered([(np.array(proposals), costs) for proposals, costs in found])
 
 
 def gathered(populations: list[Searched]) -> Searched:
     """Return the populations of a search as one."""
     proposals, costs = zip(*populations, strict=True)
     return np.concatenate(proposals), np.concatenate(costs)
-
-
-def _posterior_of(problem: PoseProblem, proposals: Array, weights: Array) -> Posterior:
-    return Posterior(*problem.decode(proposals), weights)
 
 
 def symmetric_proposals(problem: PoseProblem, proposal: Array) -> Array:
@@ -160,35 +146,37 @@ class WeighingTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation."""
+        shown, coming = tee(observations)
         record = _Record(self.tracker.make)
-        following = replace(self.tracker, make=record.begin)
-        for frame in following.track(record.noted(observations), rng):
-            assert record.observation is not None
-            yield self._with_posterior(frame, record, rng) if record.observation.usable else frame
+        following = replace(self.tracker, make=record.begin).track(coming, rng)
+        for frame, observation in zip(following, shown, strict=False):
+            if not observation.usable:
+                yield frame
+                continue
+            start, cpu_start = time.perf_counter(), time.process_time()
+            posterior, more = self._posterior(observation, record, rng)
+            yield replace(
+                frame,
+                posterior=posterior,
+                lost=float(lost_probability(np.array(frame.cost))),
+                evaluations=frame.evaluations + more,
+                seconds=frame.seconds + time.perf_counter() - start,
+                cpu_seconds=None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - cpu_start,
+            )
 
-    def _with_posterior(self, frame: Frame, record: "_Record", rng: np.random.Generator) -> Frame:
-        start, cpu_start = time.perf_counter(), time.process_time()
-        posterior, more = self._posterior(record, rng)
-        frame = replace(frame, posterior=posterior, lost=float(lost_probability(np.array(frame.cost))))
-        return replace(
-            frame,
-            evaluations=frame.evaluations + more,
-            seconds=frame.seconds + time.perf_counter() - start,
-            cpu_seconds=None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - cpu_start,
-        )
-
-    def _posterior(self, record: "_Record", rng: np.random.Generator) -> tuple[Posterior, int]:
+    def _posterior(
+        self, observation: Observation, record: "_Record", rng: np.random.Generator
+    ) -> tuple[Posterior, int]:
         """Return the posterior of a frame, and how many evaluations it took."""
         how, evaluations = self.tracker.prediction, self.tracker.task.evaluations
-        assert record.observation is not None
-        problem = self.tracker.problem(cast(SearchSpace, record.space), record.observation)
+        problem = self.tracker.problem(cast(SearchSpace, record.space), observation)
         if how.modes == 1 and self.tracker.next_frame == "carry":
             particles, costs = record.evaluated[-1]
             weights = boltzmann_weights(costs, how.posterior_temperature)
             if len(particles) > POSTERIOR_POSES:  # some of equal weight
                 particles = particles[systematic_rows(weights, 0.5, POSTERIOR_POSES)]
                 weights = np.full(POSTERIOR_POSES, 1.0 / POSTERIOR_POSES)
-            return _posterior_of(problem, particles, weights), 0
+            return Posterior(*problem.decode(particles), weights), 0
         own = independent(rng)  # the track is the same as without
         first, more = gathered(record.evaluated), round(how.modes_share * evaluations)
         return further(problem, self.tracker.make, first, more, own, how.modes - 1, how.posterior_temperature)
@@ -199,33 +187,20 @@ class _Record:
 
     def __init__(self, make: MakeOptimiser) -> None:
         self._make = make
-        self.observation: Observation | None = None
-
-    def noted(self, observations: Iterable[Observation]) -> Iterator[Observation]:
-        """Yield the observations, and keep the latest."""
-        for observation in observations:
-            self.observation = observation
-            yield observation
 
     def begin(self, space: Space, rng: np.random.Generator) -> Self:
         """Return this record as the optimiser of a search."""
-        self._open(space)
-        self._optimiser: Optimiser = self._make(space, rng)
+        self.space, self.evaluated = space, list[Searched]()
+        self._optimiser = self._make(space, rng)
+        self.ask = self._optimiser.ask
         return self
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
-        self._open(space)
+        self.space, self.evaluated = space, []
         cast(Filter, self._optimiser).advance(space)
-
-    def ask(self) -> Array:
-        """Return the optimiser's next population."""
-        return self._optimiser.ask()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Keep the costs, and pass them on."""
         self.evaluated.append((np.array(proposals), np.array(costs)))
         self._optimiser.tell(proposals, costs)
-
-    def _open(self, space: Space) -> None:
-        self.space, self.evaluated = space, list[Searched]()

@@ -24,7 +24,7 @@ from posefit.footage.video import VideoWriter
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.reading import SHOWN, cut, quoted
 from posefit.tracking.evaluation import unseen
-from posefit.tracking.identity import ArgumentDigest, difference
+from posefit.tracking.identity import Digest, difference
 from posefit.tracking.measures import Rows
 from posefit.tracking.page import track_document
 from posefit.tracking.page.content import track_data
@@ -86,7 +86,7 @@ class OutputFolder(Output):
         path: str | Path,
         force: bool,
         resume: bool,
-        spec: Mapping[str, ArgumentDigest],
+        spec: Mapping[str, Digest],
         say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
@@ -117,12 +117,11 @@ class OutputFolder(Output):
         return place
 
     def __enter__(self) -> Self:
-        arguments = {name: digest.as_json() for name, digest in self._spec.items()}
         try:
             if self._place is None:
                 for earlier in Unfinished.interrupted(self.path):
                     earlier.remove(_MINE)
-                self._place = Unfinished.begin(self.path, arguments)
+                self._place = Unfinished.begin(self.path, self._spec)
             self._building = self._place.path
         except OSError as error:
             raise InputError(f"{self.path}: expected a place to write to, got {error.strerror}") from None

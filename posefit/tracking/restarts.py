@@ -9,17 +9,16 @@
 | with several passes | `smoothing.smooth`: all frames again, their path known | the new one, if about as cheap |
 """
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import copy, deepcopy
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import chain, islice, tee
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.check import whole
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
@@ -28,7 +27,7 @@ from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, r
 from posefit.motion.motion import Motion
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
-from posefit.tracking.trajectory import cheaper, effort_of, mean_cost, with_total_effort
+from posefit.tracking.trajectory import effort_of, mean_cost, with_total_effort
 
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026}  # part of the seed of what is tracked again
 RESTARTS = 8  # searches of the first frame
@@ -55,9 +54,7 @@ def stream(seed: int, kind: Literal["hypothesis", "spin", "pass"], number: int) 
 
 def independent(rng: np.random.Generator) -> np.random.Generator:
     """Return a generator that is seeded by what another one would draw next, which stays as it is."""
-    bits = type(rng.bit_generator)(0)
-    bits.state = rng.bit_generator.state
-    return np.random.default_rng(np.random.Generator(bits).integers(0, 2**63, 4))
+    return np.random.default_rng(deepcopy(rng).integers(0, 2**63, 4))
 
 
 # Before the first frame.
@@ -97,7 +94,7 @@ def best_restart(
         least = _trial_cost(list(follow(on, shown, np.random.default_rng([*prefix, restarts + 1]))))
     for k in range(restarts):
         frames = list(follow(trial, shown, np.random.default_rng([*prefix, k])))
-        if cheaper(cost := _trial_cost(frames), least):
+        if (cost := _trial_cost(frames)) < least:
             best, least = frames[0], cost
     if best is None:
         return going_on or task
@@ -148,37 +145,32 @@ class RelocalisingTracker:
     follow: Follow
     gap: int = GAP
 
-    def __post_init__(self) -> None:
-        whole("gap", self.gap, 1)
-
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation."""
-        history, coming = _History(self.task, self.gap), _LookAhead(observations)
-        going = self.follow(self.task, coming.rest(), rng)
-        while shown := coming.peek(1):
+        coming, rest = tee(observations)
+        history, going = _History(self.task, self.gap), self.follow(self.task, rest, rng)
+        for observation in coming:
             tried: list[Frame] = []
-            relocalised: bool | None = None
-            if shown[0].usable and history.is_lost:
-                window = coming.peek((TRIAL_FRAMES - 1) * TRIAL_STRIDE + 1)
-                task = self._relocalise(history, window, tried, independent(rng))
+            relocalised = False
+            if observation.usable and (latest := history.lost_after()) is not None:
+                window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]
+                task = self._relocalise(latest, window, tried, independent(rng))
                 if relocalised := task is not None:
-                    going = self.follow(task, coming.rest(), rng)
-                history.forget()
+                    going = self.follow(task, chain([observation], copy(coming)), rng)
             if (frame := next(going, None)) is None:
                 return
-            coming.drop()
-            history.add(frame, shown[0].usable)
-            yield frame if relocalised is None else _with_effort(frame, tried, relocalised)
+            if tried:
+                frame = _with_effort(frame, tried, relocalised)
+            history.add(frame, observation.usable)
+            yield frame
         yield from going  # none: the tracker gets to its end
 
     def _relocalise(
-        self, history: "_History", coming: list[Observation], tried: list[Frame], rng: np.random.Generator
+        self, latest: Frame, coming: list[Observation], tried: list[Frame], rng: np.random.Generator
     ) -> Task | None:
         """Return the task to go on with; None where the track is best as it is. `tried` gets every frame tried."""
-        latest = history.latest
-        assert latest is not None
         around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
-        on = replace(around, yaw=float(latest.pose[0]), first_pose=latest.pose[3:], before=(latest,))
+        on = _after(around, latest)
 
         def counted(task: Task, shown: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
             for frame in self.follow(task, shown, rng):
@@ -197,67 +189,31 @@ def _with_effort(frame: Frame, tried: Sequence[Frame], relocalised: bool) -> Fra
 
 
 class _History:
-    """The latest frame of a track that showed the person, and the costs of its frames."""
+    """The latest frame of a track that showed the person, and the costs of its frames since it relocalised."""
 
     def __init__(self, task: Task, gap: int) -> None:
-        self._gap = gap
+        self._gap, self._unseen, self._costs = gap, 0, list[float]()
         self._typical = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
         self._high = max(round(HIGH_COST_SECONDS * task.fps), 1)
         self.latest: Frame | None = None
-        self.forget()
         if len(task.before) > 1:  # a single one is what the track was begun with
             for frame in task.before:
                 self.add(frame, frame.evaluations > 0)
 
-    def forget(self) -> None:
-        """Learn the typical cost from the next frames on."""
-        self._unseen, self._costs = 0, list[float]()
-
     def add(self, frame: Frame, usable: bool) -> None:
         """Add a frame that was estimated, or held where the observation was not usable."""
         if RELOCALISED in frame.details:
-            self.forget()
+            self._costs = []
         self._unseen = 0 if usable else self._unseen + 1
         if usable:
             self.latest = frame
             self._costs.append(frame.cost)
 
-    @property
-    def is_lost(self) -> bool:
-        """Whether the person was away for the gap, or costs have been high for long enough."""
-        if self.latest is None:
-            return False
-        if self._unseen >= self._gap:
-            return True
+    def lost_after(self) -> Frame | None:
+        """Return the latest frame where the person was away for the gap since, or costs have been high; else None."""
         typical, high = self._costs[: -self._high], self._costs[-self._high :]
-        return len(typical) >= self._typical and min(high) > COST_RISE * float(np.median(typical))
-
-
-class _LookAhead:
-    """Observations that may be read before they are taken."""
-
-    def __init__(self, observations: Iterable[Observation]) -> None:
-        self._rest = iter(observations)
-        self._buffer: deque[Observation] = deque()
-        self._first = 0
-
-    def peek(self, count: int) -> list[Observation]:
-        """Return the next so many, or as many as there are."""
-        while len(self._buffer) < count and (one := next(self._rest, None)) is not None:
-            self._buffer.append(one)
-        return list(self._buffer)[:count]
-
-    def drop(self) -> None:
-        """Take the next one."""
-        self._buffer.popleft()
-        self._first += 1
-
-    def rest(self) -> Iterator[Observation]:
-        """Yield those from here on, whether they are taken meanwhile or not."""
-        number = self._first
-        while len(self.peek(number - self._first + 1)) > number - self._first:
-            yield self._buffer[number - self._first]
-            number += 1
+        costly = len(typical) >= self._typical and min(high) > COST_RISE * float(np.median(typical))
+        return self.latest if costly or self._unseen >= self._gap else None
 
 
 # Several hypotheses.
@@ -318,8 +274,8 @@ def retrack_spins(
     ahead = list(follow(sure, (observations[k] for k in range(start, len(frames))), stream(seed, "spin", 0)))
     behind = list(follow(back, (observations[k] for k in range(start, -1, -1)), stream(seed, "spin", 1)))
     again = [*_joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
-    better = _spin_count(task, again, usable) < before
-    better = better and cheaper(mean_cost(again, usable), mean_cost(frames, usable), SPIN_TOLERANCE)
+    cheap = mean_cost(again, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
+    better = cheap and _spin_count(task, again, usable) < before
     return with_total_effort([frames, again], int(better)), start if better else None
 
 

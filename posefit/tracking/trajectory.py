@@ -43,11 +43,6 @@ def motion_of(scene: Scene, frames: Sequence[Frame]) -> Motion:
     return Motion(scene.name, scene.body.skeleton, poses, places, scene.fps)
 
 
-def cheaper(cost: float, than: float, tolerance: float = 1.0) -> bool:
-    """Return whether a later trajectory replaces an earlier one: it costs less than so many times as much."""
-    return cost < tolerance * than
-
-
 def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
     """Return the mean cost of the frames that show enough of the person; of all frames where none does."""
     costs = np.array([frame.cost for frame in frames])

@@ -21,7 +21,7 @@ from posefit.motion.steadiness import BALLS, acceleration, runs, standing
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
-from posefit.tracking.evaluation import LOST
+from posefit.tracking.evaluation import LOST, mean_known
 from posefit.tracking.trajectory import motion_of
 
 SMOOTH_SECONDS = 0.5  # before and after a frame, to which a smooth path is fitted
@@ -34,15 +34,6 @@ def longer_side(mask: Mask) -> int:
     left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
     cut = left == 0 or top == 0 or top + height == len(mask) or left + width == len(mask[0])
     return 0 if cut else max(width, height)
-
-
-def size_ratio(observed: NDArray[np.int64], fitted: NDArray[np.int64]) -> float | None:
-    """Return how large the person looks beside the fitted body, the median; None where nothing can be compared.
-
-    Both are longer sides (n,) in pixels, 0 where they are not known.
-    """
-    both = (observed > 0) & (fitted > 0)
-    return float(np.median(observed[both] / fitted[both])) if both.any() else None
 
 
 def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
@@ -69,27 +60,13 @@ def held_share(usable: NDArray[np.bool_]) -> float:
     return 1.0 - len(known) / float(known[-1] + 1 - known[0]) if len(known) else 1.0
 
 
-def mean_acceleration(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
-    """Return how fast joints (T, 27, 3) accelerate, the mean over usable frames, in m/s2; None where it is unknown."""
-    known = acceleration(joints, fps)[usable]
-    known = known[np.isfinite(known)]
-    return float(known.mean()) if len(known) else None
+def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
+    """Return how far apart in metres the heights are at which feet stand, of joints (T, 27, 3); None of one stance.
 
-
-def foot_share(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
-    """Return the share of usable frames in which a foot stands, of joints (T, 27, 3); None where no frame is usable."""
-    return float(np.any(standing(joints, fps)[usable], axis=1).mean()) if usable.any() else None
-
-
-def stance_spread(joints: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
-    """Return how far apart in metres the heights are at which feet stand (T, 27, 3); None where none stands twice.
-
-    It is the standard deviation over stances of the ball's height, y being up.
+    It is the standard deviation over stances (T, 2) of the ball's height, y being up.
     """
-    stands = standing(joints, fps) & usable[:, None]
-    heights = []
-    for side, ball in enumerate(BALLS):
-        heights += [float(joints[start:stop, ball, 1].mean()) for start, stop in runs(stands[:, side])]
+    each = [(start, stop, ball) for ball, flags in zip(BALLS, stands.T, strict=True) for start, stop in runs(flags)]
+    heights = [joints[start:stop, ball, 1].mean() for start, stop, ball in each]
     return float(np.std(heights)) if len(heights) > 1 else None
 
 
@@ -238,26 +215,26 @@ def trust_of(
     the masks. Shares are of the frames that show enough of the person.
     """
     usable = np.array([row["usable"] == 1.0 for row in rows])
-    shown = [row for row in rows if row["usable"] == 1.0]
-    many = len(shown) >= MIN_FRAMES
-    measured = motion_of(scene, frames).joints, usable, scene.fps
-    camera = scene.cameras[0]
-    depths = (motion_of(scene, tracked).translations @ camera.rotation.T + camera.translation)[:, 2]
+    many = usable.sum() >= MIN_FRAMES
+    joints, camera, stature = motion_of(scene, frames).joints, scene.cameras[0], scene.body.stature
+    stands = standing(joints, scene.fps) & usable[:, None]
+    depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     ratio = _size(scene, frames, usable) if len(scene.cameras) > 1 else None
+    lost, unknown = (np.array([row[name] for row in rows])[usable] for name in ("lost", "unknown_sides"))
     figures: dict[str, Any] = {
-        "frames": len(shown),
+        "frames": int(usable.sum()),
         "size_ratio": ratio,
-        "size_m": None if ratio is None else ratio * scene.body.stature,
-        "height_m": scene.body.stature,
+        "size_m": None if ratio is None else ratio * stature,
+        "height_m": stature,
         "depth_scatter": depth_scatter(depths, usable, scene.fps) if many else None,
-        "foot_share": foot_share(*measured) if many else None,
-        "stance_spread_m": stance_spread(*measured) if many else None,
+        "foot_share": float(stands.any(axis=1)[usable].mean()) if many else None,
+        "stance_spread_m": stance_spread(joints, stands) if many else None,
         "explained": explained_share(scene, frames, usable),
-        "lost": _share(shown, "lost", LOST),
-        "unknown": _share(shown, "unknown_sides", 1.0),
+        "lost": mean_known(np.where(np.isnan(lost), lost, lost >= LOST)),
+        "unknown": mean_known(unknown),
         "held": held_share(usable),
         "iou": iou,
-        "acceleration": mean_acceleration(*measured) if many else None,
+        "acceleration": mean_known(acceleration(joints, scene.fps)[usable]) if many else None,
     }
     signs = signs_against(figures)
     reasons = {
@@ -279,17 +256,11 @@ def trust_of(
 
 
 def _size(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
-    """Return how large the person looks beside the body, over all cameras and frames spread over the footage."""
-    shown = np.flatnonzero(usable).tolist()
-    observed, fitted = [], []
+    """Return how large the person looks beside the body, the median over all cameras and frames over the footage."""
+    shown, ratios = np.flatnonzero(usable).tolist(), []
     for k in shown[:: max(1, len(shown) // SIZED_FRAMES)]:
         for camera, silhouette in zip(scene.cameras, scene.observations[k].silhouettes, strict=True):
-            observed.append(longer_side(silhouette.mask))
-            fitted.append(longer_side(project(scene.body, camera, frames[k].pose, frames[k].translation)))
-    return size_ratio(np.array(observed, dtype=np.int64), np.array(fitted, dtype=np.int64))
-
-
-def _share(rows: Sequence[Mapping[str, float]], name: str, least: float) -> float | None:
-    """Return the share of frames with so much in a column, of those where it is known; None where it is in none."""
-    known = [row[name] for row in rows if not np.isnan(row[name])]
-    return float((np.array(known) >= least).mean()) if known else None
+            observed = longer_side(silhouette.mask)
+            fitted = longer_side(project(scene.body, camera, frames[k].pose, frames[k].translation))
+            ratios += [observed / fitted] if observed and fitted else []
+    return float(np.median(ratios)) if ratios else None

@@ -13,7 +13,7 @@ import numpy as np
 
 from posefit.fitting.tracker import Frame
 from posefit.sweep.log import encoded
-from posefit.tracking.identity import ArgumentDigest
+from posefit.tracking.identity import digest_of
 from posefit.tracking.outputs import OutputFolder
 from posefit.uncertainty.modes import Posterior
 from tests.report.browser import result
@@ -23,7 +23,7 @@ from tests.sweep.fake import cells
 
 _ROW = re.compile(rb'\{"key": "([0-9a-f]{64})", "crc": "[0-9a-f]{8}", "row": (\{.*\})\}')
 _FRAME = re.compile(rb"[0-9a-f]{8} (.*)")
-SPEC = {"seed": ArgumentDigest.of(1), "method": ArgumentDigest.of("sapso@pca")}
+SPEC = {"seed": digest_of(1), "method": digest_of("sapso@pca")}
 NAME = "subject"
 
 

@@ -10,7 +10,7 @@ import pytest
 import posefit
 from posefit.motion import built_in
 from posefit.progress import Progress
-from posefit.tracking.identity import ArgumentDigest
+from posefit.tracking.identity import digest_of
 from tests.cases import each
 
 QUICK: dict[str, Any] = {"method": "sapso", "frames": (0, 8), "size": (120, 90), "evaluations": 200}
@@ -48,15 +48,15 @@ def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
 def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
     first, second = tmp_path / "a.npz", tmp_path / "b"
     first.write_bytes(b"masks")
-    before = ArgumentDigest.of(first, files=True)
-    assert ArgumentDigest.of(str(first), files=True).digest == before.digest
-    assert ArgumentDigest.of(first).digest != before.digest
+    before = digest_of(first, files=True)
+    assert digest_of(str(first), files=True)["digest"] == before["digest"]
+    assert digest_of(first)["digest"] != before["digest"]
     first.write_bytes(b"maskz")
-    assert ArgumentDigest.of(first, files=True).digest != before.digest
+    assert digest_of(first, files=True)["digest"] != before["digest"]
     second.mkdir()
-    empty = ArgumentDigest.of(second, files=True)
+    empty = digest_of(second, files=True)
     (second / "0.png").write_bytes(b"x")
-    assert ArgumentDigest.of(second, files=True).digest != empty.digest
+    assert digest_of(second, files=True)["digest"] != empty["digest"]
 
 
 @each(
@@ -72,8 +72,8 @@ def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
     ],
 )
 def test_different_values_have_different_digests(first: Any, second: Any) -> None:
-    assert ArgumentDigest.of(first).digest == ArgumentDigest.of(first).digest
-    assert ArgumentDigest.of(first).digest != ArgumentDigest.of(second).digest
+    assert digest_of(first)["digest"] == digest_of(first)["digest"]
+    assert digest_of(first)["digest"] != digest_of(second)["digest"]
 
 
 def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:

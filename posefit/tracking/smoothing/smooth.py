@@ -25,7 +25,7 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import stream
 from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
-from posefit.tracking.trajectory import cheaper, mean_cost, motion_of, with_total_effort
+from posefit.tracking.trajectory import mean_cost, motion_of, with_total_effort
 
 PASS_TOLERANCE = 1.125  # times what the pass before costs: a pass that costs more is not kept
 
@@ -67,7 +67,7 @@ def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: Track
         rng = stream(options.seed, "pass", number)
         tracked = list(progress.steps(tracker_of(method, scene, task).track(known, rng), scene.count))
         passes.append(Pass.smoothed(scene, tracked, before.shape, method.beta, number + 1))
-        if cheaper(passes[-1].cost, before.cost, PASS_TOLERANCE):
+        if passes[-1].cost < PASS_TOLERANCE * before.cost:
             kept = number
     return replace(passes[kept], frames=with_total_effort([done.frames for done in passes], kept))
 
