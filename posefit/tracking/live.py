@@ -1,6 +1,7 @@
 """Tracks a person in frames as they come: `posefit track --live`."""
 
 import json
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -140,42 +141,34 @@ def write_live(
     With `out`, a new folder gets frames.jsonl, a line a frame as it comes, and at the end poses.npz, also where the
     stream breaks off. Raises InputError then, after both are written.
     """
-    folder, latencies, last = None if out is None else Path(out), [], 0
+    folder, latencies, last = None if out is None else Path(out), list[float](), -1
     check_free(folder)
     if folder is not None:
         folder.mkdir()
-    lines = None if folder is None else (folder / LINES).open("w", encoding="utf-8")
     try:
-        for live in frames:
-            latencies.append(live.latency)
-            last = live.number
-            if lines is not None:
+        with (Path(os.devnull) if folder is None else folder / LINES).open("w", encoding="utf-8") as lines:
+            for live in frames:
+                latencies.append(live.latency)
+                last = live.number
                 print(json.dumps(live.row), file=lines, flush=True)
-            if on_frame is not None:
-                on_frame(live)
+                if on_frame is not None:
+                    on_frame(live)
     except KeyboardInterrupt:
         pass
     finally:
-        if folder is not None and lines is not None:
-            lines.close()
-            _write_arrays(folder)
+        if folder is not None:
+            rows = [json.loads(line) for line in (folder / LINES).read_text("utf-8").splitlines()]
+            np.savez_compressed(
+                folder / ARRAYS,
+                frames=np.array([row["frame"] for row in rows], dtype=np.int64),
+                seconds=np.array([row["seconds"] for row in rows]),
+                poses=np.radians([row["pose_degrees"] for row in rows]).reshape(-1, 66),
+                translations=np.array([row["translation_m"] for row in rows]).reshape(-1, 3),
+                usable=np.array([row["usable"] for row in rows], dtype=bool),
+            )
     median, slow = np.quantile(latencies, (0.5, 0.99)).tolist() if latencies else (np.nan, np.nan)
     return {
         "frames": len(latencies),
-        "skipped": last + 1 - len(latencies) if latencies else 0,
+        "skipped": last + 1 - len(latencies),
         "latency_ms": {"p50": round(1e3 * median, 1), "p99": round(1e3 * slow, 1)},
     }
-
-
-def _write_arrays(folder: Path) -> None:
-    """Write poses.npz from the lines that were written."""
-    with (folder / LINES).open(encoding="utf-8") as lines:
-        rows = [json.loads(line) for line in lines]
-    np.savez_compressed(
-        folder / ARRAYS,
-        frames=np.array([row["frame"] for row in rows], dtype=np.int64),
-        seconds=np.array([row["seconds"] for row in rows]),
-        poses=np.radians([row["pose_degrees"] for row in rows]).reshape(-1, 66),
-        translations=np.array([row["translation_m"] for row in rows]).reshape(-1, 3),
-        usable=np.array([row["usable"] for row in rows], dtype=bool),
-    )

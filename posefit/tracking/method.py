@@ -169,27 +169,23 @@ def parsed_settings(
     in use or a setting that it does not know, or where a value does not fit.
     """
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
-    texts = not isinstance(given, Mapping)
     for item in given:
-        left, equals, value = item.partition("=") if texts else (item, "=", None)
+        left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
         name, dot, setting = left.partition(".")
         if not (equals and dot):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
-            raise InputError(
-                f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(item)}"
-            )
+            known = ", ".join(places)
+            raise InputError(f"a setting must name one of {known}, which are in use here, got {quoted(item)}")
         if setting in each[name]:
             raise InputError(f"a setting must be given once, got {quoted(left)} twice")
-        each[name][setting] = given[item] if isinstance(given, Mapping) else value
-    parsed: dict[str, dict[str, Any]] = {}
-    for name, (kind, factory) in places.items():
-        if texts:
-            parsed[kind] = settings.parse(name, factory, each[name])
-        else:
+        each[name][setting] = value
+    for name, (_, factory) in places.items():
+        if isinstance(given, Mapping):
             settings.check(name, factory, each[name])
-            parsed[kind] = each[name]
-    return parsed
+        else:
+            each[name] = settings.parse(name, factory, each[name])
+    return {kind: each[name] for name, (kind, _) in places.items()}
 
 
 def _family(name: str) -> str:
@@ -198,7 +194,10 @@ def _family(name: str) -> str:
 
 def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> Method:
     mine = parsed_settings({_family(offer.name): ("tracker", offer.factory)}, given)["tracker"]
-    audit, beta = Audit(), _beta(offer, mine)
+    defaults = {setting.name: setting.default for setting in offer.settings}
+    beta = {"beta": BETA, **defaults, **mine}["beta"]  # of the costs that it gives
+    beta = float(beta) if isinstance(beta, float | int) else BETA
+    audit = Audit()
 
     def make(task: Task, _patience: float) -> Tracker:
         with _rules(offer):
@@ -206,13 +205,6 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
         return AuditedTracker(tracker, task, offer.label, beta, audit)
 
     return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
-
-
-def _beta(offer: Offer, given: Mapping[str, Any]) -> float:
-    """Return the beta of the costs that a tracker gives: its setting of that name, if it has one."""
-    default = {setting.name: setting.default for setting in offer.settings}.get("beta", BETA)
-    beta = given.get("beta", default)
-    return float(beta) if isinstance(beta, float | int) else BETA
 
 
 def _learned(offer: Offer, given: Mapping[str, Any], task: Task) -> Prior:
@@ -233,8 +225,7 @@ def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
     low, high = np.asarray(prior.low), np.asarray(prior.high)
     if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
         raise broken(f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}")
-    if (low > high).any():
-        k = int((low > high).argmax())
+    for k in np.flatnonzero(low > high):
         raise broken(f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}")
     angles = training[:3]
     latents = np.asarray(prior.transform(angles))
@@ -248,11 +239,9 @@ def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
             raise broken(f"{name} must return shape {shape}, got {np.shape(value)}")
         if not np.isfinite(value).all():
             raise broken(f"{name} must return finite numbers, got some that are not")
-    if np.any(feasible):
-        return
     sample = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
     drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
-    if not (np.any(prior.feasible(np.asarray(prior.transform(sample)))) or np.any(prior.feasible(drawn))):
+    if not (np.any(feasible) or any(np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn))):
         came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
         raise broken(f"feasible must allow some poses, got {came}")
 

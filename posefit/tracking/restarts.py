@@ -9,7 +9,7 @@
 | with several passes | `smoothing.smooth`: all frames again, their path known | the new one, if about as cheap |
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy, deepcopy
 from dataclasses import dataclass, replace
 from itertools import chain, islice, tee
@@ -18,7 +18,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
@@ -218,15 +217,6 @@ class _History:
 
 # Several hypotheses.
 
-# What becomes of poses (n, 66), given the yaw of a person who faces the first camera.
-Operator = Callable[[Skeleton, Array, float], Array]
-SYMMETRIC_POSES: Mapping[str, Operator] = {
-    "mirrored": lambda skeleton, poses, _: mirrored_poses(skeleton, poses),
-    "reflected": reflected_poses,
-    "legs exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "legs"),
-    "turned": lambda _skeleton, poses, _towards: turned_poses(poses),
-    "arms exchanged": lambda skeleton, poses, _: exchanged_limbs(skeleton, poses, "arms"),
-}
 # The initial guesses of the hypotheses after the first, in turn: those first that are mistaken most often.
 GUESSES = ("mirrored", "reflected", SEARCHED_AGAIN, "legs exchanged", "turned", SEARCHED_AGAIN, "arms exchanged")
 
@@ -238,14 +228,18 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
     face elsewhere than the known `yaw` are left out; where the first pose is known, only seeds differ.
     """
     towards = facing(task.cameras[0], first.translation)
-    poses = {name: made(task.body.skeleton, first.pose[None], towards)[0] for name, made in SYMMETRIC_POSES.items()}
-
-    def contradicts(pose: Array) -> bool:
-        if pose_known or yaw is None:
-            return pose_known
-        return bool(abs(wrapped(pose[0] - yaw)) > np.radians(ROOT_RANGE_DEGREES[0]))
-
-    order = [name for name in GUESSES if name == SEARCHED_AGAIN or not contradicts(poses[name])]
+    skeleton, pose = task.body.skeleton, first.pose[None]
+    poses = {
+        "mirrored": mirrored_poses(skeleton, pose)[0],
+        "reflected": reflected_poses(skeleton, pose, towards)[0],
+        "legs exchanged": exchanged_limbs(skeleton, pose, "legs")[0],
+        "turned": turned_poses(pose)[0],
+        "arms exchanged": exchanged_limbs(skeleton, pose, "arms")[0],
+    }
+    if yaw is not None:
+        reach = np.radians(ROOT_RANGE_DEGREES[0])
+        poses = {name: pose for name, pose in poses.items() if abs(wrapped(pose[0] - yaw)) <= reach}
+    order = [name for name in GUESSES if name == SEARCHED_AGAIN or (name in poses and not pose_known)]
     name = order[(number - 1) % len(order)]
     if name == SEARCHED_AGAIN:
         return name, task

@@ -16,7 +16,7 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.silhouette.drawn import PoseCount
-from posefit.tracking.restarts import SEARCHED_AGAIN, SYMMETRIC_POSES, initial_guess
+from posefit.tracking.restarts import GUESSES, SEARCHED_AGAIN, initial_guess
 from posefit.tracking.trajectory import (
     MIN_TYPICAL_SPEED,
     WALKING_SPEED,
@@ -126,7 +126,7 @@ def guesses(
 def test_hypotheses_begin_with_symmetric_poses_and_new_searches() -> None:
     task, named = guesses(8, 90.0)
     assert [name for name, _ in named[:3]] == ["mirrored", "reflected", SEARCHED_AGAIN]
-    assert {name for name, _ in named} == {*SYMMETRIC_POSES, SEARCHED_AGAIN}
+    assert {name for name, _ in named} == {*GUESSES}
     mirror, guess = mirrored_poses(SKELETON, WALK.poses[:1])[0], named[0][1]
     assert guess.yaw == mirror[0]
     np.testing.assert_array_equal(guess.first_pose, mirror[3:])
