@@ -1,7 +1,6 @@
 """A search by covariance matrix adaptation (CMA-ES), from its first draw until it has come to an end."""
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
@@ -25,34 +24,29 @@ class Rates(NamedTuple):
     chi: float  # how long a standard normal vector is, on average
 
 
-@dataclass(frozen=True, eq=False)
-class Constants:
-    """The weights of a population, best first, and the rates that follow from them."""
+def constants(dimensions: int, population: int) -> tuple[Array, Rates]:
+    """Return the weights of a population (lambda, 4 or more), best first, and the rates that follow from them.
 
-    weights: Array  # (lambda,) the better half sums to 1, the worse half is negative
-    rates: Rates
-
-    @classmethod
-    def of(cls, dimensions: int, population: int) -> "Constants":
-        """Return the constants of a population (lambda, 4 or more) in so many dimensions (n)."""
-        n, mu = dimensions, population // 2
-        raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))  # HANSEN2016 (49)
-        mu_eff, mu_eff_minus = _worth(raw[:mu]), _worth(raw[mu:])
-        c_sigma = (mu_eff + 2.0) / (n + mu_eff + 5.0)  # HANSEN2016 (55)
-        d_sigma = 1.0 + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_sigma
-        c_c = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n)  # HANSEN2016 (56)
-        c_1 = ALPHA / ((n + 1.3) ** 2 + mu_eff)  # HANSEN2016 (57)
-        c_mu = ALPHA * (mu_eff - 2.0 + 1.0 / mu_eff) / ((n + 2.0) ** 2 + ALPHA * mu_eff / 2.0)  # HANSEN2016 (58)
-        c_mu = min(1.0 - c_1 - SLACK, c_mu)
-        least = min(
-            1.0 + c_1 / c_mu,  # HANSEN2016 (50)
-            1.0 + 2.0 * mu_eff_minus / (mu_eff + 2.0),  # HANSEN2016 (51)
-            (1.0 - c_1 - c_mu) / (n * c_mu),  # HANSEN2016 (52)
-        )
-        better, worse = raw[raw > 0.0].sum(), -raw[raw < 0.0].sum()
-        weights = np.where(raw >= 0.0, raw / better, least * raw / worse)  # HANSEN2016 (53)
-        chi = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))  # HANSEN2016 (chi)
-        return cls(weights, Rates(mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi))
+    The better half of the weights sums to 1, the worse half is negative.
+    """
+    n, mu = dimensions, population // 2
+    raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))  # HANSEN2016 (49)
+    mu_eff, mu_eff_minus = _worth(raw[:mu]), _worth(raw[mu:])
+    c_sigma = (mu_eff + 2.0) / (n + mu_eff + 5.0)  # HANSEN2016 (55)
+    d_sigma = 1.0 + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_sigma
+    c_c = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n)  # HANSEN2016 (56)
+    c_1 = ALPHA / ((n + 1.3) ** 2 + mu_eff)  # HANSEN2016 (57)
+    c_mu = ALPHA * (mu_eff - 2.0 + 1.0 / mu_eff) / ((n + 2.0) ** 2 + ALPHA * mu_eff / 2.0)  # HANSEN2016 (58)
+    c_mu = min(1.0 - c_1 - SLACK, c_mu)
+    least = min(
+        1.0 + c_1 / c_mu,  # HANSEN2016 (50)
+        1.0 + 2.0 * mu_eff_minus / (mu_eff + 2.0),  # HANSEN2016 (51)
+        (1.0 - c_1 - c_mu) / (n * c_mu),  # HANSEN2016 (52)
+    )
+    better, worse = raw[raw > 0.0].sum(), -raw[raw < 0.0].sum()
+    weights = np.where(raw >= 0.0, raw / better, least * raw / worse)  # HANSEN2016 (53)
+    chi = math.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))  # HANSEN2016 (chi)
+    return weights, Rates(mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi)
 
 
 def default_population_size(dimensions: int) -> int:
@@ -86,8 +80,8 @@ class Strategy:
         self.mean, self.sigma, self.generation = np.array(mean, dtype=np.float64), size, 0
         self.covariance = np.diag(np.maximum(spread / size, LEAST) ** 2)
         self.step_path, self.path = np.zeros(d), np.zeros(d)
-        constants = Constants.of(d, population)
-        self._weights, self._rates, rates = constants.weights, tuple(constants.rates), constants.rates
+        self._weights, rates = constants(d, population)
+        self._rates = tuple(rates)
         self._every = max(1, math.floor(lag / (d * (rates.c_1 + rates.c_mu))))  # HANSEN2016 (B.2)
         self._recent, self._small = np.zeros(2 * (10 + math.ceil(30 * d / population))), SMALL * size
         self._decompose()

@@ -97,16 +97,9 @@ class Tilt:
     The mean is affine in the latents, and kept within what it is for the training poses.
     """
 
-    base: Array  # (2,) radians: mean pitch and roll where all latents are 0
-    slopes: Array  # (m, 2) radians a unit of each latent
-    least: Array  # (2,) radians: the range of the mean
-    most: Array  # (2,)
+    mean: Array  # (3 + m, 2) radians: the least and most of the mean, where all latents are 0, and a unit of each
     low: Array  # (2,) radians: the range of what is added to the mean; pi to either side is the whole circle
     high: Array  # (2,)
-    mean: Array = field(init=False, repr=False)  # (3 + m, 2) least, most, base and slopes, as the kernel wants them
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mean", np.vstack([self.least, self.most, self.base, self.slopes]))
 
     @classmethod
     def of(cls, prior: Prior, motions: Sequence[Motion], share: float, margin: float) -> Self:
@@ -125,18 +118,18 @@ class Tilt:
         gram = scaled.T @ scaled + RIDGE * len(scaled) * np.eye(len(scales))
         slopes = np.linalg.solve(gram, scaled.T @ (around - offset))
         mean = offset + scaled @ slopes
+        base = middle + offset - centre @ slopes
         left = wrapped(around - mean)
         low, high = np.quantile(left, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
         low, high = low - margin, high + margin
         whole = high - low > 2.0 * OVER
-        return cls(
-            middle + offset - centre @ slopes,
-            slopes / np.where(scales > 0.0, scales, 1.0)[:, None],
-            middle + mean.min(axis=0),
-            middle + mean.max(axis=0),
-            np.where(whole, -np.pi, low),
-            np.where(whole, np.pi, high),
-        )
+        slopes /= np.where(scales > 0.0, scales, 1.0)[:, None]
+        rows = middle + mean.min(axis=0), middle + mean.max(axis=0), base, slopes
+        return cls(np.vstack(rows), np.where(whole, -np.pi, low), np.where(whole, np.pi, high))
+
+    def at(self, latents: Array) -> Array:
+        """Return the mean pitch and roll (n, 2) that go with latents (n, m)."""
+        return np.clip(self.mean[2] + latents @ self.mean[3:], self.mean[0], self.mean[1])
 
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of the box around what was added last (2,).

@@ -26,6 +26,7 @@ def corrupted(mask: Mask, noise: Mapping[str, float], rng: np.random.Generator) 
 
 
 def _discs(mask: Mask, count: int, radius: float, rng: np.random.Generator, inside: bool) -> Mask:
+    """Return round spots in or around the person, whose radii are about a share of the person's height."""
     left, top, right, bottom = box_of(mask)
     drawn = np.zeros(mask.shape, dtype=np.uint8)
     where = np.argwhere(mask)
@@ -35,20 +36,18 @@ def _discs(mask: Mask, count: int, radius: float, rng: np.random.Generator, insi
         else:
             x = rng.uniform(left - 0.3 * (bottom - top), right + 0.3 * (bottom - top))
             y = rng.uniform(top, bottom)
-        cv2.circle(drawn, (int(x), int(y)), max(1, round(radius * rng.uniform(0.5, 1.5))), 1, -1)
+        cv2.circle(drawn, (int(x), int(y)), max(1, round(radius * (bottom - top) * rng.uniform(0.5, 1.5))), 1, -1)
     return drawn.astype(bool)
 
 
 def holes(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round holes, as where clothes look like the background."""
-    tall = box_of(mask)[3] - box_of(mask)[1]
-    return np.asarray(mask & ~_discs(mask, round(HOLES * strength), 0.03 * tall, rng, inside=True))
+    return np.asarray(mask & ~_discs(mask, round(HOLES * strength), 0.03, rng, inside=True))
 
 
 def blobs(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:
     """Return the mask with round blobs around the person, as where something else moves."""
-    tall = box_of(mask)[3] - box_of(mask)[1]
-    return np.asarray(mask | _discs(mask, round(BLOBS * strength), 0.04 * tall, rng, inside=False))
+    return np.asarray(mask | _discs(mask, round(BLOBS * strength), 0.04, rng, inside=False))
 
 
 def shadow(mask: Mask, strength: float, rng: np.random.Generator) -> Mask:

@@ -119,7 +119,7 @@ def proposals_of(space: SearchSpace, poses: Array, translations: Array) -> Array
     latents = np.asarray(space.prior.transform(poses[:, 3:]))
     root, tilt = poses[:, :3].copy(), space.tilt
     if tilt is not None:
-        root[:, 1:] -= np.clip(tilt.base + latents @ tilt.slopes, tilt.least, tilt.most)
+        root[:, 1:] -= tilt.at(latents)
     parts = [root, translations, latents] if space.translation == "searched" else [root, latents]
     return space.proposals(np.concatenate(parts, axis=1))
 
