@@ -16,26 +16,12 @@ from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_priors.pca import PCA
 from tests.cases import each
+from tests.sources.test_sapso import Line
 
 LEFT_HIP = 3  # of a pose: its first joint angle
 DEGREE = np.radians(1.0)
 WALKS = [built_in.motion(style) for style in built_in.other_styles("walk")]
 NOTHING = Observation([], np.zeros(3))
-
-
-class Hip:
-    """A prior of one latent, the first joint angle, from -1 to 1 radians."""
-
-    low, high = np.array([-1.0]), np.array([1.0])
-
-    def transform(self, angles: Array) -> Array:
-        return angles[:, :1]
-
-    def inverse_transform(self, latents: Array) -> Array:
-        return np.column_stack([latents, np.zeros((len(latents), 62))])
-
-    def feasible(self, latents: Array) -> Array:
-        return np.ones(len(latents), dtype=bool)
 
 
 def bending(pitch: Array, roll: Array, hip: Array | float = 0.0) -> Motion:
@@ -49,12 +35,12 @@ def task_of(*training: Motion, yaw: float | None = 0.3) -> Task:
 
 
 def space_of(tilt: Tilt, reach: float = 1.0) -> SearchSpace:
-    return SearchSpace(Hip(), np.zeros(3), np.full(3, reach), np.zeros(3), tilt=tilt)
+    return SearchSpace(Line(), np.zeros(3), np.full(3, reach), np.zeros(3), tilt=tilt)
 
 
 def test_bent_hips_tilt_as_in_training() -> None:
     hip = np.linspace(-1.0, 1.0, 201)
-    tilt = Tilt.of(Hip(), [bending(0.2 + 0.9 * hip, -0.1 * hip, hip)], 1.0, 2.0 * DEGREE)
+    tilt = Tilt.of(Line(), [bending(0.2 + 0.9 * hip, -0.1 * hip, hip)], 1.0, 2.0 * DEGREE)
     poses = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -0.8], [0.0, 0.0, 0.0, 0.8]]))[0]
     # a third of a latent's variance and a ridge of 0.05: slopes come out smaller by 0.333 / 0.383
     shrunk = 0.8 / (1.0 + 0.05 / np.mean(hip**2))
@@ -66,7 +52,7 @@ def test_bent_hips_tilt_as_in_training() -> None:
 
 def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None:
     hip = np.linspace(-0.1, 0.1, 50)
-    tilt = Tilt.of(Hip(), [bending(4.0 * hip, 0.0 * hip, hip)], 1.0, 0.0)
+    tilt = Tilt.of(Line(), [bending(4.0 * hip, 0.0 * hip, hip)], 1.0, 0.0)
     least, most = space_of(tilt).decode(np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 1.0]]))[0][:, 1]
     assert [least, most] == pytest.approx(tilt.mean[:2, 0])
     assert most < 0.4
@@ -75,7 +61,7 @@ def test_latents_that_training_never_had_tilt_no_farther_than_training() -> None
 @each("turns", [0, 1, -2])
 def test_a_roll_past_half_a_turn_is_the_same_as_before_it(turns: int) -> None:
     rolls = np.radians([170.0, 175.0, -175.0, -170.0]) + 2.0 * np.pi * turns
-    tilt = Tilt.of(Hip(), [bending(np.zeros(4), rolls)], 1.0, DEGREE)
+    tilt = Tilt.of(Line(), [bending(np.zeros(4), rolls)], 1.0, DEGREE)
     roll = space_of(tilt).decode(np.zeros((1, 4)))[0][0, 2]
     assert np.cos(roll) == pytest.approx(-1.0)
     np.testing.assert_allclose([tilt.low[1], tilt.high[1]], np.radians([-11.0, 11.0]))
@@ -83,7 +69,7 @@ def test_a_roll_past_half_a_turn_is_the_same_as_before_it(turns: int) -> None:
 
 def test_a_turn_over_in_training_may_be_repeated() -> None:
     cartwheel = bending(np.zeros(73), np.linspace(0.0, 2.0 * np.pi, 73))
-    follower = Follower(task_of(cartwheel), Hip(), Prediction())
+    follower = Follower(task_of(cartwheel), Line(), Prediction())
     space = follower.space(NOTHING)
     assert space.periodic.tolist() == [False, False, True, False]
     rolls = []
@@ -101,7 +87,7 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
     rng = np.random.default_rng(0)
     rolling = bending(np.zeros(500), rng.uniform(-1.0, 1.0, 500))
     prediction = Prediction(tilt_share=1.0, tilt_margin_degrees=0.0)
-    follower = Follower(task_of(rolling), Hip(), prediction)
+    follower = Follower(task_of(rolling), Line(), prediction)
     space = follower.space(NOTHING)
     tilt = space.tilt
     assert tilt is not None
@@ -123,7 +109,7 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
 @each("how", [Prediction(), Prediction(tilt="box")])
 def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(how: Prediction) -> None:
     training = [bending(np.full(9, 0.8), np.zeros(9))] if how.tilt == "box" else []
-    follower = Follower(task_of(*training), Hip(), how)
+    follower = Follower(task_of(*training), Line(), how)
     space = follower.space(NOTHING)
     assert space.tilt is None
     np.testing.assert_allclose(space.centre[:3], [0.3, 0.0, 0.0])
@@ -136,7 +122,7 @@ def test_a_first_pose_that_is_given_begins_with_the_tilt_that_goes_with_it() -> 
     hip = np.linspace(-1.0, 1.0, 100)
     lying = bending(0.9 * hip + np.where(hip > 0.5, 0.8, 0.0), 0.0 * hip, hip)
     task = replace(task_of(lying), first_pose=np.eye(63)[0] * 0.4)
-    space = Follower(task, Hip(), Prediction()).space(NOTHING)
+    space = Follower(task, Line(), Prediction()).space(NOTHING)
     assert space.start is not None
     assert space.centre[1] != 0.0
     np.testing.assert_allclose(space.coordinates(space.start.mean), [0.3, 0.0, 0.0, 0.4], atol=1e-12)
@@ -151,8 +137,8 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
         assert isinstance(tracker, SynthesisTracker)
         return Follower(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
 
-    before = Tilt.of(Hip(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
-    assert Follower(task_of(), Hip(), Prediction(), before).space(NOTHING).tilt is before
+    before = Tilt.of(Line(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
+    assert Follower(task_of(), Line(), Prediction(), before).space(NOTHING).tilt is before
     assert tilt(TrackOptions(method="@pca")) is not None
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
     assert tilt(TrackOptions(prior=learned)) is None

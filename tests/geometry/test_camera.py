@@ -26,15 +26,6 @@ def test_from_the_front_the_left_hand_is_on_the_images_right() -> None:
     assert pixels[JOINTS.index("lhand"), 0] > 160.0 > pixels[JOINTS.index("rhand"), 0]
 
 
-def test_a_camera_survives_its_file(tmp_path: Path) -> None:
-    camera = Camera.around(np.array([1.0, 2.0, 3.0]), 0.4, 5.0, (321, 123))
-    (tmp_path / "camera.json").write_text(camera.to_json())
-    again = Camera.from_json(tmp_path / "camera.json")
-    assert (again.width, again.height) == (321, 123)
-    for name in ("focal", "centre", "rotation", "translation"):
-        np.testing.assert_array_equal(getattr(again, name), getattr(camera, name))
-
-
 def test_around_by_hand_from_the_side() -> None:
     # It stands at (4 + 1, 2, 3) and looks along -x; its right is -z, so who walks along +z walks to the left.
     camera = Camera.around(np.array([1.0, 2.0, 3.0]), np.pi / 2, 4.0, (320, 240), field_of_view=np.pi / 2)

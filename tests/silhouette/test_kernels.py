@@ -11,7 +11,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
+from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.drawn import PoseCount, count_poses
 from posefit.silhouette.mask import Silhouette
@@ -57,22 +57,6 @@ def test_a_body_is_cut_by_any_image_and_the_near_plane_and_both_focal_lengths_co
         view = Camera.around(np.zeros(3), 0.0, 3.0, (width, 61), field_of_view=0.6)
         poses = random_poses(np.random.default_rng(width), 12)
         assert sum(assert_equals_the_twin(body, view, pose, np.zeros(3)) for pose in poses) >= 4
-
-
-def test_radii_are_seen_at_the_mean_of_two_focal_lengths(body: Body) -> None:
-    # All bones are lines without a width, but that the hand's end, 4 m away, is a ball of 0.1 m. With fx = 400 and
-    # fy = 100 it is a disc of sqrt(400 * 100) * 0.1 / 4 = 5 pixels, of 10 by fx alone and of 2.5 by fy alone. Around a
-    # corner of four pixels each quadrant has 5 + 5 + 4 + 4 + 2 = 20 pixel centres that are no farther than 5.
-    hand = JOINTS.index("lhand")
-    radii = np.zeros(body.radii.shape)
-    radii[hand - 1, 1] = 0.1
-    at = body.skeleton.joints(np.zeros(ANGLES))[hand]
-    level = np.diag([1.0, -1.0, -1.0])
-    camera = Camera(64, 48, np.array([400.0, 100.0]), np.array([32.0, 24.0]), level, np.array([0.0, 0.0, 4.0]))
-    drawn = project(Body(body.skeleton, radii), camera, np.zeros(ANGLES), -at)
-    assert [drawn[24 + k, 32:].sum() for k in range(6)] == [5, 5, 4, 4, 2, 0]
-    quadrants = (drawn[24:, 32:], drawn[23::-1, 32:], drawn[24:, 31::-1], drawn[23::-1, 31::-1])
-    assert [quadrant.sum() for quadrant in quadrants] == [20] * 4
 
 
 def test_the_same_bits_for_any_number_of_poses_and_threads_and_many_calls_at_once(body: Body, camera: Camera) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from posefit import Start
 from posefit.arrays import Array
-from posefit.testing.toy import Toy, ball, sphere
+from posefit.testing.toy import Toy, ball
 from posefit.uncertainty.smc import systematic_rows
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
@@ -107,20 +107,6 @@ def test_noise_is_a_multiple_of_the_particles_own_spread() -> None:  # DEUTSCHER
     made.tell(particles, np.zeros(len(particles)))  # equal costs: all survive, once each
     step = made.ask() - particles
     np.testing.assert_allclose(step.std(axis=0), 0.5 * particles.std(axis=0), rtol=0.02)
-
-
-def test_noise_shrinks_where_the_particles_agree() -> None:  # DEUTSCHER2005 (diffusion)
-    space = Toy(4)
-    made = Annealed(space, np.random.default_rng(0), evaluations=5000, layers=10)
-    spreads, betas = [], []
-    while len(proposals := made.ask()):
-        costs = sphere(proposals)
-        spreads.append(proposals.std(axis=0).mean())
-        betas.append(sharpness(costs, 0.5))
-        made.tell(proposals, costs)
-    assert len(spreads) == 10
-    assert (np.diff(spreads) < 0.0).all()
-    assert (np.diff(betas) > 0.0).all()  # so the likelihood sharpens from layer to layer
 
 
 def test_crossover_trades_a_run_of_coordinates() -> None:  # DEUTSCHER2005 (crossover)

@@ -68,16 +68,6 @@ def test_a_hill_between_two_points_parts_them() -> None:  # URSEM1999 (hill vall
         assert landscape.evaluations == 3 * probes
 
 
-def test_a_hill_is_only_seen_where_it_is_probed() -> None:
-    # from -0.5 to 0.7 two probes are at -0.1 and 0.3; one is at 0.1: a thin hill at 0.3 is seen by two alone
-    def thin(proposals: Array) -> Array:
-        return np.asarray(np.where(np.abs(proposals[:, 0] - 0.3) < 0.01, 5.0, 1.0))
-
-    points, pairs = np.array([[-0.5], [0.7]]), np.array([[0, 1]])
-    seen = [same_valley(Landscape(Toy(1), thin), points, np.ones(2), pairs, np.array([probes]))[0] for probes in (1, 2)]
-    assert seen == [True, False]
-
-
 def test_a_hill_lower_than_the_tolerance_is_none_and_what_is_not_feasible_is_one() -> None:
     points, pairs, probes = np.array([[-0.5], [0.5]]), np.array([[0, 1]]), np.array([1])
     for tolerance, one in ((0.9, False), (1.1, True)):
@@ -86,15 +76,6 @@ def test_a_hill_lower_than_the_tolerance_is_none_and_what_is_not_feasible_is_one
     flat = Landscape(Toy(1, lambda x: np.abs(x[:, 0]) > 0.1), lambda x: np.zeros(len(x)))
     assert not same_valley(flat, points, np.zeros(2), pairs, probes)[0]
     assert flat.evaluations == 0
-
-
-def test_the_way_between_two_is_the_short_one_around() -> None:
-    points, pairs = np.array([[-0.9], [0.9]]), np.array([[0, 1]])
-    joined = [
-        same_valley(Landscape(Toy(1, wrapping=turns), turning), points, turning(points), pairs, np.array([3]))[0]
-        for turns in (0, 1)
-    ]
-    assert joined == [False, True]
 
 
 def test_neighbours_of_a_grid_lie_an_edge_apart() -> None:  # MAREE2018 (edge length)

@@ -16,16 +16,6 @@ def test_chi_of_4_1_is_the_constant_everybody_quotes() -> None:  # CLERC2002 (co
     assert constriction(5.0) == pytest.approx(2.0 / (3.0 + np.sqrt(5.0)))
 
 
-@pytest.mark.parametrize("phi", [4.01, 4.1, 4.5, 6.0])
-def test_the_constricted_swarm_neither_explodes_nor_stands_still(phi: float) -> None:  # CLERC2002 (constriction)
-    # both attractors at the origin, all rand() = 1: (v, x) -> (chi (v - phi x), x + that); its eigenvalues decide
-    chi = constriction(phi)
-    step = np.array([[chi, -chi * phi], [chi, 1.0 - chi * phi]])
-    radius = np.abs(np.linalg.eigvals(step)).max()
-    assert 0.0 < radius < 1.0
-    assert np.linalg.det(step) == pytest.approx(chi)
-
-
 class Twin:
     """The update as the papers print it, particle by particle and coordinate by coordinate, without any box."""
 
