@@ -129,7 +129,9 @@ class Tilt:
 
     def at(self, latents: Array) -> Array:
         """Return the mean pitch and roll (n, 2) that go with latents (n, m)."""
-        return np.clip(self.mean[2] + latents @ self.mean[3:], self.mean[0], self.mean[1])
+        low, high, base = self.mean[:3]
+        tilt: Array = np.clip(base + latents @ self.mean[3:], low, high)
+        return tilt
 
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of the box around what was added last (2,).

@@ -63,8 +63,8 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
             f"the nearest to the last{leaps}"
         )
     whole = np.flatnonzero(usable & ~cut)
-    for k in np.flatnonzero(usable & cut) if len(whole) else ():
-        usable[k] = areas[k] >= CUT_SHOWN * areas[whole[np.abs(whole - k).argmin()]]
+    for frame in np.flatnonzero(usable & cut) if len(whole) else ():
+        usable[frame] = areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
     return replace(masks, usable=usable), warnings
 
 
