@@ -103,30 +103,27 @@ def _errors(
     def with_root(angles: Array) -> Array:
         return np.column_stack([truth[:, :3], np.broadcast_to(angles, (len(truth), truth.shape[1] - 3))])
 
+    def error_of(poses: Array) -> float:
+        return float(metrics.pose_error_degrees(truth, poses).mean())
+
     trivial = {
         "mean_pose": with_root(training.mean(axis=0)),
         "persistence": np.tile(truth[0], (len(truth), 1)),
         "nearest": nearest_poses,
     }
-    if prior is not None:
-        trivial["prior_floor"] = with_root(prior.inverse_transform(prior.transform(truth[:, 3:])))
-    baselines = {name: float(metrics.pose_error_degrees(truth, pose).mean()) for name, pose in trivial.items()}
-    floor = baselines.pop("prior_floor", None)
+    baselines = {name: error_of(poses) for name, poses in trivial.items()}
+    floor = None if prior is None else error_of(with_root(prior.inverse_transform(prior.transform(truth[:, 3:]))))
     return columns, {
-        "error_degrees": Spread(
-            float(metrics.mean_error(errors)), float(metrics.error_spread(errors)), float(errors.max())
-        ),
-        "geodesic_degrees": means["geodesic_degrees"],
+        **{name: means[name] for name in ("geodesic_degrees", "mpjpe_mm", "pa_mpjpe_mm")},
+        "error_degrees": Spread(metrics.mean_error(errors), metrics.error_spread(errors), float(errors.max())),
         "free_error_degrees": float(metrics.pose_error_degrees(truth, poses, skeleton.free).mean()),
-        "mpjpe_mm": means["mpjpe_mm"],
-        "pa_mpjpe_mm": means["pa_mpjpe_mm"],
         "swap_rate": means["swapped"],
         "lost_rate": float(metrics.lost_rate(columns["mpjpe_mm"])),
         "skill": {name: metrics.skill(means["error_degrees"], error) for name, error in baselines.items()},
         "baselines_degrees": baselines,
         "baselines_mm": {
-            name: float(metrics.mpjpe_mm(true_joints, skeleton.joints(trivial[name], places)).mean())
-            for name in baselines
+            name: float(metrics.mpjpe_mm(true_joints, skeleton.joints(each, places)).mean())
+            for name, each in trivial.items()
         },
         "prior_floor_degrees": floor,
     }

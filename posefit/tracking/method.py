@@ -6,7 +6,6 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,7 +140,10 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations, options.population_size)
     settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
     if prior is not None:
-        learned, name = _learned(prior, mine["prior"], task), prior.name
+        with _rules(prior):
+            learned = prior.factory(**mine["prior"]).fit(task.angles, task.body.skeleton)
+            _check_prior(learned, task.angles, prior)
+        learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
         assert options.prior is not None
         learned, name = options.prior, type(options.prior).__name__
@@ -151,7 +153,12 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
     def make(task: Task, patience: float) -> Tracker:
         limit = None if options.ask_seconds is None else options.ask_seconds + patience
-        build = partial(_guarded, optimiser, mine["optimiser"], limit, task.evaluations)
+
+        def build(space: Space, rng: np.random.Generator) -> Optimiser:
+            with _rules(optimiser):
+                made = optimiser.factory(space, rng, **mine["optimiser"])
+            return CheckedOptimiser(made, space, optimiser.label, limit, task.evaluations)
+
         tracker = SynthesisTracker(task, learned, build, optimiser.next_frame, prediction, tilt)
         return WeighingTracker(tracker) if prediction.modes else tracker
 
@@ -207,15 +214,6 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
     return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
 
 
-def _learned(offer: Offer, given: Mapping[str, Any], task: Task) -> Prior:
-    """Return a prior fitted to a task's training motions."""
-    angles = task.angles
-    with _rules(offer):
-        prior: Prior = offer.factory(**given).fit(angles, task.body.skeleton)
-        _check_prior(prior, angles, offer)
-    return CheckedPrior(prior, offer.label)
-
-
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
     """Return nothing. Raises BrokenRuleError where a prior's range, shapes or numbers are wrong."""
 
@@ -244,14 +242,6 @@ def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
     if not (np.any(feasible) or any(np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn))):
         came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
         raise broken(f"feasible must allow some poses, got {came}")
-
-
-def _guarded(
-    offer: Offer, mine: Mapping[str, Any], limit: float | None, evaluations: int, space: Space, rng: np.random.Generator
-) -> Optimiser:
-    with _rules(offer):
-        optimiser = offer.factory(space, rng, **mine)
-    return CheckedOptimiser(optimiser, space, offer.label, limit, evaluations)
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:

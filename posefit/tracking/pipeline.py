@@ -24,9 +24,9 @@ from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
+from posefit.tracking.restarts import MAX_TURN_RATE
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import Pass, smooth
-from posefit.tracking.spins import MAX_TURN_RATE
 from posefit.tracking.summary import evaluate
 
 

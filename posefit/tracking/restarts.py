@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion.motion import Motion
+from posefit.motion.steadiness import runs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
 from posefit.tracking.trajectory import effort_of, mean_cost, with_total_effort
 
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026}  # part of the seed of what is tracked again
@@ -41,6 +42,11 @@ TYPICAL_COST_SECONDS = 1.0  # of frames that show the typical cost
 HIGH_COST_SECONDS = 0.5  # for which costs are high before a track relocalises
 RELOCALISED = "relocalised"  # in the details of a frame where it did: whether a restart was better
 SPIN_TOLERANCE = 1.5  # a track without spins that costs more is wrong: the person does turn so fast
+MAX_TURN_RATE = np.radians(450.0)  # a second: the fastest that a person turns on the spot
+SPIN_SECONDS = 0.1
+SPIN_ANGLE = np.radians(60.0)  # within that time: more is no turn of a person, even in a smoothed track
+VOTES_PER_SECOND = 30.0
+EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
 SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
 
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
@@ -246,7 +252,8 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
     return name, replace(_after(task, replace(first, pose=poses[name])), before=())
 
 
-# After the last frame.
+# After the last frame. A silhouette hardly distinguishes a body that faces the camera from its reflection, which faces
+# away. A track that takes one for the other and back spins; each of its frames then votes for one of the two.
 
 
 def retrack_spins(
@@ -254,7 +261,7 @@ def retrack_spins(
 ) -> tuple[list[Frame], int | None]:
     """Return a track without spins, and the frame from which it was tracked again; None where it is as it was.
 
-    That frame is the surest of those that face as most do, see `spins.facing_consensus`. From there the person is
+    That frame is the surest of those that face as most do, see `facing_consensus`. From there the person is
     followed onward, and backwards by training motions in reverse. The old track is kept where the new one spins as
     often, or costs half as much again. The frames have the effort of both tracks.
     """
@@ -299,3 +306,61 @@ def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[F
             posterior = replace(posterior, poses=poses, translations=places, weights=np.ones(len(rows)))
         frames.append(replace(frame, posterior=posterior))
     return frames
+
+
+def spin_mask(yaws: Array, usable: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
+    """Return in which frames (T,) a body spins, by its yaws (T,) in radians, where it is visible."""
+    spins = np.zeros(len(yaws), dtype=bool)
+    reach = max(round(SPIN_SECONDS * fps), 1)
+    turned = np.abs(wrapped(yaws[reach:] - yaws[:-reach]))
+    for k in np.flatnonzero((turned > SPIN_ANGLE) & usable[reach:] & usable[:-reach]):
+        spins[k : k + reach + 1] = True
+    return spins
+
+
+def facing_consensus(
+    frames: Sequence[Frame], cameras: Sequence[Camera], usable: NDArray[np.bool_], fps: float
+) -> NDArray[np.bool_]:
+    """Return which frames (T,) face where the whole track does, by the likeliest sequence of yaws without spins.
+
+    A frame may face where it was estimated, or where its reflection does; the latter goes against its votes, one for
+    each camera that sees the person. Frames that spin have no votes, nor those that show too little. Viterbi.
+    """
+    yaws = np.array([frame.pose[0] for frame in frames])
+    steady = ~spin_mask(yaws, usable, fps)
+    rows, clock = np.flatnonzero(usable & steady), steady.cumsum()  # no turn has time during a spin
+    agrees = np.zeros(len(frames), dtype=bool)
+    if not len(rows):
+        return agrees
+    voters = [frames[k] for k in rows.tolist()]
+    views = np.array([frame.areas.any(axis=1) for frame in voters])
+    towards = [
+        facing(cameras[int(seeing.argmax())], frame.translation) for frame, seeing in zip(voters, views, strict=True)
+    ]
+    both = np.column_stack([yaws[rows], 2.0 * np.array(towards) + np.pi - yaws[rows]])
+    against = np.column_stack([np.zeros(len(rows)), views.sum(axis=1) * VOTES_PER_SECOND / fps])
+    totals, parents = against[0], np.zeros((len(rows), 2), dtype=np.int64)
+    for k in range(1, len(rows)):
+        turned = np.abs(wrapped(both[k] - both[k - 1][:, None]))
+        excess = np.maximum(turned - MAX_TURN_RATE * (clock[rows[k]] - clock[rows[k - 1]]) / fps, 0.0)
+        paths = totals[:, None] + EXCESS_TURN_VOTES * excess
+        parents[k] = paths.argmin(axis=0)
+        totals = paths.min(axis=0) + against[k]
+    chosen = int(totals.argmin())
+    for k in range(len(rows) - 1, -1, -1):
+        agrees[rows[k]] = chosen == 0
+        chosen = int(parents[k, chosen])
+    return agrees
+
+
+def anchor_frame(frames: Sequence[Frame], agrees: NDArray[np.bool_]) -> int | None:
+    """Return the frame from which to track again: in the longest run of flags, the best one that most cameras see.
+
+    None where no flag is true.
+    """
+    every = runs(agrees)
+    if not every:
+        return None
+    start, stop = max(every, key=lambda run: run[1] - run[0])
+    inner = range(start, stop) if stop - start < 3 else range(start + 1, stop - 1)
+    return min(inner, key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost))

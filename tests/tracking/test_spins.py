@@ -11,8 +11,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.restarts import retrack_spins
-from posefit.tracking.spins import MAX_TURN_RATE, anchor_frame, facing_consensus, spin_mask
+from posefit.tracking.restarts import MAX_TURN_RATE, anchor_frame, facing_consensus, retrack_spins, spin_mask
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 
