@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.fitting.space import ROOT_RANGE_DEGREES
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.camera import Camera
