@@ -16,6 +16,7 @@ from posefit.errors import InputError
 from posefit.geometry import symmetry
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.motion import Motion
+from posefit_exemplars import kernels
 
 Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
 Rows = NDArray[np.int64]
@@ -56,11 +57,8 @@ def _facing(skeleton: Skeleton, poses: Array) -> Array:
 
 def thinned_frames(codes: Codes) -> Rows:
     """Return which frames of a clip to keep: each two centimetres or more from the last one kept, and both ends."""
-    kept = [0]
-    for k in range(1, len(codes)):
-        if k == len(codes) - 1 or float(((codes[k] - codes[kept[-1]]) ** 2).sum()) > SAME**2:
-            kept.append(k)
-    return np.array(kept)
+    kept = np.empty(len(codes), dtype=np.int64)
+    return kept[: kernels.keep_apart(codes, np.float32(SAME**2), kept)]
 
 
 def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
@@ -100,7 +98,7 @@ class Exemplars:
     members: Rows = field(repr=False)  # (K,) all poses, group by group
     bounds: Rows = field(repr=False)  # (G + 1,) where each group begins in `members`
     owners: Rows = field(repr=False)  # (K,) the group of each pose
-    grouped: Codes = field(repr=False)  # (K, D) codes, group by group
+    grouped: Codes = field(repr=False)  # (D, K) codes, group by group
     kinds: Rows = field(repr=False)  # (K,) which of a few poses that are as unlike as can be each is nearest to
     coding: Coding = field(repr=False)
 
@@ -136,7 +134,7 @@ class Exemplars:
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(thinned)), "right") - 1
         frames = poses, codes, (codes**2).sum(axis=1), paths, times, clips, lasts
-        return cls(*frames, centres, members, bounds, owners, codes[members], kinds, coding)
+        return cls(*frames, centres, members, bounds, owners, np.ascontiguousarray(codes[members].T), kinds, coding)
 
     def __len__(self) -> int:
         return len(self.poses)
