@@ -7,7 +7,7 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 import csv
 import json
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
 from typing import Any, Self
@@ -17,12 +17,12 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import MARK, Unfinished, other_entries
-from posefit.fitting.check import finite_number, whole
-from posefit.fitting.tracker import Frame
+from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.reading import SHOWN, cut, quoted
+from posefit.silhouette.foreground import Image
 from posefit.tracking.evaluation import unseen
 from posefit.tracking.identity import Digest, difference
 from posefit.tracking.measures import Rows
@@ -42,16 +42,8 @@ _TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json", "camera.json"
 FILES = (*_MOTION_FILES, *_OPENSIM, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
-# The arrays of a recorded frame: their shape, -1 for any, and whether they may be missing
-_ARRAYS = {
-    "pose": ((ANGLES,), False),
-    "translation": ((3,), False),
-    "areas": ((-1, 3), False),
-    "history": ((-1,), False),
-    "coordinates": ((-1,), True),
-    "spent": ((-1,), True),
-}
-_MAX_ITEM_BYTES = 10_000  # of one element of an array in a frame's details
+# The fields of a recorded frame, besides its posterior
+_ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
 _PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "activity", "details")
 
 
@@ -163,15 +155,7 @@ class OutputFolder(Output):
         for number, line in enumerate(recorded.splitlines(keepends=True), 1):
             try:
                 frame, state = _frame_of(line)
-            except (
-                ValueError,
-                LookupError,
-                TypeError,
-                ArithmeticError,
-                AttributeError,
-                MemoryError,
-                RecursionError,
-            ) as error:
+            except Exception as error:  # whatever a damaged line raises
                 if line.endswith(b"\n"):  # else it was being written when the track ended
                     reason = cut(" ".join(str(error).split()))
                     self._say(
@@ -204,12 +188,10 @@ class OutputFolder(Output):
         folder, stills = self._building, Stills(scene)
         painter = Painter(scene, [row["usable"] == 1.0 for row in rows])
         intervals = intervals_of(scene.body.skeleton, frames)
-        radii = intervals.get("joint_radii")
+        radii = intervals.get("joint_radii", repeat(None))
         _write_formats(folder, scene, frames, rows, summary, intervals)
-        pictures = repeat(None) if scene.pictures is None else scene.pictures()
-        each = zip(frames, scene.observations, rows, pictures, repeat(None) if radii is None else radii, strict=False)
         writer: VideoWriter | None = None
-        for frame, observation, row, picture, frame_radii in each:
+        for frame, observation, picture, row, frame_radii in zip(frames, *_filmed(scene), rows, radii, strict=False):
             stills.add(frame, observation, picture)
             image = painter.add(frame, observation, row, picture, frame_radii)
             if writer is None:
@@ -217,8 +199,8 @@ class OutputFolder(Output):
             writer.write(image)
         assert writer is not None
         writer.close()
-        trust = "" if summary["trust"] is None else summary["trust"]["sentence"]
-        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, radii, undetermined(summary), trust)):
+        notes = ("" if summary["trust"] is None else summary["trust"]["sentence"], undetermined(summary))
+        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, [*filter(None, notes)])):
             raise OSError("no room for summary.png")
         page = track_document(track_data(scene, frames, rows, summary, intervals, stills))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
@@ -227,9 +209,7 @@ class OutputFolder(Output):
 def page_of(scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> str:
     """Return the page of a track, `track.html`."""
     stills = Stills(scene)
-    for frame, observation, picture in zip(
-        frames, scene.observations, repeat(None) if scene.pictures is None else scene.pictures(), strict=False
-    ):
+    for frame, observation, picture in zip(frames, *_filmed(scene), strict=False):
         stills.add(frame, observation, picture)
     return track_document(track_data(scene, frames, rows, summary, intervals_of(scene.body.skeleton, frames), stills))
 
@@ -244,10 +224,7 @@ def _encoded(value: Any) -> Any:
 def _decoded(mapping: dict[str, Any]) -> Any:
     """Return a mapping of JSON, or the array that it holds."""
     if mapping.keys() == {"dtype", "values"}:
-        dtype = np.dtype(mapping["dtype"])
-        if dtype.kind not in "biufU" or dtype.itemsize > _MAX_ITEM_BYTES:
-            raise InputError(f"an array of {cut(str(dtype))}")
-        return np.array(mapping["values"], dtype=dtype)
+        return np.array(mapping["values"], dtype=mapping["dtype"])
     return mapping
 
 
@@ -257,29 +234,10 @@ def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
     if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
         raise InputError("a damaged one")
     row = json.loads(text, object_hook=_decoded)
-    if row.keys() != {*_PLAIN, *_ARRAYS, "posterior", "state"}:
-        raise InputError("one with other fields")
-    values = {name: row[name] for name in _PLAIN}
-    for name, (shape, optional) in _ARRAYS.items():
-        if row[name] is None and optional:
-            values[name] = None
-            continue
-        array = values[name] = np.array(row[name])
-        fits = array.ndim == len(shape) and all(
-            size in (-1, side) for size, side in zip(shape, array.shape, strict=True)
-        )
-        if not fits or (array.size and array.dtype.kind not in "iuf") or np.isnan(array.astype(float)).any():
-            raise InputError(f"{name} of shape {array.shape}")
-    for name in _PLAIN[:4]:
-        if not (row[name] is None and name == "cpu_seconds"):
-            finite_number(name, row[name])
-    whole("evaluations", row["evaluations"], 0)
-    if not isinstance(row["details"], dict) or not isinstance(row["activity"], str | type(None)):
-        raise InputError("details or an activity of another type")
-    posterior = row["posterior"]
-    values["posterior"] = None if posterior is None else Posterior.from_dict(posterior)
-    np.random.default_rng(0).bit_generator.state = row["state"]  # raises where it is none
-    return Frame(**values), row["state"]
+    state, posterior = row.pop("state"), row.pop("posterior")
+    row |= {name: np.array(row[name]) for name in _ARRAYS if row[name] is not None}
+    np.random.default_rng(0).bit_generator.state = state  # raises where it is none
+    return Frame(**row, posterior=None if posterior is None else Posterior.from_dict(posterior)), state
 
 
 def _check_mark(folder: Unfinished) -> None:
@@ -304,6 +262,11 @@ def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array
             radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose)
             halves[k] = angle_intervals(frame.posterior, frame.pose)
     return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
+
+
+def _filmed(scene: Scene) -> tuple[Iterable[Observation], Iterable[Image | None]]:
+    """Return what was observed in each frame, and the footage of each, None where there is none."""
+    return scene.observations, repeat(None) if scene.pictures is None else scene.pictures()
 
 
 def _write_formats(

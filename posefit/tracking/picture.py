@@ -6,7 +6,6 @@ frames have a border.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -15,8 +14,6 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import JOINTS
-from posefit.motion.steadiness import runs
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.tracking.drawing import (
@@ -25,9 +22,7 @@ from posefit.tracking.drawing import (
     LINES,
     MISSED,
     OTHER,
-    RIGHT,
     SPILLED,
-    TEXT,
     draw_body,
     draw_stick,
     opacities,
@@ -151,27 +146,21 @@ class Painter:
         if other is not None:
             draw_stick(image, self._scene.body, camera, other.pose, other.translation)
 
-    def summary(
-        self, rows: Sequence[Mapping[str, float]], radii: Array | None = None, title: str = "", trust: str = ""
-    ) -> Image:
-        """Return stills of the track above a curve of its error, or of its cost where there is no truth.
-
-        Where a method says how sure it is, a chart of that stands below: of the radii (T, levels, 27) of the joints'
-        intervals, and of `title`, which says in words what was not determined. `trust` is a sentence at the top.
-        """
+    def summary(self, rows: Sequence[Mapping[str, float]], notes: Sequence[str] = ()) -> Image:
+        """Return notes and stills of the track, above a curve of its error, or of its cost where truth is unknown."""
         grid = _grid(self._stills, 2, BACKGROUND[0])
-        if self._scene.pictures is None:
-            grid = np.vstack([grid, np.full((LABEL_HEIGHT, *grid.shape[1:]), BACKGROUND, np.uint8)])
-            _write_legend(grid, grid.shape[0] - 12, SUMMARY_SCALE)
-        name, width = "error_degrees" if "error_degrees" in rows[0] else "cost", grid.shape[1]
-        parts = [grid, curve([row[name] for row in rows], name.replace("_", " "), width, 180)]
-        if trust:
+        width = grid.shape[1]
+        parts = []
+        for note in notes:
             head = np.full((LABEL_HEIGHT, width, 3), BACKGROUND, dtype=np.uint8)
-            write(head, trust, (12, 26), scale=SUMMARY_SCALE * min(1.0, (width - 24) / width_of(trust, SUMMARY_SCALE)))
-            parts.insert(0, head)
-        if radii is not None or np.isfinite([[row["unknown_sides"], row["lost"]] for row in rows]).any():
-            parts.append(certainty_chart(rows, radii, title, width, 240))
-        return np.vstack(parts)
+            write(head, note, (12, 26), scale=SUMMARY_SCALE * min(1.0, (width - 24) / width_of(note, SUMMARY_SCALE)))
+            parts.append(head)
+        parts.append(grid)
+        if self._scene.pictures is None:
+            parts.append(np.full((LABEL_HEIGHT, width, 3), BACKGROUND, np.uint8))
+            _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
+        name = "error_degrees" if "error_degrees" in rows[0] else "cost"
+        return np.vstack([*parts, curve([row[name] for row in rows], name.replace("_", " "), width, 180)])
 
 
 def _draw_border(image: Image, width: int) -> None:
@@ -205,94 +194,17 @@ def _grid(panels: list[Image], columns: int, background: int) -> Image:
     return np.vstack([np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)])
 
 
-# Charts below the stills: a figure over the frames, and how certain the track is, with marks of frames.
-LEFT_MARGIN, RIGHT_MARGIN = 66, 16  # pixels
-HEAD, FOOT = 60, 54  # pixels of what is written above, and of the two rows of marks below
-MARKS_HEIGHT = 14  # pixels of a row of marks
-GRID_STEPS = (5, 10, 20, 50, 100, 200, 500, 1000)  # millimetres between two lines
-BAND_STRENGTHS = (0.85, 0.5, 0.25)  # of the bands' colour, the narrowest first
-ROOT = JOINTS.index("root")  # which every interval is relative to
-
-
 def curve(values: Sequence[float], name: str, width: int, height: int) -> Image:
     """Return a plot (height, width, 3) of values, one a frame, from 0 up."""
     image = np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
-    top = max(max(values), 1e-9) * 1.15
-    x, _ = _columns(len(values), width)
+    left, right = 66, width - 16
+    scale = (height - 56) / (max(max(values), 1e-9) * 1.15)
     for level in (0.0, float(np.mean(values)), max(values)):
-        _grid_line(image, f"{level:.2f}", int(height - 24 - level / top * (height - 56)))
-    _polyline(image, x, height - 24 - np.array(values) / top * (height - 56))
-    write(image, f"{name}, frame by frame: 0, mean and maximum", (LEFT_MARGIN, 20), scale=SUMMARY_SCALE)
-    return image
-
-
-def certainty_chart(
-    rows: Sequence[Mapping[str, float]], radii: Array | None, title: str, width: int, height: int
-) -> Image:
-    """Return a chart (height, width, 3) of how far joints may be off, and of which frames are doubtful.
-
-    Bands are the radii (T, levels, 27) of intervals, the mean over joints; where the truth is known, a line is how far
-    joints really are off. Rows of marks are frames whose sides are unknown, and lost ones. `title` is written above.
-    """
-    image = np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
-    bottom = height - FOOT
-    x, half = _columns(len(rows), width)
-    bands = np.empty((len(rows), 0)) if radii is None else 1e3 * np.delete(radii, ROOT, axis=2).mean(axis=2)
-    error = np.array([row.get("mpjpe_mm", np.nan) for row in rows])
-    values = np.column_stack([error, bands])
-    top = 1.05 * max(float(values[np.isfinite(values)].max(initial=0.0)), GRID_STEPS[0])
-
-    def height_of(value: Any) -> Any:
-        return bottom - np.asarray(value) / top * (bottom - HEAD)
-
-    for k in reversed(range(bands.shape[1])):
-        strength = BAND_STRENGTHS[k]
-        colour = tuple(strength * c + (1.0 - strength) * b for c, b in zip(RIGHT, BACKGROUND, strict=True))
-        for start, stop in runs(np.isfinite(bands[:, k])):
-            frames = np.arange(start, stop)
-            ends = np.concatenate([[x[start] - half], x[frames], [x[stop - 1] + half]]).clip(x[0], width - RIGHT_MARGIN)
-            heights = height_of(bands[[start, *frames, stop - 1], k])
-            edge = [*zip(ends, heights, strict=True), (ends[-1], bottom), (ends[0], bottom)]
-            cv2.fillPoly(image, [np.rint(np.array(edge) * 16).astype(np.int32)], colour, cv2.LINE_AA, 4)
-    step = next((step for step in GRID_STEPS if top / step <= 4.0), GRID_STEPS[-1])
-    for level in range(0, int(top) + 1, step):
-        _grid_line(image, f"{level}", int(height_of(level)))
-    error_known = bool(np.isfinite(error).all())
-    if error_known:
-        _polyline(image, x, height_of(error))
-    marks = (("unknown_sides", "sides", 1.0, OTHER), ("lost", "lost", LOST, MISSED))
-    for k, (name, label, least, colour) in enumerate(marks):
-        row = bottom + 8 + k * (MARKS_HEIGHT + 6)
-        cv2.rectangle(image, (LEFT_MARGIN, row), (width - RIGHT_MARGIN, row + MARKS_HEIGHT), LINES, 1)
-        for at in x[np.array([values[name] >= least for values in rows])]:
-            left, right = (
-                np.rint(np.clip([at - half, at + half], LEFT_MARGIN, width - RIGHT_MARGIN)).astype(int).tolist()
-            )
-            cv2.rectangle(image, (left, row), (right, row + MARKS_HEIGHT), colour, -1)
-        write(image, label, (8, row + MARKS_HEIGHT), colour, SUMMARY_SCALE - 0.1)
-    write(image, title or "nothing is reported as unknown or lost", (LEFT_MARGIN, 20), scale=SUMMARY_SCALE)
-    levels = ", ".join(f"{100 * level:.0f}" for level in LEVELS)
-    legend = [("mm, the mean over joints:", TEXT)] if radii is not None or error_known else []
-    legend += [(f"intervals of {levels} %", RIGHT)] if radii is not None else []
-    legend += [("true error", BOTH)] if error_known else []
-    at = LEFT_MARGIN
-    for word, colour in [*legend, ("left and right unknown", OTHER), ("lost", MISSED)]:
-        write(image, word, (at, 44), colour, SUMMARY_SCALE)
-        at += width_of(word, SUMMARY_SCALE) + 18
-    return image
-
-
-def _columns(count: int, width: int) -> tuple[Array, float]:
-    """Return where frames stand from left to right (count,), and half of what is between two."""
-    x = np.linspace(LEFT_MARGIN, width - RIGHT_MARGIN, max(count, 2))[:count]
-    return x, 0.5 * (width - RIGHT_MARGIN - LEFT_MARGIN) / max(count - 1, 1)
-
-
-def _grid_line(image: Image, label: str, row: int) -> None:
-    cv2.line(image, (LEFT_MARGIN, row), (image.shape[1] - RIGHT_MARGIN, row), LINES, 1)
-    write(image, label, (8, row + 6), scale=SUMMARY_SCALE - 0.1)
-
-
-def _polyline(image: Image, x: Array, y: Array) -> None:
-    points = np.rint(np.column_stack([x, y]) * 16).astype(np.int32)
+        row = int(height - 24 - level * scale)
+        cv2.line(image, (left, row), (right, row), LINES, 1)
+        write(image, f"{level:.2f}", (8, row + 6), scale=SUMMARY_SCALE - 0.1)
+    x = np.linspace(left, right, max(len(values), 2))[: len(values)]
+    points = np.rint(np.column_stack([x, height - 24 - scale * np.array(values)]) * 16).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
+    write(image, f"{name}, frame by frame: 0, mean and maximum", (left, 20), scale=SUMMARY_SCALE)
+    return image
