@@ -21,7 +21,7 @@ from tests.docs.pages import ROOT, RUN, SHOWN, Block, blocks, pages
 BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
 SLOW = tuple(
-    f"docs/{page}.md" for page in ("ways/sweep", "howto/ambiguity", "howto/suite", "howto/masks", "howto/settings")
+    f"docs/{page}.md" for page in ("ways/sweep", "howto/ambiguity", "howto/suite", "howto/masks", "reference/settings")
 )
 VIDEO = ROOT.parent / "shared/data/video/sports2d_walk"
 
