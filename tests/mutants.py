@@ -27,7 +27,6 @@ KERNEL_TESTS = {  # which tests notice a change of a package's kernels
     "posefit/silhouette": ["tests/silhouette"],
     "posefit/geometry": ["tests/geometry", "tests/silhouette/test_kernels.py"],
     "posefit/fitting": ["tests/fitting"],
-    "posefit/uncertainty": ["tests/uncertainty"],
     "plugins/posefit_exemplars": ["tests/sources", "tests/exemplars"],
 }
 

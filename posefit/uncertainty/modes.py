@@ -7,11 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, frozen, writeable
+from posefit.arrays import Array, frozen
 from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, JOINTS, MIRROR, SIDES, Skeleton, joint_distances, root_centred
 from posefit.uncertainty.calibration import Recalibration
-from posefit.uncertainty.kernels import mean_distances
 
 # ours: metres, the mean over joints, beyond which poses are of different modes; a mirrored stride is 0.15 to 0.2 off
 APART = 0.1
@@ -84,7 +83,7 @@ def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> 
     its medoid; a mean might be no possible pose. Weights are shares of the poses' weight, raised to the sharpness of
     the posterior's recalibration; they sum to 1, less its probability that no mode is right.
     """
-    distances = mean_distances(writeable(skeleton.joints(posterior.poses)))
+    distances = poses_apart(skeleton, posterior.poses, posterior.poses)
     clusters = _clusters(distances, posterior.weights, apart)
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
@@ -117,9 +116,10 @@ def _nearest(skeleton: Skeleton, modes: Sequence[Mode], joints: Array) -> tuple[
 
 def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
     """Return the distances (n, K), metres, of poses (n, 66) from others (K, 66): the mean over joints, root-centred."""
-    joints, targets = skeleton.joints(poses), skeleton.joints(others)
-    distances = [joint_distances(each, targets).mean(axis=-1) for each in joints]
-    return np.array(distances).reshape(len(poses), len(others))
+    from scipy.spatial.distance import cdist
+
+    pairs = zip(np.moveaxis(skeleton.joints(poses), 1, 0), np.moveaxis(skeleton.joints(others), 1, 0), strict=True)
+    return np.asarray(sum(cdist(joints, targets) for joints, targets in pairs) / len(JOINTS))
 
 
 def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: float = APART) -> list[TrackMode]:
@@ -129,7 +129,7 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: floa
     """
     if not posteriors or any(not frame.coherent or len(frame) != len(posteriors[0]) for frame in posteriors):
         raise InputError("posteriors must be coherent, of one length and at least one, to be tracks")
-    distances = np.mean([mean_distances(writeable(skeleton.joints(frame.poses))) for frame in posteriors], axis=0)
+    distances = np.mean([poses_apart(skeleton, frame.poses, frame.poses) for frame in posteriors], axis=0)
     weights = np.mean([frame.weights for frame in posteriors], axis=0)
     poses = np.array([frame.poses for frame in posteriors])
     translations = np.array([frame.translations for frame in posteriors])

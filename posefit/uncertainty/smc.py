@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
+from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.uncertainty import kernels
-from posefit.uncertainty.landscape import Box, Landscape, wrap
+from posefit.uncertainty.landscape import Box, Landscape, displacement, wrap
 
 PARTICLES = 2048  # N, ours
 CHAIN = 8  # P, ours: of N = M P particles, M survive and each becomes a chain of P
@@ -38,8 +37,6 @@ class NormalMixture:
     broad: float  # between 0 and 1
 
     def __post_init__(self) -> None:
-        for name in ("centres", "spreads"):
-            object.__setattr__(self, name, writeable(getattr(self, name)))
         if not ((self.spreads > 0.0) & (self.spreads <= WIDEST)).all():
             raise InputError(f"spreads must be above 0 and at most {WIDEST}, got {self.spreads.ravel()[:3]}")
 
@@ -63,15 +60,28 @@ class NormalMixture:
 
     def log_density(self, box: Box, proposals: Array) -> Array:
         """Return the logarithm (n,) of the density of proposals (n, d), over that of the uniform distribution."""
-        each = math.log((1.0 - self.broad) / len(self.centres))
-        return np.asarray(kernels.log_sums(self._log_parts(box, proposals), each, math.log(self.broad)))
+        parts = self._log_parts(box, proposals)
+        top = parts.max(axis=1)
+        near = top + np.log(np.exp(parts - top[:, None]).mean(axis=1))
+        return np.logaddexp(near + math.log(1.0 - self.broad), math.log(self.broad))
 
     def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
         """Return the densest normal distribution (n,) at each of proposals (n, d)."""
         return np.asarray(self._log_parts(box, proposals).argmax(axis=1))
 
     def _log_parts(self, box: Box, proposals: Array) -> Array:
-        return np.asarray(kernels.log_parts(writeable(proposals), self.centres, self.spreads, box.periodic))
+        """Return the logarithms (n, k) of each normal density, over that of the uniform distribution."""
+        from scipy.special import ndtr
+
+        flat, turning, spreads = ~box.periodic, np.flatnonzero(box.periodic), self.spreads
+        centres, precise = self.centres[:, flat], spreads[:, flat] ** -2
+        inside = ndtr((1.0 - centres) / spreads[:, flat]) - ndtr((-1.0 - centres) / spreads[:, flat])
+        logs = proposals[:, flat] @ (precise * centres).T - 0.5 * proposals[:, flat] ** 2 @ precise.T
+        logs -= 0.5 * (precise * centres**2).sum(axis=1) + np.log(inside).sum(axis=1)
+        for k in turning.tolist():
+            away = (proposals[:, k, None] - self.centres[:, k] + 1.0) % 2.0 - 1.0
+            logs += np.log(sum(np.exp(-0.5 * ((away + turn) / spreads[:, k]) ** 2) for turn in (-2.0, 0.0, 2.0)))
+        return np.asarray(logs - np.log(0.5 * math.sqrt(2.0 * math.pi) * spreads).sum(axis=1))
 
     def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
         drawn = rng.uniform(-1.0, 1.0, (count, box.dimensions))
@@ -156,9 +166,18 @@ def next_step(rises: Array, left: float, survival: float) -> float:
     step grows: bisection.
     """
     alive = rises[rises > -np.inf]
-    if not len(alive) or kernels.effective(left * alive) >= survival * len(alive):
+
+    def enough(step: float) -> bool:
+        weights = np.exp(step * (alive - alive.max()))
+        return bool(weights.sum() ** 2 / (weights @ weights) >= survival * len(alive))
+
+    if not len(alive) or enough(left):
         return left
-    return float(kernels.longest_step(alive, left, survival * len(alive), HALVINGS))  # DAU2022 (exponent)
+    low, high = 0.0, left
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if enough(middle) else (low, middle)
+    return high  # DAU2022 (exponent)
 
 
 def reweighed(rises: Array, step: float) -> Array:
@@ -184,10 +203,13 @@ def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
 
 def _walk(start: NormalMixture, landscape: Landscape, proposals: Array, weights: Array) -> Array:
     """Return the root (d, d) of a random walk's covariance, in proportion to that within the modes of the start."""
-    box, dimensions = landscape.box, proposals.shape[1]
-    groups = start.nearest(box, proposals)
-    covariance = kernels.covariance_within(writeable(proposals), weights, groups, start.centres, box.periodic)
-    covariance += 1e-12 * np.eye(dimensions)
+    proposals, weights, dimensions = proposals[weights > 0.0], weights[weights > 0.0], proposals.shape[1]
+    groups = start.nearest(landscape.box, proposals)
+    around = displacement(landscape.box, start.centres[groups], proposals)
+    for group in np.unique(groups):
+        rows = groups == group
+        around[rows] -= np.average(around[rows], axis=0, weights=weights[rows])
+    covariance = (weights[:, None] * around).T @ around + 1e-12 * np.eye(dimensions)
     return np.asarray(2.38 / np.sqrt(dimensions) * np.linalg.cholesky(covariance))  # DAU2022 (random walk)
 
 
@@ -204,8 +226,10 @@ def _moved(
     rng: np.random.Generator,
 ) -> tuple[_State, float]:
     """Return a chain's next state, and the share of its moves that was accepted."""
-    tried = kernels.random_walk(state[0], rng.standard_normal(state[0].shape), walk, landscape.box.periodic)
-    new = (tried, landscape.costs(tried), start.log_density(landscape.box, tried))
-    moved_state = (state[0].copy(), state[1].copy(), state[2].copy())
-    share = kernels.accept_moves(*moved_state, *new, rng.random(len(tried)), exponent, temperature)
-    return moved_state, float(share)
+    (proposals, costs, starts), box = state, landscape.box
+    tried = wrap(box, proposals + rng.standard_normal(proposals.shape) @ walk.T)
+    new_costs, new_starts = landscape.costs(tried), start.log_density(box, tried)
+    rises = exponent * (costs - new_costs) / temperature + (1.0 - exponent) * (new_starts - starts)
+    moves = np.log1p(-rng.random(len(tried))) < rises
+    moved = np.where(moves[:, None], tried, proposals)
+    return (moved, np.where(moves, new_costs, costs), np.where(moves, new_starts, starts)), float(moves.mean())
