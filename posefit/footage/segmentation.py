@@ -16,7 +16,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span
-from posefit.footage.quality import FrameQuality, Verdict, advice, verdict
+from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.reading import quoted
 from posefit.registry import registry
@@ -54,7 +54,8 @@ class Extraction:
     """How the person is separated from the rest of a video.
 
     `method` is a segmenter's name: by default a "mixture" of Gaussians learned from the whole video, or the "mean" of
-    `background` where that is given: frames without a person, as A:B, or an image. `settings` are the segmenter's own.
+    `background` where that is given: frames without a person, as A:B, or an image. Where the default's masks are
+    doubted, a track tries "mediapipe", if that is installed. `settings` are the segmenter's own.
     `roi` x, y, width, height in the video's own pixels is where the person is searched; `ignore` is an image whose
     bright pixels are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
     """
@@ -69,7 +70,6 @@ class Extraction:
     def __post_init__(self) -> None:
         if not 36 <= self.width <= 8192:
             raise InputError(f"width must lie in 36 to 8192 pixels, got {self.width}")
-        object.__setattr__(self, "method", segmenter_name(self.method, self.background))
         offer = registry().offer("segmenter", self.name)
         if self.background is not None:
             offers = registry().offers["segmenter"].values()
@@ -87,8 +87,15 @@ class Extraction:
     @property
     def name(self) -> str:
         """The segmenter's name."""
-        assert self.method is not None
-        return self.method
+        return segmenter_name(self.method, self.background)
+
+    @property
+    def fallback(self) -> "Extraction | None":
+        """What to try where the masks are doubted; None where a segmenter was chosen, or no other is installed."""
+        other = registry().offers["segmenter"].get(PEOPLE_SEGMENTER)
+        if self.method or self.background or self.settings or other is None or other.missing:
+            return None
+        return replace(self, method=PEOPLE_SEGMENTER)
 
     def segmenter(self, film: Footage) -> Segmenter:
         """Return the segmenter, trained on a film. Raises InputError where a setting does not fit it."""

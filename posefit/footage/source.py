@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -13,6 +13,7 @@ from posefit.errors import InputError
 from posefit.footage.cameras import CameraView, calibrated, combined, listed
 from posefit.footage.cleaning import cleaned
 from posefit.footage.masks import FPS, Range, existing
+from posefit.footage.quality import Verdict
 from posefit.footage.readers import IMAGES, Masks, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
@@ -104,8 +105,7 @@ def scene_of(
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
         known = calibrated(camera, [video.size for video in videos])
-        segmentations = [Segmentation(video, extraction or Extraction(), frames) for video in videos]
-        views = [_filmed(segmentation, progress) for segmentation in segmentations]
+        views = _filmed(videos, extraction or Extraction(), frames, progress)
     else:
         known = calibrated(camera, [None] * len(sources))
         places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
@@ -121,15 +121,40 @@ def body_of(asf: str | Path | None, height: float | None) -> Body:
     return body if height is None else body.scaled(height / body.stature, height / body.stature)
 
 
-def _filmed(segmentation: Segmentation, progress: Progress) -> CameraView:
-    """Return what a video shows. Raises InputError where its masks cannot be those of a person."""
-    video = segmentation.video
-    progress.log(f"taking the person out of {video.path}")
-    masks = segmentation.masks(progress.steps)
-    if segmentation.verdict and segmentation.verdict.refused:
-        raise InputError(segmentation.verdict.text)
-    pictures = partial(video.frames, segmentation.start, segmentation.stop, segmentation.size)
-    return CameraView(masks, segmentation.warnings, str(video.path), video.size, pictures, segmentation.facings)
+def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress) -> list[CameraView]:
+    """Return what videos show. Raises InputError where their masks cannot be those of a person.
+
+    Where the default's masks are doubted and another segmenter is installed, the one is used that is doubted less.
+    """
+    views, doubt = _taken_out(videos, how, frames, progress)
+    if doubt and (other := how.fallback):
+        others, left = _taken_out(videos, other, frames, progress)
+        if left is None or (doubt.refused and not left.refused):
+            reason = doubt.text.partition(";")[0]
+            said = f"{other.name} took the person out, instead of {how.name}: {reason}"
+            others[0] = replace(others[0], warnings=[*others[0].warnings, said])
+            views, doubt = others, left
+    if doubt and doubt.refused:
+        raise InputError(doubt.text)
+    return views
+
+
+def _taken_out(
+    videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress
+) -> tuple[list[CameraView], Verdict | None]:
+    """Return what videos show, and the worst that is wrong with their masks, if anything."""
+    views, doubts = [], []
+    segmentations = [Segmentation(video, how, frames) for video in videos]  # all are checked before any is read
+    for part in segmentations:
+        progress.log(f"taking the person out of {part.video.path}{f' by {how.method}' if how.method else ''}")
+        try:
+            masks = part.masks(progress.steps)
+        except InputError as error:
+            return [], Verdict(str(error), True)
+        pictures = partial(part.video.frames, part.start, part.stop, part.size)
+        views.append(CameraView(masks, part.warnings, str(part.video.path), part.video.size, pictures, part.facings))
+        doubts += [part.verdict] if part.verdict else []
+    return views, max(doubts, key=lambda one: one.refused, default=None)
 
 
 @dataclass(frozen=True)

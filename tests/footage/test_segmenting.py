@@ -21,6 +21,7 @@ from posefit.footage.segmentation import Extraction, Segmentation, facings_on_th
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.camera import Camera
+from posefit.registry import Registry, registry
 from posefit.silhouette.foreground import Image, Person
 from tests.cases import each
 from tests.commands import error_of, run
@@ -60,6 +61,31 @@ def test_a_person_who_is_always_there_is_refused_before_any_tracking(
     assert f"{kind}.avi: the person seems to stand in the background" in error
     assert "give --background with an empty picture, or --extraction mediapipe" in error
     assert list(tmp_path.iterdir()) == []
+
+
+@each("kind", ["jumping", "passing"])
+def test_where_the_defaults_masks_are_doubted_an_installed_network_takes_the_person_out(
+    films: dict[str, Any], kind: Kind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, true = films[kind]
+
+    class Network:
+        def __init__(self, film: object) -> None:
+            self.masks = iter(true)
+
+        def segment(self, image: Image) -> tuple[Any, Any]:
+            mask = next(self.masks)
+            return mask, np.zeros_like(mask)
+
+    plugins = registry().plugins
+    offer = replace(registry().offers["segmenter"]["mediapipe"], factory=Network, needs=None)
+    installed = Registry((*plugins, plugins[0]._replace(offers=(offer,))))
+    monkeypatch.setattr("posefit.footage.segmentation.registry", lambda: installed)
+    scene = scene_of([path], height=1.7)
+    doubted = kind == "jumping"
+    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    assert not doubted or overlap(masks, true) > 0.95
+    assert any("mediapipe took the person out, instead of mixture: " in text for text in scene.warnings) == doubted
 
 
 @each("kind", ["passing", "leaving", *ALWAYS])
