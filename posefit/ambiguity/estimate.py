@@ -10,10 +10,10 @@ step may leave out; the tests compare the result with all combinations at full s
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,34 +47,24 @@ MIN_SPACING = 0.02  # metres between joints, root mean square: nearer poses of o
 Rows = NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class LibraryPoses:
-    """Poses (K, 66) of clips, in their order. The mirror images are the second half."""
+class Origin(NamedTuple):
+    """Where a pose of the library comes from."""
 
-    poses: Array = field(repr=False)
-    names: tuple[str, ...]  # of the clips
-    clips: Rows = field(repr=False)  # (K,) number of the clip
-    frames: Rows = field(repr=False)  # (K,) frame of the clip
+    clip: str
+    frame: int
+    mirrored: bool
 
-    @classmethod
-    def of(cls, motions: Sequence[Motion], skeleton: Skeleton) -> Self:
-        """Return the poses of motions and their mirror images; `skeleton` is the person's.
 
-        A frame nearer than two centimetres to the last one used of its clip is left out.
-        """
-        spaced = [spaced_frames(skeleton, motion.poses) for motion in motions]
-        poses = [motion.poses[rows] for motion, rows in zip(motions, spaced, strict=True)]
-        images = [mirrored_poses(motion.skeleton, some) for motion, some in zip(motions, poses, strict=True)]
-        clips = np.repeat(np.arange(len(motions)), [len(rows) for rows in spaced])
-        names = tuple(motion.name for motion in motions)
-        return cls(np.concatenate(poses + images), names, np.tile(clips, 2), np.tile(np.concatenate(spaced), 2))
+def library_of(motions: Sequence[Motion], skeleton: Skeleton) -> tuple[Array, list[Origin]]:
+    """Return the poses (K, 66) of motions, then their mirror images, and the origin of each.
 
-    def __len__(self) -> int:
-        return len(self.poses)
-
-    def is_mirrored(self, row: int) -> bool:
-        """Return whether a pose is the mirror image of a recorded one."""
-        return row >= len(self) // 2
+    A frame nearer than two centimetres to the last one used of its clip is left out; `skeleton` is the person's.
+    """
+    spaced = [(motion, spaced_frames(skeleton, motion.poses)) for motion in motions]
+    poses = [motion.poses[rows] for motion, rows in spaced]
+    images = [mirrored_poses(motion.skeleton, some) for (motion, _), some in zip(spaced, poses, strict=True)]
+    frames = [(motion.name, int(row)) for motion, rows in spaced for row in rows]
+    return np.concatenate(poses + images), [Origin(*frame, mirrored) for mirrored in (False, True) for frame in frames]
 
 
 def spaced_frames(skeleton: Skeleton, poses: Array) -> Rows:
@@ -115,35 +105,25 @@ def problem_of(
     return PoseProblem(body, cameras, silhouettes, space, threads=threads)
 
 
-def shrink_factor(problem: PoseProblem) -> int:
-    """Return the factor by which the images may be shrunk."""
-    fewest = min(silhouette.pixels for silhouette in problem.silhouettes if silhouette.known)
-    return next((factor for factor in SHRINK_FACTORS if fewest >= factor**2 * MIN_PIXELS), 1)
-
-
 @dataclass(frozen=True, eq=False)
 class States:
     """Poses and yaws that fit a silhouette about equally well."""
 
     rows: Rows = field(repr=False)  # (n,) of the library
-    poses: Array = field(repr=False)  # (n, 66) turned to their yaws
-    translations: Array = field(repr=False)  # (n, 3) metres
+    posterior: Posterior = field(repr=False)  # turned to their yaws; under a uniform prior, exp(-cost / temperature)
     costs: Array = field(repr=False)  # (n,)
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def posterior(self, temperature: float) -> Posterior:
-        """Return the posterior under a uniform prior: weights exp(-cost / temperature)."""
-        return Posterior(self.poses, self.translations, boltzmann_weights(self.costs, temperature))
 
-
-def states_within(problem: PoseProblem, poses: Array, within: float) -> States:
+def states_within(problem: PoseProblem, poses: Array, within: float, temperature: float) -> States:
     """Return those of poses (K, 66), at any of 72 yaws, whose cost is at most `within` above the least.
 
     Raises ValueError where they are too many to compare with each other.
     """
-    small = problem.coarser(shrink_factor(problem))
+    fewest = min(silhouette.pixels for silhouette in problem.silhouettes if silhouette.known)
+    small = problem.coarser(next((factor for factor in SHRINK_FACTORS if fewest >= factor**2 * MIN_PIXELS), 1))
     rows, yaws = np.tile(np.arange(len(poses)), YAWS // EVERY), np.repeat(np.arange(0, YAWS, EVERY), len(poses))
     rows, yaws, _ = _best(small, poses, rows, yaws, within + MARGIN)
     beside = [np.mod(yaws + step, YAWS) for step in range(-(EVERY // 2), EVERY // 2 + 1)]
@@ -155,7 +135,7 @@ def states_within(problem: PoseProblem, poses: Array, within: float) -> States:
             f"which leaves {len(rows):,}"
         )
     turned = turned_to(poses[rows], yaws)
-    return States(rows, turned, problem.placed(turned), costs)
+    return States(rows, Posterior(turned, problem.placed(turned), boltzmann_weights(costs, temperature)), costs)
 
 
 def turned_to(poses: Array, yaws: Rows) -> Array:
@@ -193,46 +173,42 @@ class PoseCluster:
     image: str  # of the first cluster: mirrored, turned or reflected, see posefit.geometry.symmetry; or ""
 
 
-def clusters_of(problem: PoseProblem, states: States, posterior: Posterior) -> list[PoseCluster]:
+def clusters_of(problem: PoseProblem, states: States) -> list[PoseCluster]:
     """Return clusters of states by their joints relative to the root, the heaviest first."""
-    skeleton, weights = problem.body.skeleton, posterior.weights
+    skeleton, poses, weights = problem.body.skeleton, states.posterior.poses, states.posterior.weights
     # a random sample, as a regular stride could pick similar poses
     some = np.sort(np.random.default_rng(0).permutation(len(states))[:MAX_COMPARED])
-    modes = modes_of(skeleton, Posterior(states.poses[some], states.translations[some], weights[some]))
-    nearest = poses_apart(skeleton, np.array([mode.pose for mode in modes]), states.poses).argmin(axis=0)
+    modes = modes_of(skeleton, Posterior(poses[some], states.posterior.translations[some], weights[some]))
+    nearest = poses_apart(skeleton, np.array([mode.pose for mode in modes]), poses).argmin(axis=0)
     groups = [rows for k in range(len(modes)) if len(rows := np.flatnonzero(nearest == k))]
     groups.sort(key=lambda rows: -weights[rows].sum())
     best = [int(rows[states.costs[rows].argmin()]) for rows in groups]
-    first, towards = states.poses[best[:1]], facing(problem.cameras[0], problem.space.anchor)
+    first, towards = poses[best[:1]], facing(problem.cameras[0], problem.space.anchor)
     images = {
         "mirrored": mirrored_poses(skeleton, first),
         "turned": turned_poses(first),
         "reflected": reflected_poses(skeleton, first, towards),
     }
-    away = 1e3 * poses_apart(skeleton, states.poses[best], first)[:, 0]
+    away = 1e3 * poses_apart(skeleton, poses[best], first)[:, 0]
     # to a millimetre, as in a side view a mirrored pose is the reflected one as well
-    from_images = np.round(1e3 * poses_apart(skeleton, states.poses[best], np.concatenate([*images.values()])))
+    from_images = np.round(1e3 * poses_apart(skeleton, poses[best], np.concatenate([*images.values()])))
     clusters = []
     for k, rows in enumerate(groups):
         image = [*images][from_images[k].argmin()] if from_images[k].min() < IMAGE_TOLERANCE * away[k] else ""
-        spread = body_spread(spread_mm(skeleton, states.poses[rows], weights[rows]))
+        _, spread = spreads_mm(skeleton, poses[rows], weights[rows])
         clusters.append(PoseCluster(float(weights[rows].sum()), rows, best[k], spread, float(away[k]), image))
     return clusters
 
 
-def spread_mm(skeleton: Skeleton, poses: Array, weights: Array) -> Array:
-    """Return the spread (27,) in millimetres of the joints of poses (n, 66) with weights (n,), all roots at one point.
+def spreads_mm(skeleton: Skeleton, poses: Array, weights: Array) -> tuple[Array, float]:
+    """Return the spread (27,) in millimetres of the joints of poses (n, 66) with weights (n,), and that of the body.
 
-    It is the root mean square distance of each joint from its mean; weights need not sum to 1.
+    A joint's is the root mean square distance from its mean, all roots at one point; the body's is that of its joints.
+    Weights need not sum to 1.
     """
     joints, weights = skeleton.joints(poses), weights / weights.sum()
-    mean = np.einsum("n,njk->jk", weights, joints)
-    return np.asarray(1e3 * np.sqrt(weights @ ((joints - mean) ** 2).sum(axis=2)))
-
-
-def body_spread(spreads_mm: Array) -> float:
-    """Return the spread of a body from those (27,) of its joints: their root mean square."""
-    return float(np.sqrt((spreads_mm**2).mean()))
+    squares = weights @ ((joints - np.einsum("n,njk->jk", weights, joints)) ** 2).sum(axis=2)
+    return 1e3 * np.sqrt(squares), 1e3 * float(np.sqrt(squares.mean()))
 
 
 MAX_SUMMARY_BYTES = 10_000_000
@@ -248,16 +224,14 @@ def body_of(folder: str | Path, body: Body) -> Body:
     if not path.is_file():
         raise InputError(f"{folder}: expected the folder of a track with its {path.name}, got none")
     try:
-        summary = parsed_json(read_text(path, MAX_SUMMARY_BYTES))
-        build = summary["body"] if isinstance(summary, Mapping) else None
-        if not isinstance(build, Mapping):
+        build = parsed_json(read_text(path, MAX_SUMMARY_BYTES))["body"]
+        if build is None:
             raise InputError("expected the build of a person, got none: it was not fitted")
-        factors = np.array([finite_number(name, build["factors"][name]) for name in NAMES])
-        stature = finite_number("stature", build["stature"])
-        for name, factor in zip(NAMES, factors, strict=True):
-            between(name, factor, *BUILD_RANGE)
+        stature, factors = finite_number("stature", build["stature"]), build["factors"]
         between("stature", stature, *HEIGHTS)
-        return shaped(body, factors, stature)
+        for name in NAMES:
+            between(name, finite_number(name, factors[name]), *BUILD_RANGE)
+        return shaped(body, np.array([factors[name] for name in NAMES]), stature)
     except KeyError as error:
         raise InputError(f"{path}: expected {error.args[0]} in it, got none") from None
     except (ValueError, TypeError) as error:
@@ -276,11 +250,7 @@ class Floor:
     count: int  # poses and yaws that cannot be distinguished
     least: float  # cost
     joints_mm: Array = field(repr=False)  # (27,)
-
-    @property
-    def spread_mm(self) -> float:
-        """The spread of the body: the root mean square of its joints' spreads."""
-        return body_spread(self.joints_mm)
+    spread_mm: float  # of the body: the root mean square of its joints' spreads
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +262,7 @@ class Ambiguity:
     within: float
     temperature: float
     problem: PoseProblem = field(repr=False)
-    library: LibraryPoses = field(repr=False)
+    library: Sequence[Origin] = field(repr=False)  # of its poses
     states: States = field(repr=False)  # of all cameras together
     clusters: Sequence[PoseCluster]  # the heaviest first
     floors: Sequence[Floor]  # the first is that of `states`
@@ -346,17 +316,19 @@ def ambiguity_of(
     for warning in scene.warnings:
         progress.warn(warning)
     began = time.perf_counter()
-    library = LibraryPoses.of(training_motions(clips, FPS), scene.body.skeleton)
-    states = states_within(problem, library.poses, within)
-    clusters = clusters_of(problem, states, states.posterior(temperature))
+    poses, library = library_of(training_motions(clips, FPS), scene.body.skeleton)
+    views = {1: "one camera", 2: "both cameras"}.get(len(problem.cameras), f"all {len(problem.cameras)} cameras")
+    found, floors = [], []
+    for name, each in [(views, problem), *_others(scene, problem, frame)]:
+        found.append(states_within(each, poses, within, temperature))
+        spreads = spreads_mm(scene.body.skeleton, found[-1].posterior.poses, found[-1].posterior.weights)
+        floors.append(Floor(name, len(found[-1]), float(found[-1].costs.min()), *spreads))
+    states = found[0]
+    clusters = clusters_of(problem, states)
     truth = None
     if scene.truth is not None:
-        best = states.poses[[cluster.best for cluster in clusters]]
+        best = states.posterior.poses[[cluster.best for cluster in clusters]]
         truth = (1e3 * poses_apart(scene.body.skeleton, best, scene.truth.poses[frame : frame + 1])[:, 0]).tolist()
-    views = {1: "one camera", 2: "both cameras"}.get(len(problem.cameras), f"all {len(problem.cameras)} cameras")
-    floors = [_floor(views, problem, states, temperature)]
-    for name, other in _others(scene, problem, frame):
-        floors.append(_floor(name, other, states_within(other, library.poses, within), temperature))
     seconds = time.perf_counter() - began
     return Ambiguity(scene, frame, within, temperature, problem, library, states, clusters, floors, truth, seconds)
 
@@ -400,8 +372,3 @@ def camera_about(camera: Camera, place: Array, angle: float) -> Camera:
     rotation = camera.rotation @ turn.T
     translation = camera.rotation @ place + camera.translation - rotation @ place
     return replace(camera, rotation=rotation, translation=translation)
-
-
-def _floor(views: str, problem: PoseProblem, states: States, temperature: float) -> Floor:
-    spreads = spread_mm(problem.body.skeleton, states.poses, states.posterior(temperature).weights)
-    return Floor(views, len(states), float(states.costs.min()), spreads)

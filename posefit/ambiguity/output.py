@@ -35,7 +35,7 @@ def summary_of(result: Ambiguity) -> dict[str, Any]:
         "temperature": result.temperature,
         "translation": result.problem.space.translation,
         "views": len(result.problem.cameras),
-        "library": {"clips": len(result.library.names), "poses": len(result.library), "yaws": YAWS},
+        "library": {"clips": len({pose.clip for pose in result.library}), "poses": len(result.library), "yaws": YAWS},
         "similar": len(result.states),
         "least_cost": float(result.states.costs.min()),
         "modes": [_mode(result, k) for k in range(len(result.clusters))],
@@ -102,9 +102,9 @@ def by_kind(joints_mm: Any) -> dict[str, float]:
 
 
 def _mode(result: Ambiguity, k: int) -> dict[str, Any]:
-    cluster, states, library = result.clusters[k], result.states, result.library
-    row, yaw = int(states.rows[cluster.best]), float(states.poses[cluster.best, 0])
-    towards = facing(result.problem.cameras[0], states.translations[cluster.best])
+    cluster, states, poses = result.clusters[k], result.states, result.states.posterior
+    origin, yaw = result.library[int(states.rows[cluster.best])], float(poses.poses[cluster.best, 0])
+    towards = facing(result.problem.cameras[0], poses.translations[cluster.best])
     return {
         "weight": cluster.weight,
         "poses": len(cluster.members),
@@ -115,9 +115,9 @@ def _mode(result: Ambiguity, k: int) -> dict[str, Any]:
         "view_degrees": float(np.degrees(wrapped(np.array(towards - yaw)))),
         "image": cluster.image or None,
         "cost": float(states.costs[cluster.best]),
-        "clip": library.names[library.clips[row]],
-        "clip_frame": int(library.frames[row]),
-        "clip_mirrored": library.is_mirrored(row),
+        "clip": origin.clip,
+        "clip_frame": origin.frame,
+        "clip_mirrored": origin.mirrored,
     }
 
 
@@ -161,7 +161,8 @@ def nearer(camera: Camera, silhouette: Silhouette) -> tuple[Camera, Image]:
 def _column(result: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Image:
     """Return the column of a cluster: text, body before the silhouette, body from the side."""
     cluster, body = result.clusters[k], result.problem.body
-    pose, place = result.states.poses[cluster.best], result.states.translations[cluster.best]
+    states = result.states.posterior
+    pose, place = states.poses[cluster.best], states.translations[cluster.best]
     head = _blank(BAND, WIDTH)
     write(head, f"{cluster.weight:.2f}", (12, 26), scale=0.75)
     write(head, cluster.image or ("first" if k == 0 else ""), (90, 26))

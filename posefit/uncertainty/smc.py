@@ -80,7 +80,8 @@ class NormalMixture:
         logs -= 0.5 * (precise * centres**2).sum(axis=1) + np.log(inside).sum(axis=1)
         for k in turning.tolist():
             away = (proposals[:, k, None] - self.centres[:, k] + 1.0) % 2.0 - 1.0
-            logs += np.log(sum(np.exp(-0.5 * ((away + turn) / spreads[:, k]) ** 2) for turn in (-2.0, 0.0, 2.0)))
+            near, *images = (0.5 * ((away + turn) / spreads[:, k]) ** 2 for turn in (0.0, -2.0, 2.0))
+            logs += np.log1p(sum(np.exp(near - far) for far in images)) - near
         return np.asarray(logs - np.log(0.5 * math.sqrt(2.0 * math.pi) * spreads).sum(axis=1))
 
     def _drawn(self, box: Box, rng: np.random.Generator, count: int) -> Array:
