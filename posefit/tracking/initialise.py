@@ -58,7 +58,7 @@ def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, 
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
     if restarts:
         progress.log(f"looking for the first pose, {restarts} times")
-        task = best_restart(task, scene.observations, method.follow, restarts, options.seed)
+        task, _ = best_restart(task, scene.observations, method.follow, restarts, options.seed)
     shape = None
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"

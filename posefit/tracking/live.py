@@ -26,7 +26,6 @@ from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
 from posefit.progress import QUIET, Progress
 from posefit.silhouette.mask import Mask, Silhouette
-from posefit.tracking.follow import tracker_of
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
@@ -95,9 +94,8 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         method = prepare(chosen, task)
         if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
             progress.log(f"looking for the first pose, {restarts} times")
-            task = best_restart(task, scene.observations, method.follow, restarts, chosen.seed)
-        tracker = tracker_of(method, scene, task)
-        for frame in tracker.track(coming(), np.random.default_rng(chosen.seed)):
+            task, _ = best_restart(task, scene.observations, method.follow, restarts, chosen.seed)
+        for frame in method.relocalising(task, footage=True).track(coming(), np.random.default_rng(chosen.seed)):
             live = waiting.popleft()
             came, began = live.source.arrived, first[0].source.arrived
             yield LiveFrame(live.source.number, came - began, time.perf_counter() - came, live.usable, frame)

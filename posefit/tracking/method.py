@@ -32,6 +32,7 @@ from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.modes import WeighingTracker
 from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import GAP, RelocalisingTracker
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
@@ -105,6 +106,17 @@ class Method:
     def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
         """Return a tracker for a task, whose plugin may take so many seconds longer to propose a population."""
         return self._make(task, patience)
+
+    def looks_ahead(self, task: Task) -> bool:
+        """Return whether the tracker of a task takes several observations before it gives a frame."""
+        return getattr(self.tracker(task), "lag", None) is not None
+
+    def relocalising(self, task: Task, footage: bool) -> Tracker:
+        """Return a tracker that in footage relocalises after gaps, unless it looks ahead."""
+        tracker, gap = self.tracker(task), self.relocalise_gap
+        if gap is None:
+            gap = GAP if footage and getattr(tracker, "lag", None) is None else 0
+        return RelocalisingTracker(task, self.follow, gap) if gap else tracker
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""

@@ -3,8 +3,8 @@
 | step | what it returns | file |
 |---|---|---|
 | `initialise` | the first pose and the person's build | initialise.py |
-| `follow` | the frames of each hypothesis, by the method's own tracker | follow.py |
-| `retrack` | the frames of the cheapest, tracked again where the body spins | follow.py, restarts.py |
+| `follow` | the frames of each hypothesis, by the method's own tracker | pipeline.py |
+| `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
 | `smooth` | of footage: a smooth path, feet that stand, poses fitted to the contours | smoothing/ |
 | `evaluate` | errors against the truth, or signs of trust, and the summary | summary.py |
 """
@@ -13,21 +13,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.errors import InputError
 from posefit.footage.scene import Scene, on_device
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
-from posefit.tracking.follow import follow, retrack
-from posefit.tracking.initialise import initialise, task_of
-from posefit.tracking.method import prepare
+from posefit.tracking.initialise import Guess, initialise, task_of
+from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
-from posefit.tracking.restarts import MAX_TURN_RATE
+from posefit.tracking.restarts import MAX_TURN_RATE, SEARCHED, initial_guess, retrack_spins, stream
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import Pass, smooth
 from posefit.tracking.summary import evaluate
+from posefit.tracking.trajectory import Hypothesis, cheapest
 
 
 def track_scene(
@@ -62,11 +63,53 @@ def track_scene(
         method.audit.clear()  # what was tried before the first frame is in no row
         with progress.phase("follow"):
             hypotheses = follow(guess, method, options, output, progress)
-            tracked = retrack(guess, method, hypotheses, options, progress)
-        if tracked.start is not None:
-            guess = replace(guess, task=replace(guess.task, fastest_turn=MAX_TURN_RATE))
+            scene, task = guess.scene, guess.task
+            tracked = cheapest(scene, hypotheses, task.training)
+            if scene.truth is None and method.looks_ahead(task):
+                frames, start = retrack_spins(task, scene.observations, tracked.frames, method.follow, options.seed)
+                tracked = tracked._replace(frames=frames, start=start)
+                if start is not None:
+                    progress.log(
+                        f"the body turned faster than a person can: tracked again both ways from frame {start}"
+                    )
+                    guess = replace(guess, task=replace(task, fastest_turn=MAX_TURN_RATE))
         smoothed = Pass(guess.scene, tracked.frames, guess.shape, 1)
         if options.smooth:
             with progress.phase("smooth"):
                 smoothed = smooth(guess, method, tracked.frames, options, progress)
         return evaluate(smoothed, method, guess.task, tracked, options, output, progress, source or {})
+
+
+def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, progress: Progress) -> list[Hypothesis]:
+    """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again."""
+    earlier, state = output.earlier()
+    scene, count, total = guess.scene, guess.scene.count, options.hypotheses
+    hypotheses: list[Hypothesis] = []
+    for number in range(total):
+        name, task = SEARCHED, guess.task
+        if number:
+            each = zip(hypotheses[0][1], scene.observations, strict=True)
+            first = next((frame for frame, seen in each if seen.usable), hypotheses[0][1][0])
+            name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", first)
+        frames = list(earlier[number * count : (number + 1) * count])
+        rng = stream(options.seed, "hypothesis", number) if number else np.random.default_rng(options.seed)
+        which = f" of track {number + 1} of {total}, {name}" if total > 1 else ""
+        if state is not None and 0 < len(frames) < count:
+            rng.bit_generator.state = state
+            frames = [  # this track has other trajectories than the earlier one
+                frame if (own := frame.posterior) is None else replace(frame, posterior=replace(own, coherent=False))
+                for frame in frames
+            ]
+            progress.log(f"going on from frame {len(frames)} of {count}{which}")
+            last = frames[-1]
+            task = replace(task, yaw=float(last.pose[0]), first_pose=last.pose[3:], before=tuple(frames))
+        elif which and not frames:
+            progress.log(f"track {number + 1} of {total}: {name}")
+        hypotheses.append((name, frames))
+        if len(frames) < count:
+            rest = (scene.observations[k] for k in range(len(frames), count))
+            tracker = method.relocalising(task, scene.truth is None)
+            for frame in progress.steps(tracker.track(rest, rng), count - len(frames)):
+                output.record(frame, dict(rng.bit_generator.state))
+                frames.append(frame)
+    return hypotheses

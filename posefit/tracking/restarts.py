@@ -81,8 +81,8 @@ def best_restart(
     restarts: int,
     seed: int | Sequence[int],
     going_on: Task | None = None,
-) -> Task:
-    """Return the task with the best of several restarts as the frame before the first.
+) -> tuple[Task, list[Frame]]:
+    """Return the task with the best of several restarts as the frame before the first, and all frames of the trial.
 
     Each searches the first usable frame, at all yaws where none is known, and follows the person through a few more
     frames. The least mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution,
@@ -91,23 +91,26 @@ def best_restart(
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
-    apart = replace(task, fps=task.fps / TRIAL_STRIDE)  # for models of motion
-    trial, shown = _coarser(apart, chosen, factor) if factor > 1 else (apart, chosen)
+    trial, shown = replace(task, fps=task.fps / TRIAL_STRIDE), chosen  # for models of motion
+    if factor > 1:
+        trial = replace(trial, cameras=[coarser_camera(camera, factor) for camera in task.cameras])
+        masks = [[coarser_silhouette(silhouette, factor) for silhouette in seen.silhouettes] for seen in chosen]
+        shown = [replace(seen, silhouettes=small) for seen, small in zip(chosen, masks, strict=True)]
     prefix = [seed] if isinstance(seed, int) else [*seed]
-    best, least = None, np.inf
+    best, least, tried = going_on or task, np.inf, list[Frame]()
     if going_on is not None:
-        on = replace(going_on, fps=apart.fps, cameras=trial.cameras)
-        least = _trial_cost(list(follow(on, shown, np.random.default_rng([*prefix, restarts + 1]))))
+        on = replace(going_on, fps=trial.fps, cameras=trial.cameras)
+        tried += follow(on, shown, np.random.default_rng([*prefix, restarts + 1]))
+        least = _trial_cost(tried)
     for k in range(restarts):
         frames = list(follow(trial, shown, np.random.default_rng([*prefix, k])))
+        tried += frames
         if (cost := _trial_cost(frames)) < least:
-            best, least = frames[0], cost
-    if best is None:
-        return going_on or task
-    if factor == 1:
-        return _after(task, best)
-    rng = np.random.default_rng([*prefix, restarts])
-    return _after(task, next(follow(_after(task, best), chosen[:1], rng)))
+            best, least = _after(task, frames[0]), cost
+    if factor > 1 and best is not (going_on or task):
+        tried.append(next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts]))))
+        best = _after(task, tried[-1])
+    return best, tried
 
 
 def _trial_cost(frames: Sequence[Frame]) -> float:
@@ -123,15 +126,6 @@ def _trial_cost(frames: Sequence[Frame]) -> float:
 def _after(task: Task, frame: Frame) -> Task:
     """Return the task that goes on from a frame."""
     return replace(task, yaw=float(frame.pose[0]), anchor=frame.translation, first_pose=frame.pose[3:], before=(frame,))
-
-
-def _coarser(task: Task, observations: Sequence[Observation], factor: int) -> tuple[Task, list[Observation]]:
-    """Return a task and its observations through every `factor`th pixel of every `factor`th row."""
-    small = [
-        replace(seen, silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in seen.silhouettes])
-        for seen in observations
-    ]
-    return replace(task, cameras=[coarser_camera(camera, factor) for camera in task.cameras]), small
 
 
 # While a track goes on.
@@ -154,72 +148,44 @@ class RelocalisingTracker:
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation."""
         coming, rest = tee(observations)
-        history, going = _History(self.task, self.gap), self.follow(self.task, rest, rng)
+        going = self.follow(self.task, rest, rng)
+        many = max(round(TYPICAL_COST_SECONDS * self.task.fps), 1)
+        few = max(round(HIGH_COST_SECONDS * self.task.fps), 1)
+        latest: Frame | None = None  # that showed the person
+        unseen, costs = 0, list[float]()  # frames since then; and since the last relocalisation
+
+        def add(frame: Frame, usable: bool) -> None:
+            nonlocal latest, unseen
+            if RELOCALISED in frame.details:
+                costs.clear()
+            unseen += 1
+            if usable:
+                latest, unseen = frame, 0
+                costs.append(frame.cost)
+
+        if len(self.task.before) > 1:  # a single one is what the track was begun with
+            for frame in self.task.before:
+                add(frame, frame.evaluations > 0)
         for observation in coming:
-            tried: list[Frame] = []
-            relocalised = False
-            if observation.usable and (latest := history.lost_after()) is not None:
+            typical, high, tried = costs[:-few], costs[-few:], None
+            costly = len(typical) >= many and min(high) > COST_RISE * float(np.median(typical))
+            if observation.usable and latest is not None and (costly or unseen >= self.gap):
                 window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]
-                task = self._relocalise(latest, window, tried, independent(rng))
-                if relocalised := task is not None:
+                seeds = independent(rng).integers(0, 2**32, 2).tolist()
+                around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
+                on = _after(around, latest)
+                task, tried = best_restart(around, window, self.follow, RESTARTS, seeds, on)
+                if task is not on:
                     going = self.follow(task, chain([observation], copy(coming)), rng)
             if (frame := next(going, None)) is None:
                 return
-            if tried:
-                frame = _with_effort(frame, tried, relocalised)
-            history.add(frame, observation.usable)
+            if tried is not None:
+                effort = effort_of([frame, *tried])
+                spent = None if frame.spent is None else frame.spent + effort["evaluations"] - frame.evaluations
+                frame = replace(frame, **effort, spent=spent, details={**frame.details, RELOCALISED: task is not on})
+            add(frame, observation.usable)
             yield frame
         yield from going  # none: the tracker gets to its end
-
-    def _relocalise(
-        self, latest: Frame, coming: list[Observation], tried: list[Frame], rng: np.random.Generator
-    ) -> Task | None:
-        """Return the task to go on with; None where the track is best as it is. `tried` gets every frame tried."""
-        around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
-        on = _after(around, latest)
-
-        def counted(task: Task, shown: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-            for frame in self.follow(task, shown, rng):
-                tried.append(frame)
-                yield frame
-
-        task = best_restart(around, coming, counted, RESTARTS, rng.integers(0, 2**32, 2).tolist(), on)
-        return None if task is on else task
-
-
-def _with_effort(frame: Frame, tried: Sequence[Frame], relocalised: bool) -> Frame:
-    """Return a frame with the evaluations and times of those that were tried before it."""
-    effort = effort_of([frame, *tried])
-    spent = None if frame.spent is None else frame.spent + effort["evaluations"] - frame.evaluations
-    return replace(frame, **effort, spent=spent, details={**frame.details, RELOCALISED: relocalised})
-
-
-class _History:
-    """The latest frame of a track that showed the person, and the costs of its frames since it relocalised."""
-
-    def __init__(self, task: Task, gap: int) -> None:
-        self._gap, self._unseen, self._costs = gap, 0, list[float]()
-        self._typical = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
-        self._high = max(round(HIGH_COST_SECONDS * task.fps), 1)
-        self.latest: Frame | None = None
-        if len(task.before) > 1:  # a single one is what the track was begun with
-            for frame in task.before:
-                self.add(frame, frame.evaluations > 0)
-
-    def add(self, frame: Frame, usable: bool) -> None:
-        """Add a frame that was estimated, or held where the observation was not usable."""
-        if RELOCALISED in frame.details:
-            self._costs = []
-        self._unseen = 0 if usable else self._unseen + 1
-        if usable:
-            self.latest = frame
-            self._costs.append(frame.cost)
-
-    def lost_after(self) -> Frame | None:
-        """Return the latest frame where the person was away for the gap since, or costs have been high; else None."""
-        typical, high = self._costs[: -self._high], self._costs[-self._high :]
-        costly = len(typical) >= self._typical and min(high) > COST_RISE * float(np.median(typical))
-        return self.latest if costly or self._unseen >= self._gap else None
 
 
 # Several hypotheses.

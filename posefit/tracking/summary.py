@@ -11,14 +11,13 @@ from posefit.fitting.tracker import Task
 from posefit.measuring.gait import backwards, backwards_warning, gait_of
 from posefit.progress import Progress
 from posefit.tracking.evaluation import LOST, evaluated, unseen
-from posefit.tracking.follow import Tracked
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.restarts import RELOCALISED
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import Pass
-from posefit.tracking.trajectory import motion_of
+from posefit.tracking.trajectory import Tracked, motion_of
 from posefit.tracking.trust import trust_of
 from posefit.uncertainty.modes import modes_of, track_modes
 from posefit.version import __version__

@@ -6,7 +6,7 @@ in most frames, or has to jump. So a trajectory that is judged as a whole is rig
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,17 @@ WALKING_SPEED = 1.0  # metres a second, of the joints about the root: the typica
 MIN_TYPICAL_SPEED = 0.25  # metres a second
 TURN_AROUND_SPEED = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot
 JUMP_SPEED = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
+
+
+Hypothesis = tuple[str, list[Frame]]  # a track from one initial guess, and what that is called
+
+
+class Tracked(NamedTuple):
+    """The track that is kept of several, with the effort of all."""
+
+    frames: list[Frame]
+    hypotheses: list[dict[str, Any]]  # of each of several: its initial guess, cost and motion term, and whether kept
+    start: int | None = None  # the frame from which it was tracked again because it spun
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,21 @@ def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Fram
         spent = None if frame.spent is None else frame.spent * effort["evaluations"] // max(frame.evaluations, 1)
         frames.append(replace(frame, **effort, spent=spent))
     return frames
+
+
+def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]) -> Tracked:
+    """Return the hypothesis whose trajectory costs least."""
+    if len(hypotheses) == 1:
+        return Tracked(hypotheses[0][1], [])
+    usable, speed = [observation.usable for observation in scene.observations], typical_speed(training)
+    tracks = [frames for _, frames in hypotheses]
+    costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
+    kept = min(range(len(costs)), key=lambda k: costs[k].total)
+    table = [
+        {"guess": guess, "cost": cost.cost, "motion": cost.motion, "kept": k == kept}
+        for k, ((guess, _), cost) in enumerate(zip(hypotheses, costs, strict=True))
+    ]
+    return Tracked(with_total_effort(tracks, kept), table)
 
 
 def typical_speed(training: Sequence[Motion]) -> float:

@@ -73,7 +73,7 @@ def test_restarts_are_compared_in_small_pictures_and_the_best_goes_on_in_the_who
             view = replace(scene, cameras=task.cameras)
             yield frame_of(view, motion.poses[0], motion.translations[0], observation)
 
-    guess = best_restart(task, scene.observations, follow, 3, 0)
+    guess, _ = best_restart(task, scene.observations, follow, 3, 0)
     # frames 0 and 3 of each restart, with their own rate, and the first of the best once more if they were reduced
     assert views == [(rows, 10.0)] * 6 + ([(size[1], 30.0)] if rows != size[1] else [])
     assert guess.fps == 30.0

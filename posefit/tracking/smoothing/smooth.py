@@ -18,7 +18,6 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.silhouette.cost import pose_costs
-from posefit.tracking.follow import tracker_of
 from posefit.tracking.initialise import Guess
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
@@ -65,7 +64,8 @@ def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: Track
         known = (replace(seen, translation=place) for seen, place in zip(scene.observations, path, strict=True))
         progress.log(f"tracking again along its path, pass {number + 1} of {options.passes}")
         rng = stream(options.seed, "pass", number)
-        tracked = list(progress.steps(tracker_of(method, scene, task).track(known, rng), scene.count))
+        tracker = method.relocalising(task, scene.truth is None)
+        tracked = list(progress.steps(tracker.track(known, rng), scene.count))
         passes.append(Pass.smoothed(scene, tracked, before.shape, method.beta, number + 1))
         if passes[-1].cost < PASS_TOLERANCE * before.cost:
             kept = number
