@@ -15,6 +15,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.progress import Progress
 from posefit.silhouette.cost import areas
 from posefit.tracking import method
 from posefit.tracking.outputs import OutputFolder
@@ -94,3 +95,16 @@ def viewed(folder: Path, scene: Scene, frames: Sequence[Frame]) -> Path:
     with OutputFolder(folder, False, False, {}, print) as output:
         tracked(scene, frames, output=output)
     return folder / "track.html"
+
+
+def stopping(after: int) -> Progress:
+    """Return a progress that ends the program after some frames, of all tracks together."""
+    left = iter(range(after))
+
+    def steps(frames: Iterator[Any], _count: int) -> Iterator[Any]:
+        for frame in frames:
+            if next(left, None) is None:
+                raise KeyboardInterrupt
+            yield frame
+
+    return Progress(steps=steps)

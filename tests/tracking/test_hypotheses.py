@@ -1,6 +1,6 @@
 """Several hypotheses: their initial guesses, what trajectories cost, which is kept, and that all are counted."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from posefit.tracking.trajectory import (
     typical_speed,
 )
 from tests.cases import each
-from tests.tracking.scenes import walk
+from tests.tracking.scenes import stopping, walk
 
 WALK = built_in.motion("walk", frames=30)
 SKELETON = WALK.skeleton
@@ -161,26 +161,13 @@ def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -
     assert single.summary["hypotheses"] == []
 
 
-def stopping(after: int) -> Any:
-    """Return a progress that ends the program after some frames, of all tracks together."""
-    left = iter(range(after))
-
-    def progress(steps: Iterator[Any], _count: int) -> Iterator[Any]:
-        for step in steps:
-            if next(left, None) is None:
-                raise KeyboardInterrupt
-            yield step
-
-    return progress
-
-
 def test_interrupted_hypotheses_go_on_where_they_were(tmp_path: Path) -> None:
     options: dict[str, Any] = {"hypotheses": 3, "seed": 1, "view_degrees": 90.0, **QUICK}
     whole, names = posefit.track("walk", **options), ("searched", "mirrored", "reflected")
     for after in [1, 3, 4, 7]:
         written: dict[str, Any] = {**options, "out": tmp_path / f"walk-{after}"}
         with pytest.raises(KeyboardInterrupt):
-            posefit.track("walk", progress=Progress(steps=stopping(after)), **written)
+            posefit.track("walk", progress=stopping(after), **written)
         with pytest.raises(ValueError, match="hypotheses must be 3, as before, to resume, got 2"):
             posefit.track("walk", resume=True, **{**written, "hypotheses": 2})
         log: list[str] = []

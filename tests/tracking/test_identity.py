@@ -9,22 +9,11 @@ import pytest
 
 import posefit
 from posefit.motion import built_in
-from posefit.progress import Progress
 from posefit.tracking.identity import digest_of
 from tests.cases import each
+from tests.tracking.scenes import stopping
 
 QUICK: dict[str, Any] = {"method": "sapso", "frames": (0, 8), "size": (120, 90), "evaluations": 200}
-
-
-class StopError(Exception):
-    """The track ends too early."""
-
-
-def stopping(frames: Any, count: int) -> Any:
-    for k, frame in enumerate(frames):
-        yield frame
-        if k + 1 == 4:
-            raise StopError
 
 
 def camera(azimuth: float) -> posefit.Camera:
@@ -34,29 +23,25 @@ def camera(azimuth: float) -> posefit.Camera:
 def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
     assert repr(camera(0.5)) == repr(camera(1.5))  # which is why texts are not enough
     out = tmp_path / "out"
-    with pytest.raises(StopError):
-        posefit.track("walk", camera=camera(0.5), out=out, progress=Progress(steps=stopping), **QUICK)
+    with pytest.raises(KeyboardInterrupt):
+        posefit.track("walk", camera=camera(0.5), out=out, progress=stopping(4), **QUICK)
     with pytest.raises(ValueError, match="camera must be .* as it was, to resume, got one with another content"):
         posefit.track("walk", camera=camera(1.5), out=out, resume=True, **QUICK)
-    resumed = posefit.track(
-        "walk", camera=camera(0.5), out=out, resume=True, **QUICK
-    )  # another object, the same camera
+    # another object, the same camera
+    resumed = posefit.track("walk", camera=camera(0.5), out=out, resume=True, **QUICK)
     whole = posefit.track("walk", camera=camera(0.5), **QUICK)
     np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
 
 
-def test_a_file_is_what_it_holds(tmp_path: Path) -> None:
-    first, second = tmp_path / "a.npz", tmp_path / "b"
-    first.write_bytes(b"masks")
-    before = digest_of(first, files=True)
-    assert digest_of(str(first), files=True)["digest"] == before["digest"]
-    assert digest_of(first)["digest"] != before["digest"]
-    first.write_bytes(b"maskz")
-    assert digest_of(first, files=True)["digest"] != before["digest"]
-    second.mkdir()
-    empty = digest_of(second, files=True)
-    (second / "0.png").write_bytes(b"x")
-    assert digest_of(second, files=True)["digest"] != empty["digest"]
+def test_a_file_or_a_folder_is_what_it_holds(tmp_path: Path) -> None:
+    file, folder = tmp_path / "a.npz", tmp_path / "b"
+    folder.mkdir()
+    for path, inside in ((file, file), (folder, folder / "0.png")):
+        digests = set()
+        for content in (b"masks", b"maskz"):
+            inside.write_bytes(content)
+            digests |= {digest_of(path, files=True)["digest"], digest_of(str(path), files=True)["digest"]}
+        assert len(digests | {digest_of(path)["digest"]}) == 3
 
 
 @each(
@@ -78,8 +63,8 @@ def test_different_values_have_different_digests(first: Any, second: Any) -> Non
 
 def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:
     options: dict[str, Any] = {**QUICK, "method": "vsmm", "out": tmp_path / "out"}
-    with pytest.raises(StopError):
-        posefit.track("walk", progress=Progress(steps=stopping), **options)
+    with pytest.raises(KeyboardInterrupt):
+        posefit.track("walk", progress=stopping(4), **options)
     resumed = posefit.track("walk", resume=True, **options)
     whole = posefit.track("walk", **{**options, "out": None})
     for before, after in zip(whole.estimates, resumed.estimates, strict=True):

@@ -1,5 +1,6 @@
 """A method is chosen by names: equal budgets, settings, and what happens where a plugin breaks a rule."""
 
+import functools
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -36,34 +37,6 @@ def test_a_budget_is_the_population_times_iterations_and_one() -> None:
     assert TrackOptions(population_size=10, evaluations=300).budget == 300
 
 
-def test_a_filter_carries_its_particles_and_the_others_are_built_again(monkeypatch: Any) -> None:
-    built: list[str] = []
-    for name in ("particle", "sapso", "random"):
-        offer = registry().offer("optimiser", name)
-
-        def make(space: Any, rng: Any, offer: Offer = offer, **settings: Any) -> Any:
-            built.append("anywhere" if space.start is None else "start")
-            return offer.factory(space, rng, **settings)
-
-        make.__signature__ = __import__("inspect").signature(offer.factory)  # type: ignore[attr-defined]
-        counted = replace(offer, factory=make)
-        replaced = Registry(
-            (Plugin("test", "test", "1", "loaded", offers=(counted, registry().offer("prior", "pca"))),)
-        )
-        monkeypatch.setattr(method, "registry", lambda replaced=replaced: replaced)
-        built.clear()
-        posefit.track("walk", method=name, **QUICK)
-        first = "anywhere"  # of the track to warm up, and of the track itself
-        assert (
-            built
-            == {
-                "particle": [first, first],
-                "sapso": [first, first, "start", "start"],
-                "random": [first, first, "anywhere", "anywhere"],
-            }[name]
-        )
-
-
 @pytest.fixture
 def installed(monkeypatch: Any) -> Iterator[Any]:
     """Let plugins of the tests pass for installed ones."""
@@ -76,6 +49,26 @@ def installed(monkeypatch: Any) -> Iterator[Any]:
 
     yield install
     assert registry_package.registry() is registry()
+
+
+@each(
+    ("name", "later"),
+    [("particle", []), ("sapso", ["start", "start"]), ("random", ["anywhere", "anywhere"])],
+)
+def test_a_filter_carries_its_particles_and_the_others_are_built_again(
+    name: str, later: list[str], installed: Any
+) -> None:
+    built: list[str] = []
+    offer = registry().offer("optimiser", name)
+
+    @functools.wraps(offer.factory)
+    def make(space: Any, rng: Any, **settings: Any) -> Any:
+        built.append("anywhere" if space.start is None else "start")
+        return offer.factory(space, rng, **settings)
+
+    installed("optimiser", make, next_frame=offer.next_frame)
+    posefit.track("walk", method="bad", **QUICK)
+    assert built == ["anywhere", "anywhere", *later]  # of the track to warm up, and of the track itself
 
 
 class RaisesInTheMiddle(planted.Sound):

@@ -81,18 +81,6 @@ def test_planted_flips_are_reported_in_nine_of_ten_frames(options: dict[str, Any
     assert np.mean([0.1 <= weight <= 0.9 for weight in weights]) >= 0.9, weights
 
 
-@each(("temperature", "off"), [(2.0, 0.15), (1.0, 0.25)])
-def test_the_weight_of_a_flip_varies_little_between_seeds(temperature: float, off: float) -> None:
-    deviations = []
-    for frame in (0, 12, 24, 36):
-        problem, truth, other = side_view(frame)
-        search = modes_by("sapso", problem, temperature=temperature)
-        posteriors = [search(rng=np.random.default_rng(seed)) for seed in range(5)]
-        weights = np.array([other_weight(problem, posterior, truth, other) for posterior in posteriors])
-        deviations.append(np.abs(weights - weights.mean()).mean())
-    assert np.mean(deviations) < off, deviations
-
-
 def test_numbers_that_make_no_sense_are_refused() -> None:
     for options, message in [
         ({"searches": 0}, "searches must be at least 1, got 0"),
