@@ -111,9 +111,8 @@ class ConfigureEnv(SearchEnv):
     """
     ## Description
     A population searches for the pose in one silhouette. Each step is `every` iterations of it, and the action sets
-    which optimisers move it, how far, how much of it at a time, what is scattered and what is restarted: dynamic
-    algorithm configuration with a choice of algorithms. With `posefit_envs.policies.sapso_action` it is SAPSO: its
-    proposals are SAPSO's but for the rounding of stride and temperature in an action, and cost the same.
+    which optimisers move it, how far, how much of it at a time, and what is restarted: dynamic algorithm configuration.
+    With `posefit_envs.policies.sapso_action` it is SAPSO, but for the rounding of stride and temperature in an action.
 
     ## Action Space
     `Box(-1, 1, (10,), float32)`
@@ -132,13 +131,13 @@ class ConfigureEnv(SearchEnv):
 
     The shares are e^(5 a) of the first three numbers over their sum. Of the n particles that move at a time the first
     round(n share) are the swarm's, the next round(n share) differential evolution's, the rest are drawn from the normal
-    distribution. They are in the order of their bests where a part of the population moves, restarted ones first, and
-    in an order that never changes where all of it does. Number 3 reaches its ends at -0.5 and 0.5. Numbers 6 to 9 stand
-    for nothing from 0 down.
+    distribution: in the order of their bests where a part of the population moves, restarted ones first, and in an
+    order that never changes where all of it does. Number 3 reaches its ends at -0.5 and 0.5. Numbers 6 to 9 mean none from 0
+    down.
 
-    A step always has `every * population_size` evaluations: so a smaller part moves more often. Stride and temperature
-    fall with each iteration of a step as SAPSO's do. The best pose of all is kept, whatever is restarted. Actions
-    outside are clipped, with one warning.
+    A step always has `every * population_size` evaluations, so a smaller part moves more often. Stride and temperature
+    fall with each iteration as SAPSO's do. The best pose is kept, whatever is restarted. Actions outside are clipped,
+    with one warning.
 
     ## Observation Space
     `Box(0, 1, (25,), float32)`
@@ -159,8 +158,7 @@ class ConfigureEnv(SearchEnv):
     | 21 to 24 | shares and part of the population of the last action |
 
     ## Rewards
-    ln((1 + best cost before) / (1 + best cost after)); the sum over an episode is the logarithm of the factor by which
-    the best cost fell.
+    ln((1 + best cost before) / (1 + best cost after)).
 
     ## Starting State
     A first population of `population_size`, drawn uniformly and evaluated; the instance as in `FitImage-v0`.

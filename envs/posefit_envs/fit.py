@@ -82,8 +82,8 @@ class FitImageVectorEnv(SearchVectorEnv):
 class FitImageEnv(SearchEnv):
     """
     ## Description
-    A silhouette of a person is observed. Each step proposes a pose; its body is projected, and its mismatch with the
-    silhouette is the cost. The episode is a search for the pose by proposals alone.
+    A silhouette of a person is observed. Each step proposes a pose; the mismatch of its body with the silhouette is the
+    cost. The episode is a search for the pose.
 
     ## Action Space
     `Box(-1, 1, (d,), float32)`: a proposal, with `prior="pca"` and a known translation d = 9.
@@ -108,7 +108,7 @@ class FitImageEnv(SearchEnv):
     Minus the cost of the proposal, 0 to 100; SAPSO (4).
 
     ## Starting State
-    An instance: a pose of the motion, its cadence, and the middle of the searched yaw, all from its number. Without
+    An instance: its number gives the pose, the cadence, and the middle of the searched yaw. Without
     `instance` each reset draws a number of the `split`; `reset(options={"instance": 17})` chooses one.
 
     ## Episode End
@@ -128,7 +128,7 @@ class FitImageEnv(SearchEnv):
     - `noise=None`: corruptions of the silhouette and their strengths, such as `{"holes": 0.3, "shadow": 0.5}`; see
       `posefit.silhouette.corruption`.
     - `mismatch_percent=0.0`: the largest difference of the fitted body's bones and radii from the person's.
-    - `errors=True`: whether infos hold errors against the truth; a learner that does not read them needs none.
+    - `errors=True`: whether infos hold errors against the truth.
     - `target_cost=2.0`, `max_evaluations=200`.
     """
 
@@ -265,9 +265,8 @@ class FitStateVectorEnv(SearchVectorEnv):
 class FitStateEnv(SearchEnv):
     """
     ## Description
-    A silhouette of a person is observed. Each step proposes a pose; its body is projected, and its mismatch with the
-    silhouette is the cost. The episode is a search for the pose, and the observation holds what a search needs: the
-    best proposals so far and the last ones, with their costs.
+    As `FitImage-v0`, but the observation holds what a search needs: the best proposals so far and the last ones, with
+    their costs.
 
     ## Action Space
     `Box(-1, 1, (d + 1,), float32)`, with `prior="pca"` and a known translation d = 9.
@@ -277,8 +276,8 @@ class FitStateEnv(SearchEnv):
     | 0 to d - 1 | the target: a proposal, as in `FitImage-v0` |
     | d | the fraction of the way from the best proposal so far to the target, by powers of ten from 0.01 to 1 |
 
-    Where the last number is 1 the target is proposed, bit for bit; where it is 0, the point a tenth of the way there.
-    So every proposal lies in the box. Actions outside are clipped, with one warning. float64 is not rounded.
+    At 1 the target itself is proposed, bit for bit, and at 0 the point a tenth of the way there. Actions outside are
+    clipped, with one warning. float64 is not rounded.
 
     ## Observation Space
     `Box(-1, 1, (8 d + 10,), float32)`; with `image=True` a `Dict` of it as `search` and the picture of `FitImage-v0` as
@@ -292,19 +291,17 @@ class FitStateEnv(SearchEnv):
     | 8 d + 8 | budget left: from 1 to -1 |
     | 8 d + 9 | proposals since the best cost fell: from -1 to 1 for 50 or more |
 
-    Both lists begin as four copies of the middle of the box, with its cost. So a proposal that costs as much or more is
-    never among the best, where copies fill the remaining places; among the last they follow the first three proposals.
-    Of proposals that cost the same the earlier one is the better.
+    Both lists begin as four copies of the middle of the box, with its cost. Of proposals that cost the same the earlier
+    one is the better.
 
     ## Rewards
-    ln((1 + best cost before) / (1 + best cost after)): 0 where the proposal is no better than the best so far. The sum
-    over an episode is the logarithm of the factor by which the cost of the middle of the box fell.
+    ln((1 + best cost before) / (1 + best cost after)): 0 where the proposal is no better than the best so far.
 
     ## Starting State
     An instance, as in `FitImage-v0`. The middle of the box is proposed first, as the first of `max_evaluations`.
 
     ## Episode End
-    Terminates after `max_evaluations` proposals. There is no target. It is never truncated.
+    Terminates after `max_evaluations` proposals.
 
     ## Information
     `cost`, `best_cost`, `evaluations`, `areas` (views, 3) R, B, Y in pixels, `instance`, and unless `errors=False`

@@ -23,9 +23,9 @@ BRIER_OF_NO_REPORT = 2.0  # as of one whose weight is all in the wrong place
 class ModesEnv(RenderedEnv):
     """
     ## Description
-    The observed silhouette is that of two or more known poses, exactly or nearly: a stride and the one half a cycle
-    later, a person who comes and one who goes, an arm before the trunk or behind it. The episode is a search for all of
-    them, and for the probability of each. Each step proposes a pose, and may report it.
+    The observed silhouette is that of two or more known poses, exactly or nearly: the niching task of
+    `posefit.niching`. The episode is a search for all of them, and for the probability of each. Each step proposes a
+    pose, and may report it.
 
     ## Action Space
     `Box(-1, 1, (9,), float32)`:
@@ -54,8 +54,8 @@ class ModesEnv(RenderedEnv):
     whose silhouette it is, 2 where none is or nothing was reported.
 
     ## Starting State
-    An instance of the niching task, see `posefit.niching`. Without `instance` each reset draws a number of the `split`;
-    `reset(options={"instance": 17})` chooses one.
+    An instance. Without `instance` each reset draws a number of the `split`; `reset(options={"instance": 17})` chooses
+    one.
 
     ## Episode End
     Terminates when `max_reports` poses are reported; truncated after `max_evaluations` proposals.

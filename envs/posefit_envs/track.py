@@ -113,7 +113,7 @@ class TrackEnv(SearchEnv):
     The first frame of an instance, as in `FitImage-v0`.
 
     ## Episode End
-    Terminates when the last frame's pose is committed. It is never truncated.
+    Terminates when the last frame's pose is committed.
 
     ## Information
     `cost`, `best_cost`, `evaluations` of the frame, `areas` (views, 3), `frame`, `instance`, and unless `errors=False`
