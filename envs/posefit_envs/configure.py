@@ -132,8 +132,8 @@ class ConfigureEnv(SearchEnv):
     The shares are e^(5 a) of the first three numbers over their sum. Of the n particles that move at a time the first
     round(n share) are the swarm's, the next round(n share) differential evolution's, the rest are drawn from the normal
     distribution: in the order of their bests where a part of the population moves, restarted ones first, and in an
-    order that never changes where all of it does. Number 3 reaches its ends at -0.5 and 0.5. Numbers 6 to 9 mean none from
-    0 down.
+    order that never changes where all of it does. Number 3 reaches its ends at -0.5 and 0.5. From 0 down, numbers 6
+    to 9 mean none.
 
     A step always has `every * population_size` evaluations, so a smaller part moves more often. Stride and temperature
     fall with each iteration as SAPSO's do. The best pose is kept, whatever is restarted. Actions outside are clipped,
