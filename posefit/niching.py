@@ -72,19 +72,16 @@ def lent_arms() -> Array:
 @lru_cache(maxsize=1)
 def legs_and_arms() -> Components:
     """Return the prior of the niching task: components of legs and trunk, and then of the arms by themselves."""
-    mean, directions, ranges = np.zeros(ANGLES - 3), np.zeros((sum(COMPONENTS), ANGLES - 3)), []
-    first = 0
+    mean, directions, ends = np.zeros(ANGLES - 3), np.zeros((sum(COMPONENTS), ANGLES - 3)), []
+    prior, first = Components(mean, directions, np.empty(0), np.empty(0)), 0
     for poses, part, count in zip((stride_poses(), lent_arms()), (~_ARMS[3:], _ARMS[3:]), COMPONENTS, strict=True):
-        angles, block = poses[:, 3:], slice(first, first + count)
+        angles, block = poses[:, 3:], slice(first, first := first + count)
         mean[part] = angles[:, part].mean(axis=0)
         axes = np.linalg.svd(angles[:, part] - mean[part], full_matrices=False)[2][:count]
         directions[block, part] = axes * np.sign(axes[np.arange(count), np.abs(axes).argmax(axis=1)])[:, None]
-        first += count
-    prior = Components(mean, directions, np.empty(0), np.empty(0))
-    for poses, block in ((stride_poses(), slice(None, COMPONENTS[0])), (lent_arms(), slice(COMPONENTS[0], None))):
-        latents = prior.transform(poses[:, 3:])[:, block]
-        ranges.append((latents.min(axis=0), latents.max(axis=0)))
-    prior.low, prior.high = (np.concatenate(ends) for ends in zip(*ranges, strict=True))
+        latents = prior.transform(angles)[:, block]
+        ends.append((latents.min(axis=0), latents.max(axis=0)))
+    prior.low, prior.high = np.concatenate(ends, axis=1)
     return prior
 
 

@@ -14,7 +14,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import BONES, PARENTS, SIDES, Skeleton
+from posefit.geometry.skeleton import BONES, PARENTS, SIDES
 from posefit.motion.motion import Motion
 from posefit.tracking.drawing import OTHER, SIDE_COLOURS, opacities
 from posefit.tracking.evaluation import LOST
@@ -25,16 +25,12 @@ from posefit.uncertainty.modes import other_mode
 THIN = 0.006  # metres: how thick the lines are of what else it may be
 
 
-def _library() -> Any:
-    try:
-        return importlib.import_module("rerun")
-    except ImportError as error:
-        raise ImportError("recordings for Rerun need the library rerun-sdk: pip install posefit[viewer]") from error
-
-
 def check_recording(path: str | Path) -> None:
     """Raise ImportError without the library, and ValueError where the recording may not be written."""
-    _library()
+    try:
+        importlib.import_module("rerun")
+    except ImportError as error:
+        raise ImportError("recordings for Rerun need the library rerun-sdk: pip install posefit[viewer]") from error
     if Path(path).exists():
         raise InputError(f"{path}: expected a new file for the recording, got one that exists")
     if not Path(path).resolve().parent.is_dir():
@@ -46,7 +42,7 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
 
     `frames` are a tracker's, with their posterior and whether each is lost.
     """
-    rerun = _library()
+    rerun: Any = importlib.import_module("rerun")
     recording = rerun.RecordingStream("posefit")
     recording.save(str(path))
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
@@ -57,37 +53,28 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
             resolution=[camera.width, camera.height], focal_length=camera.focal, principal_point=camera.centre
         )
         recording.log(f"world/camera-{v}/mask", lens, static=True)
-    joints = estimate.joints
-    radii = scene.body.radii.mean(axis=1)
-    for k, (points, observation, frame) in enumerate(zip(joints, scene.observations, frames, strict=True)):
+    radii, skeleton = scene.body.radii.mean(axis=1), estimate.skeleton
+    sides = np.array([SIDE_COLOURS[side][::-1] for side in SIDES[1:]], dtype=np.float64)
+    for k, (points, observation, frame) in enumerate(zip(estimate.joints, scene.observations, frames, strict=True)):
         recording.set_time("frame", sequence=k)
         recording.set_time("time", duration=k / estimate.fps)
-        look = {"radii": radii, "colors": _colours(estimate.skeleton, frame), "labels": list(BONES)}
+        colours = sides
+        if frame.posterior is not None:
+            off = joint_intervals(skeleton, frame.posterior, frame.pose)[DRAWN_LEVEL]
+            colours = sides * opacities(off)[:, None]
+        look = {"radii": radii, "colors": colours.round().astype(np.uint8), "labels": list(BONES)}
         recording.log("world/body", rerun.LineStrips3D(_bones(points), **look, show_labels=False))
-        recording.log("world/other", _other(rerun, estimate.skeleton, frame))
+        other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
+        thin: Any = rerun.Clear(recursive=False)  # of what an earlier frame may have shown
+        if other is not None:
+            bones = _bones(skeleton.joints(other.pose, other.translation))
+            thin = rerun.LineStrips3D(bones, radii=THIN, colors=[OTHER[::-1]] * len(bones))
+        recording.log("world/other", thin)
         if frame.lost is not None and frame.lost >= LOST:
             recording.log("lost", rerun.TextLog(f"frame {k} is lost", level=rerun.TextLogLevel.WARN))
         for v, silhouette in enumerate(observation.silhouettes):
             recording.log(f"world/camera-{v}/mask", rerun.SegmentationImage(silhouette.mask.astype(np.uint8)))
     recording.flush()
-
-
-def _colours(skeleton: Skeleton, frame: Frame) -> Array:
-    """Return the colour of each bone (26, 3): of its side, the darker the less sure it is."""
-    colours = np.array([SIDE_COLOURS[side][::-1] for side in SIDES[1:]], dtype=np.float64)
-    if frame.posterior is not None:
-        radii = joint_intervals(skeleton, frame.posterior, frame.pose)[DRAWN_LEVEL]
-        colours *= opacities(radii)[:, None]
-    return np.asarray(colours.round(), np.uint8)
-
-
-def _other(rerun: Any, skeleton: Skeleton, frame: Frame) -> Any:
-    """Return what the frame may show as well, in thin lines; what clears it where that is nothing."""
-    other = other_mode(skeleton, frame.modes, frame.pose, MIN_OTHER_WEIGHT)
-    if other is None:
-        return rerun.Clear(recursive=False)
-    bones = _bones(skeleton.joints(other.pose, other.translation))
-    return rerun.LineStrips3D(bones, radii=THIN, colors=[OTHER[::-1]] * len(bones))
 
 
 def _bones(joints: Array) -> Array:

@@ -48,13 +48,7 @@ def table(summary: Mapping[str, Any]) -> str:
             lines.append(f"{projected.label:{WIDTH}} {projected.number(summary[projected.name]):>9}")
         shown = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
         lines.append(f"{', '.join(shown)} of frames")
-    if held := summary["held_frames"]:
-        show = "frame shows" if held == 1 else "frames show"
-        lines.append(
-            f"{held} {show} too little of the person: the pose is held or carried on, not searched, and may be off "
-            "the person; IoU is that of the others"
-        )
-    lines += [sentence] if (sentence := undetermined(summary)) else []
+    lines += filter(None, [held_frames(summary), undetermined(summary)])
     lines += [gait_line(summary["gait"])] if summary["frames"] > 1 else []
     if (body := summary["body"]) is not None:
         parts = [
@@ -73,6 +67,13 @@ def table(summary: Mapping[str, Any]) -> str:
     speed = MEASURES["evaluations_per_second"].number(summary["evaluations_per_second"])
     lines.append(f"{_effort(summary)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the names of files are among them
+
+
+def held_frames(summary: Mapping[str, Any]) -> str:
+    """Return in one sentence how many frames were not searched; empty where that is none."""
+    show = "frame shows" if summary["held_frames"] == 1 else "frames show"
+    what = f"{summary['held_frames']} {show} too little of the person: the pose is held or carried on, not searched"
+    return f"{what}, and may be off the person; IoU is that of the others" if summary["held_frames"] else ""
 
 
 def undetermined(summary: Mapping[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """The data of a track's page: bodies, figures, intervals, and words."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
+from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
@@ -18,14 +19,24 @@ from posefit.tracking.evaluation import LOST
 from posefit.tracking.measures import FRAME, Rows
 from posefit.tracking.page.stills import Stills
 from posefit.tracking.picture import MIN_OTHER_WEIGHT
-from posefit.tracking.table import undetermined
+from posefit.tracking.table import brief, held_frames, undetermined
 from posefit.tracking.trajectory import motion_of
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
 
 TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
+COLUMN = ("label", "unit", "digits", "factor")  # of a figure, as the page has it
 CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
+MARKS: dict[str, Callable[[Mapping[str, float]], bool]] = {
+    "held": lambda row: not row["usable"],
+    "lost": lambda row: row["lost"] >= LOST,
+    "unknown": lambda row: row["unknown_sides"] == 1.0,
+}
+ANGLE_NAMES = (
+    *("root yaw", "root pitch", "root roll"),
+    *(f"{JOINTS[k]} {axis} (bone to the {PLACES[k].replace('_', ' ')})" for k in INNER for axis in "xyz"),
+)
 
 
 def track_data(
@@ -47,15 +58,17 @@ def track_data(
     truth, free = scene.truth, estimate.skeleton.free
     true = None if truth is None else truth.joints[::step]
     angles = np.unwrap(estimate.poses[::step], axis=0)
+    worth = "" if truth is None else f": {brief(summary)[0]}"
+    curves = [name for name in CURVES if name in rows[0]]
     return {
         "version": __version__,
         "title": str(summary["motion"]),
-        "made": _made(summary),
+        "made": f"Tracked by {summary['method']}, written on {time.strftime('%d %B %Y')}{worth}.",
         "verdict": _verdict(summary),
-        "notes": [*_held(summary), *map(str, summary["warnings"])],
+        "notes": [*filter(None, [held_frames(summary)]), *map(str, summary["warnings"])],
         "facts": _facts(summary),
         "joints": JOINTS,
-        "places": [_words(place) for place in PLACES],
+        "places": [place.replace("_", " ") for place in PLACES],
         "parents": PARENTS,
         "sides": SIDES,
         "radii": np.round(scene.body.radii, 4).tolist(),
@@ -67,20 +80,20 @@ def track_data(
         "estimate": in_16_bits(joints - origin),
         "truth": None if true is None else in_16_bits(true - origin),
         "others": _others(scene, frames[::step], origin),
-        "columns": {name: _column(name) for name in CURVES if name in rows[0]},
-        "rows": {name: [row[name] for row in rows[::step]] for name in CURVES if name in rows[0]},
+        "columns": {name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves},
+        "rows": {name: [row[name] for row in rows[::step]] for name in curves},
         "marks": {
-            "held": _marked([not row["usable"] for row in rows], step),
-            "lost": _marked([row["lost"] >= LOST for row in rows], step),
-            "unknown": _marked([row["unknown_sides"] == 1.0 for row in rows], step),
+            name: sorted({k // step for k, row in enumerate(rows) if marked(row)}) for name, marked in MARKS.items()
         },
         "angles": {
-            "names": [name for name, there in zip(_angle_names(), free, strict=True) if there],
+            "names": [name for name, there in zip(ANGLE_NAMES, free, strict=True) if there],
             "values": in_16_bits(angles[:, free], UNIT),
-            "truth": None if truth is None else in_16_bits(_beside(angles, truth.poses[::step])[:, free], UNIT),
+            "truth": None
+            if truth is None
+            else in_16_bits((angles - wrapped(angles - truth.poses[::step]))[:, free], UNIT),
         },
         "clinical": {
-            "names": [_words(name) for name in COLUMNS],
+            "names": [name.replace("_", " ") for name in COLUMNS],
             "values": in_16_bits(_clinical(estimate, step), TENTH),
             "truth": None if truth is None else in_16_bits(_clinical(truth, step), TENTH),
         },
@@ -92,16 +105,6 @@ def track_data(
         if intervals
         else None,
     }
-
-
-def _made(summary: dict[str, Any]) -> str:
-    """Return the method, the date of the page and how far the track is off, in a sentence."""
-    made = f"Tracked by {summary['method']}, written on {time.strftime('%d %B %Y')}"
-    if summary["mpjpe_mm"] is None:
-        return f"{made}."
-    rate = summary["lost_rate"]
-    lost = "" if rate is None else f", {100.0 * rate:.0f}\N{NO-BREAK SPACE}% of the frames lost"
-    return f"{made}: {summary['mpjpe_mm']:.0f} mm off the truth{lost}."
 
 
 def _verdict(summary: dict[str, Any]) -> str:
@@ -116,17 +119,10 @@ def _verdict(summary: dict[str, Any]) -> str:
     return f"{trust}The method reports no frame as lost, and left and right as known in every frame."
 
 
-def _held(summary: dict[str, Any]) -> list[str]:
-    held = summary["held_frames"]
-    show = "shows" if held == 1 else "show"
-    return [f"{held} of {summary['frames']} frames {show} too little of the person: the pose is held."] if held else []
-
-
 def _facts(summary: dict[str, Any]) -> list[list[str]]:
     """Return names and values of the track's method and scene."""
-    mpjpe = [] if summary["mpjpe_mm"] is None else [["MPJPE", f"{summary['mpjpe_mm']:.0f} mm"]]
     return [
-        *mpjpe,
+        *([] if summary["mpjpe_mm"] is None else [["MPJPE", f"{summary['mpjpe_mm']:.0f} mm"]]),
         ["method", str(summary["method"])],
         ["seed", str(summary["seed"])],
         ["cameras", f"{summary['views']}, {summary['camera']}"],
@@ -134,11 +130,6 @@ def _facts(summary: dict[str, Any]) -> list[list[str]]:
         ["IoU", f"{summary['iou']:.3f}"],
         ["posefit", str(summary["version"])],
     ]
-
-
-def _column(name: str) -> dict[str, Any]:
-    measure = FRAME[name]
-    return {"label": measure.label, "unit": measure.unit, "digits": measure.digits, "factor": measure.factor}
 
 
 def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, Any]:
@@ -154,26 +145,7 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
     }
 
 
-def _marked(marks: Sequence[bool], step: int) -> list[int]:
-    """Return the frames shown that stand for a marked one."""
-    return sorted({k // step for k, marked in enumerate(marks) if marked})
-
-
-def _angle_names() -> list[str]:
-    inner = [f"{JOINTS[joint]} {axis} (bone to the {_words(PLACES[joint])})" for joint in INNER for axis in "xyz"]
-    return ["root yaw", "root pitch", "root roll", *inner]
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
 def _clinical(motion: Motion, step: int) -> Array:
     """Return the clinical angles (T, n) in degrees of every `step`-th frame."""
     angles = clinical_angles(motion.skeleton, motion.poses[::step])
     return np.column_stack([angles[name] for name in COLUMNS])
-
-
-def _beside(angles: Array, true: Array) -> Array:
-    """Return true angles (T, n), turned by whole turns to lie nearest to others."""
-    return np.asarray(true + 2.0 * np.pi * np.round((angles - true) / (2.0 * np.pi)))
