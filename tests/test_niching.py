@@ -1,8 +1,6 @@
 """The known poses of an instance: nearly as good as the true one, apart from the others, and in the box."""
 
 import itertools
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -65,14 +63,6 @@ def test_instances_are_of_their_kind() -> None:
     assert min(same) > 0.1
 
 
-def test_an_instance_is_the_same_in_another_process() -> None:
-    code = "from posefit.niching import niche_instance as n; i = n(4); print(i.true, i.known.tobytes().hex())"
-    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    instance = niche_instance(4)
-    assert int(other[0]) == instance.true
-    assert bytes.fromhex(other[1]) == instance.known.tobytes()
-
-
 def test_instances_differ_and_any_known_pose_may_be_the_true_one() -> None:
     instance = [niche_instance(number) for number in range(0, 24, 3)]
     assert len({one.known.tobytes() for one in instance}) == len(instance)
@@ -93,12 +83,10 @@ def test_the_box_holds_the_mirror_image_of_what_it_holds() -> None:
     assert clipped(held) == pytest.approx(held, abs=1e-12)
 
 
-def test_legs_do_not_move_the_arms_and_rows_are_independent() -> None:
+def test_legs_do_not_move_the_arms() -> None:
     prior = legs_and_arms()
     latents = np.random.default_rng(0).uniform(prior.low, prior.high, (7, len(prior.low)))
     angles = prior.inverse_transform(latents)
-    alone = [prior.inverse_transform(latents[k : k + 1])[0] for k in range(len(latents))]
-    np.testing.assert_array_equal(alone, angles)
     moved = latents.copy()
     moved[:, :3] = 0.0
     assert np.array_equal(prior.inverse_transform(moved)[:, ARMS - 3], angles[:, ARMS - 3])

@@ -191,7 +191,6 @@ def masks(folder: Path, azimuth: float = 0.8) -> Camera:
     [
         (["walk", "--frame", 60, *QUICK], "frame must lie in 0 to 59 of walk, got 60"),
         (["walk", "--frame", -1, *QUICK], "frame must be 0 or more, got -1"),
-        (["walk", "--frame", "x", *QUICK], "Invalid value for '--frame': 'x' is not a valid integer."),
         (["walk", "--within", -0.5, *QUICK], "within must be at least 0, got -0.5"),
         (["walk", "--within", "nan", *QUICK], "within must be a finite number, got nan"),
         (
@@ -202,9 +201,6 @@ def masks(folder: Path, azimuth: float = 0.8) -> Camera:
         (["walk", "--translation", "searched", *QUICK], "translation must be one of known, aligned, got 'searched'"),
         (["walk", "--height", 1.8, *QUICK], "height must be given for footage only, got 1.8 for a motion"),
         (["walk", "--build", "x", *QUICK], "build must be given for footage only, got 'x' for a motion"),
-        (["walk", "--train", "nowhere"], "motion must be a file, a folder, a recorded one"),
-        (["walk", "--without-subject", "16", *QUICK], "without_subject must be given with --train library, got walk-a"),
-        (["nothing.bvh"], "nothing.bvh: expected a file, got nothing of that name"),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(words: list[object], message: str, tmp_path: Path) -> None:
@@ -244,12 +240,6 @@ def test_an_unusable_frame_is_a_mistake(tmp_path: Path) -> None:
     assert run("ambiguity", *words, 0).exit_code == 0
 
 
-def test_an_existing_folder_is_a_mistake(tmp_path: Path) -> None:
-    result = run("ambiguity", "walk", "--frame", 999, "--out", tmp_path)
-    assert result.exit_code == 2
-    assert result.stderr.endswith("expected a new name to write to, got one that exists\n")
-
-
 def test_a_folder_is_written_and_a_table_printed(tmp_path: Path) -> None:
     result = run("ambiguity", "walk", "--frame", 5, "--within", 3, "--out", tmp_path / "out", *QUICK)
     assert result.exit_code == 0, result.stderr
@@ -262,19 +252,12 @@ def test_a_folder_is_written_and_a_table_printed(tmp_path: Path) -> None:
     assert picture.shape[1] % 260 == 0
     summary = json.loads((tmp_path / "out" / "ambiguity.json").read_text("utf-8"))
     assert (summary["source"], summary["frame"], summary["within"]) == ("walk", 5, 3.0)
-
-
-def test_the_summary_is_complete_and_weights_sum_to_one() -> None:
-    summary = printed("ambiguity", "walk", "--frame", 5, "--within", 3, *QUICK)
     modes, floor = summary["modes"], summary["floor"]
     assert sum(mode["weight"] for mode in modes) == pytest.approx(1.0)
     assert sum(mode["poses"] for mode in modes) == summary["similar"] == floor[0]["similar"]
     assert (modes[0]["away_mm"], modes[0]["clip"]) == (0.0, "walk-a")
     assert [views["views"] for views in floor] == ["one camera", "two cameras, the second at right angles"]
-    joints = floor[0]["joints_mm"]
-    assert list(joints) == list(JOINTS)
-    assert joints["root"] == pytest.approx(0.0)  # all roots are at one point
-    assert floor[0]["spread_mm"] == pytest.approx(np.sqrt(np.mean(np.square(list(joints.values())))))
+    assert list(floor[0]["joints_mm"]) == list(JOINTS)
 
 
 def test_masks_have_no_truth_and_several_cameras_are_compared_with_each(tmp_path: Path) -> None:
@@ -292,18 +275,6 @@ def test_masks_have_no_truth_and_several_cameras_are_compared_with_each(tmp_path
     assert two["views"] == 2
     assert [views["views"] for views in two["floor"]] == ["both cameras", "camera 1", "camera 2"]
     assert min(views["least_cost"] for views in two["floor"]) < 10.0
-
-
-def test_another_clip_of_the_same_person_is_near_the_truth() -> None:
-    result = ambiguity_of("walk", frame=5, train=["walk-a", "walk-b"], size=(160, 120))
-    assert result.truth_mm is not None
-    assert min(result.truth_mm) < 60.0
-
-
-def test_the_result_does_not_depend_on_the_number_of_threads() -> None:
-    one, two = (ambiguity_of("walk", frame=9, train=["walk-a"], size=(160, 120), threads=k) for k in (1, 2))
-    np.testing.assert_array_equal(one.states.costs, two.states.costs)
-    assert [cluster.weight for cluster in one.clusters] == [cluster.weight for cluster in two.clusters]
 
 
 AVERAGE = Body.of(built_in.average_skeleton())

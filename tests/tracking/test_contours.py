@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
-from scipy.ndimage import map_coordinates
+from scipy.spatial import ConvexHull
 
 from posefit.fitting.shape import NAMES, Shape, shaped
 from posefit.fitting.tracker import Frame, Observation
@@ -105,18 +104,6 @@ def test_the_border_of_a_mask_is_where_it_meets_known_background() -> None:
     assert borders.metres == pytest.approx([camera.focal[0] / 4.0] * 2)
 
 
-def test_large_masks_are_reduced_with_their_camera() -> None:
-    mask = np.zeros((800, 800), dtype=bool)
-    mask[200:600, 300:500] = True
-    camera = Camera.around(np.zeros(3), 0.0, 4.0, (800, 800))
-    borders = MaskContours.of(camera, 0, [Observation([Silhouette.of(mask)])], np.zeros((1, 3)))
-    factor = round(800 / borders.camera.width)
-    assert factor == int(camera.focal[0] / 4.0 / 80.0) == 3
-    point, small = (each.project(np.array([0.3, 0.2, 0.1]))[0] for each in (camera, borders.camera))
-    middle = 0.5 * (borders.points.min(axis=0) + borders.points.max(axis=0))
-    np.testing.assert_allclose(factor * (small - middle), point - [400.0, 400.0], atol=factor)
-
-
 def test_jacobians_are_the_change_with_poses_places_and_builds() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(2)
     poses, places = rng.normal(0.0, 0.3, (3, 66)), rng.normal(0.0, 0.2, (3, 3)) + [0.0, 0.9, 0.0]
@@ -165,66 +152,41 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     assert np.linalg.eigvalsh(curves[0]).min() > -1e-6
 
 
-def point_of(joints, radii, parents, bone, share, normal):  # type: ignore[no-untyped-def]
-    """Return the point of a bone's border at a share of it, in the direction of a normal."""
-    ends = np.array([1.0 - share, share])
-    return ends @ joints[[parents[bone], bone + 1]] + (ends @ radii[bone]) * normal
+def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
+    # the border of two discs' hull, as 4000 short edges, in a field that rises evenly: 0.6 a pixel along, 0.3 down
+    joints, radii, scale = np.array([[22.3, 24.1], [44.2, 33.4]]), np.array([[7.2, 4.1]]), 9.0
+    turn = np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    hull = ConvexHull((joints[:, None] + radii[0][:, None, None] * circle).reshape(-1, 2))
+    vertices = hull.points[[*hull.vertices, hull.vertices[0]]]
+    along = np.concatenate([[0.0], np.linalg.norm(np.diff(vertices, axis=0), axis=1).cumsum()])
+    even = np.linspace(0.0, along[-1], 4000, endpoint=False)
+    corners = np.column_stack([np.interp(even, along, each) for each in vertices.T])
+    edges, middles = np.roll(corners, -1, axis=0) - corners, 0.5 * (np.roll(corners, -1, axis=0) + corners)
+    slope = np.array([0.6, 0.3])
+    curves, slopes = np.zeros((6, 6)), np.zeros(6)
+    for (x, y), edge in zip(middles, edges, strict=True):
+        length, off = np.linalg.norm(edge), slope @ [x - 20.0, y - 30.0]
+        share = kernels.cone_distance(x, y, *joints[0], radii[0, 0], *joints[1], radii[0, 1])[1]
+        outwards = slope @ [edge[1], -edge[0]] / length
+        way = np.concatenate([np.outer([1.0 - share, share], slope).ravel(), outwards * np.array([1.0 - share, share])])
+        weight = length / (1.0 + (off / scale) ** 2)
+        curves += weight * np.outer(way, way)
+        slopes += weight * off * way
+    rows, columns = np.mgrid[:64, :70] + 0.5
+    field = (slope[0] * (columns - 20.0) + slope[1] * (rows - 30.0)).astype(np.float32)
 
+    def pulled(joints: np.ndarray, parents: list[int], radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        count = 2 * len(joints) + 2 * len(parents)
+        out = np.zeros((count, count)), np.zeros(count)
+        about = np.zeros(2, int), np.array(field.shape), np.array(parents), joints, radii
+        kernels._pull_bones(field, *about, 0.5, scale, *out)
+        return out
 
-def field_at(field: np.ndarray, x: float, y: float, corner: np.ndarray) -> float:
-    """Return a field between the middles of four pixels."""
-    where = [[y - corner[1] - 0.5], [x - corner[0] - 0.5]]
-    return float(map_coordinates(field.astype(np.float64), where, order=1)[0])
-
-
-def border_of(joint: np.ndarray, radii: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points of the border of a bone between two joints (2, 2): their shares of the bone, normals and pixels."""
-    way = joint[1] - joint[0]
-    length = float(np.linalg.norm(way))
-    axis = way / length
-    tilt = np.arccos((radii[0] - radii[1]) / length)
-    sides, caps = max(int(length / spacing) + 1, 2), (np.arange(3) + 0.5) / 3.0
-    ends = np.full(sides + 1, length * np.sin(tilt) / sides)
-    ends[[0, -1]] *= 0.5  # the sides' points are closed off by half a step at either end
-    near, far = (np.pi - tilt) / 3.0, tilt / 3.0
-    shares = np.concatenate([np.arange(sides + 1) / sides, np.ones(3), np.zeros(3)])
-    angles = np.concatenate([np.full(sides + 1, tilt), tilt * caps, tilt + (np.pi - tilt) * caps])
-    weights = np.concatenate([ends, np.full(3, radii[1] * far), np.full(3, radii[0] * near)])
-    both = [np.cos(angles)[:, None] * axis + side * np.sin(angles)[:, None] * [-axis[1], axis[0]] for side in (1, -1)]
-    return np.tile(shares, 2), np.concatenate(both), np.tile(weights, 2)
-
-
-def test_the_gradient_of_the_bones_is_that_of_their_points_in_the_field() -> None:
-    parents, rng = np.array([0, 1]), np.random.default_rng(5)
-    joints, radii = np.array([[12.3, 14.1], [30.2, 20.4], [44.6, 41.7]]), np.array([[4.2, 3.1], [2.9, 5.3]])
-    field = cv2.GaussianBlur(rng.normal(0.0, 30.0, (64, 70)), (0, 0), 6.0).astype(np.float32)
-    corner, scale = np.array([-3, -4]), 1.5
-    visible = []  # (bone, share, normal, weight) of the points that no other bone covers
-    for b, parent in enumerate(parents):
-        other = 1 - b
-        for share, normal, weight in zip(*border_of(joints[[parent, b + 1]], radii[b], 2.0), strict=True):
-            x, y = point_of(joints, radii, parents, b, share, normal)
-            off = kernels.cone_distance(
-                x, y, *joints[parents[other]], radii[other, 0], *joints[other + 1], radii[other, 1]
-            )
-            if off[0] >= -kernels.COVERED:
-                visible.append((b, share, normal, weight / (1.0 + (field_at(field, x, y, corner) / scale) ** 2)))
-    assert 20 < len(visible) < 100
-
-    def offs(numbers: np.ndarray) -> np.ndarray:
-        """Return how far the points are outside, each times the root of its weight: normals stay as they were."""
-        moved, grown = numbers[:6].reshape(3, 2), numbers[6:].reshape(2, 2)
-        places = [point_of(moved, grown, parents, b, share, normal) for b, share, normal, _ in visible]
-        weights = np.array([weight for *_, weight in visible])
-        return np.sqrt(weights) * [field_at(field, x, y, corner) for x, y in places]
-
-    out = np.zeros((1, 10, 10)), np.zeros((1, 10))
-    kernels._pull_bones(field, corner, np.array(field.shape), parents, joints, radii, 2.0, scale, out[0][0], out[1][0])
-    here = np.concatenate([joints.ravel(), radii.ravel()])
-    steps = 1e-4 * np.eye(10)
-    slopes = np.array([(offs(here + step) - offs(here - step)) / 2e-4 for step in steps])
-    np.testing.assert_allclose(out[1][0], slopes @ offs(here), rtol=1e-4, atol=1e-4)
-    np.testing.assert_allclose(out[0][0], slopes @ slopes.T, rtol=1e-4, atol=1e-4)
+    for mine, expected in zip(pulled(joints, [0], radii), (curves, slopes), strict=True):
+        np.testing.assert_allclose(mine, expected, atol=0.02 * np.abs(expected).max())
+    hidden = pulled(np.array([*joints, [60.0, 40.0]]), [0, 1], np.array([radii[0], [90.0, 90.0]]))
+    assert not hidden[1].any()  # the other bone covers it, and has its border beyond the field
 
 
 @each("views", [(60.0,), (0.0, 90.0)])
@@ -265,13 +227,6 @@ def test_a_fit_that_costs_more_than_its_start_is_not_kept(monkeypatch: pytest.Mo
     np.testing.assert_array_equal(kept.translations, motion.translations)
 
 
-def test_a_build_stays_within_its_range() -> None:
-    scene, motion = footage(6, girth=4.0)  # three spreads of 0.3 make a girth at most 2.46 times as thick
-    _, shape = fitted(scene, motion, average_shape(scene))
-    assert shape is not None
-    assert 1.5 < shape.factors.max() <= np.exp(0.9) + 1e-9
-
-
 def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, truth = footage(20)
     estimate = estimate_of(truth)
@@ -297,16 +252,12 @@ def test_frames_that_are_not_usable_go_with_those_around_them() -> None:
     assert fitted(empty, estimate)[0] is estimate
 
 
-@each("frames", [1, 2, 3, 6])
-def test_footage_of_any_length_is_fitted_and_the_same_each_time(frames: int) -> None:
+@each("frames", [1, 3])
+def test_footage_of_any_length_is_fitted(frames: int) -> None:
     scene, truth = footage(frames)
-    (motion, shape), (again, same) = (fitted(scene, estimate_of(truth), average_shape(scene)) for _ in range(2))
+    motion, _ = fitted(scene, estimate_of(truth), average_shape(scene))
     assert len(motion) == frames
     assert np.isfinite(motion.poses).all()
-    np.testing.assert_array_equal(motion.poses, again.poses)
-    assert shape is not None
-    assert same is not None
-    np.testing.assert_array_equal(shape.factors, same.factors)
 
 
 def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_move_along() -> None:
