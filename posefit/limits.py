@@ -1,4 +1,4 @@
-"""How long a call into a plugin may take, and how much memory there may be."""
+"""How long a call into a plugin may take, how much memory there may be, and in which range numbers must lie."""
 
 import os
 import signal
@@ -16,6 +16,8 @@ from posefit.reading import quoted
 
 SECONDS = 1e-3, 1e8  # of a limit: what timers of operating systems take
 GIGABYTES = 1e-3, 1e6
+RATES = 1e-3, 1e6  # frames a second
+HEIGHTS = 0.3, 2.8  # metres that a person may stand
 AGAIN = 1.0  # seconds until something that swallowed its limit meets it again
 PARENT_POLL_SECONDS = 0.5
 SOON = 1e-6  # seconds, for a timer that should have ended meanwhile; 0 would switch it off

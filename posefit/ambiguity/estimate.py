@@ -27,11 +27,12 @@ from posefit.fitting.shape import NAMES, shaped
 from posefit.fitting.space import SearchSpace
 from posefit.footage.masks import FPS
 from posefit.footage.scene import Scene
-from posefit.footage.source import HEIGHTS, Source, kind_of, scene_of, training_clips, training_motions, useless_for
+from posefit.footage.source import Source, kind_of, scene_of, training_clips, training_motions, useless_for
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses, turned_poses
+from posefit.limits import HEIGHTS
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress

@@ -269,10 +269,14 @@ class SynthesisTracker:
                 continue
             optimiser = self._ready(optimiser, space, rng)
             problem = self.problem(space, observation)
-            best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
+            best = self.minimum(problem, optimiser)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
             yield latest
+
+    def minimum(self, problem: PoseProblem, optimiser: Optimiser) -> Minimum:
+        """Return the best of the search of a frame."""
+        return minimise(problem.evaluate, optimiser, self.task.evaluations, budget_known=True)
 
     def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
         """Return the latest frame once more, at no evaluation; before the first one, the middle of the box."""

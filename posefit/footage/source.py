@@ -38,7 +38,6 @@ _KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a v
 Source = str | Path | Motion
 Footage = Source | Masks
 POSE_BYTES = 3_000  # that a method takes to learn from a pose: its angles, joints and codes, and copies
-HEIGHTS = (0.3, 2.8)  # metres that a person may stand
 _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
     "extraction": ("video", ["video"]),
     "fps": ("motions and masks", ["motion", "masks"]),

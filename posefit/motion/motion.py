@@ -13,12 +13,12 @@ from posefit.geometry.rotation import (
     rotation_from_root_angles,
 )
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angle_index
+from posefit.limits import RATES
 from posefit.reading import quoted
 
 # Share of a frame within which two times count as the same one.
 SAME_TIME = 1e-6
 LONGEST = 200_000  # frames of a file, or of a motion that is made or resampled: 28 minutes at 120 a second
-RATES = (1e-3, 1e6)  # frames a second
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,18 +186,14 @@ def nearest(scene: Scene, training: Array, k: int, observation: Observation, bet
     Of more than 8,000 only those are drawn at full size that lie, in their clips, beside the 200 that fit best of
     every fourth in a picture a quarter as large: a fifth of the time, and the same pose but for rare ties.
     """
-    if len(training) <= MAX_FULL_SIZE_POSES:
-        return _best(scene, training, k, observation, beta)
-    sides = [side for camera in scene.cameras for side in (camera.width, camera.height)]
-    factor = int(np.clip(min(sides) // MIN_SMALL_SIDE, 1, MAX_SMALL_FACTOR))
-    costs = _costs(scene, training[::SMALL_STRIDE], k, observation, beta, factor)
-    first = SMALL_STRIDE * np.argsort(costs, kind="stable")[:FULL_SIZE_CANDIDATES]
-    rows = np.unique(np.clip(first[:, None] + np.arange(1 - SMALL_STRIDE, SMALL_STRIDE), 0, len(training) - 1))
-    return _best(scene, training[rows], k, observation, beta)
-
-
-def _best(scene: Scene, training: Array, k: int, observation: Observation, beta: float) -> Array:
     assert scene.truth is not None
+    if len(training) > MAX_FULL_SIZE_POSES:
+        sides = [side for camera in scene.cameras for side in (camera.width, camera.height)]
+        factor = int(np.clip(min(sides) // MIN_SMALL_SIDE, 1, MAX_SMALL_FACTOR))
+        costs = _costs(scene, training[::SMALL_STRIDE], k, observation, beta, factor)
+        first = SMALL_STRIDE * np.argsort(costs, kind="stable")[:FULL_SIZE_CANDIDATES]
+        rows = np.unique(np.clip(first[:, None] + np.arange(1 - SMALL_STRIDE, SMALL_STRIDE), 0, len(training) - 1))
+        training = training[rows]
     best = training[_costs(scene, training, k, observation, beta).argmin()]
     return np.concatenate([scene.truth.poses[k, :3], best])
 

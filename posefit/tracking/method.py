@@ -171,8 +171,8 @@ def prepare(options: TrackOptions, task: Task) -> Method:
                 made = optimiser.factory(space, rng, **mine["optimiser"])
             return CheckedOptimiser(made, space, optimiser.label, limit, task.evaluations)
 
-        tracker = SynthesisTracker(task, learned, build, optimiser.next_frame, prediction, tilt)
-        return WeighingTracker(tracker) if prediction.modes else tracker
+        kind = WeighingTracker if prediction.modes else SynthesisTracker
+        return kind(task, learned, build, optimiser.next_frame, prediction, tilt)
 
     label = f"{optimiser.name}@{name}"
     return Method(label, learned, prediction.beta, mine, Audit(), prediction.relocalise_gap, make)

@@ -3,16 +3,15 @@
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import tee
-from typing import Self, cast
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space
 from posefit.fitting.check import at_least, positive, whole
-from posefit.fitting.optimiser import BudgetError, Filter, Optimiser, populations
+from posefit.fitting.optimiser import BudgetError, Minimum, Optimiser, minimum_of, populations
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, SynthesisTracker
@@ -134,27 +133,25 @@ def lost_probability(costs: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class WeighingTracker:
-    """Adds a posterior and the probability to be lost to every frame of a tracker that shows the person.
+class WeighingTracker(SynthesisTracker):
+    """Adds a posterior and the probability to be lost to every frame that shows the person.
 
     The track is the same as without. Beside the tracker's own search come others, `prediction.modes` in all, anywhere
     in the same space; they and the weighing have `prediction.modes_share` of its evaluations, beyond the budget. Where
     `modes` is 1 and the optimiser a filter, its last particles are weighed as they are.
     """
 
-    tracker: SynthesisTracker
+    _latest: list[tuple[PoseProblem, list[Searched]]] = field(default_factory=list, init=False, repr=False)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation."""
         shown, coming = tee(observations)
-        record = _Record(self.tracker.make)
-        following = replace(self.tracker, make=record.begin).track(coming, rng)
-        for frame, observation in zip(following, shown, strict=False):
+        for frame, observation in zip(super().track(coming, rng), shown, strict=False):
             if not observation.usable:
                 yield frame
                 continue
             start, cpu_start = time.perf_counter(), time.process_time()
-            posterior, more = self._posterior(observation, record, rng)
+            posterior, more = self._posterior(*self._latest[0], rng)
             yield replace(
                 frame,
                 posterior=posterior,
@@ -164,43 +161,25 @@ class WeighingTracker:
                 cpu_seconds=None if frame.cpu_seconds is None else frame.cpu_seconds + time.process_time() - cpu_start,
             )
 
+    def minimum(self, problem: PoseProblem, optimiser: Optimiser) -> Minimum:
+        """Return the best of the search of a frame, and keep all that was evaluated."""
+        found = populations(optimiser, problem.evaluate, self.task.evaluations)
+        searched = [(np.array(proposals), costs) for proposals, costs in found]
+        self._latest[:] = [(problem, searched)]
+        return minimum_of(searched)
+
     def _posterior(
-        self, observation: Observation, record: "_Record", rng: np.random.Generator
+        self, problem: PoseProblem, searched: list[Searched], rng: np.random.Generator
     ) -> tuple[Posterior, int]:
         """Return the posterior of a frame, and how many evaluations it took."""
-        how, evaluations = self.tracker.prediction, self.tracker.task.evaluations
-        problem = self.tracker.problem(cast(SearchSpace, record.space), observation)
-        if how.modes == 1 and self.tracker.next_frame == "carry":
-            particles, costs = record.evaluated[-1]
+        how = self.prediction
+        if how.modes == 1 and self.next_frame == "carry":
+            particles, costs = searched[-1]
             weights = boltzmann_weights(costs, how.posterior_temperature)
             if len(particles) > POSTERIOR_POSES:  # some of equal weight
                 particles = particles[systematic_rows(weights, 0.5, POSTERIOR_POSES)]
                 weights = np.full(POSTERIOR_POSES, 1.0 / POSTERIOR_POSES)
             return Posterior(*problem.decode(particles), weights), 0
         own = independent(rng)  # the track is the same as without
-        first, more = gathered(record.evaluated), round(how.modes_share * evaluations)
-        return further(problem, self.tracker.make, first, more, own, how.modes - 1, how.posterior_temperature)
-
-
-class _Record:
-    """An optimiser that records the space of its latest frame, and all that was evaluated there."""
-
-    def __init__(self, make: MakeOptimiser) -> None:
-        self._make = make
-
-    def begin(self, space: Space, rng: np.random.Generator) -> Self:
-        """Return this record as the optimiser of a search."""
-        self.space, self.evaluated = space, list[Searched]()
-        self._optimiser = self._make(space, rng)
-        self.ask = self._optimiser.ask
-        return self
-
-    def advance(self, space: Space) -> None:
-        """Pass the next frame's space on."""
-        self.space, self.evaluated = space, []
-        cast(Filter, self._optimiser).advance(space)
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        """Keep the costs, and pass them on."""
-        self.evaluated.append((np.array(proposals), np.array(costs)))
-        self._optimiser.tell(proposals, costs)
+        first, more = gathered(searched), round(how.modes_share * self.task.evaluations)
+        return further(problem, self.make, first, more, own, how.modes - 1, how.posterior_temperature)

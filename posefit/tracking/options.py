@@ -4,16 +4,15 @@ An option is one line of `TrackOptions`: its type and default, and with `option(
 slow is imported here, as every start of the command line reads it.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
-from numbers import Integral, Real
+from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from posefit.errors import InputError
 from posefit.fitting.check import finite_number, one_of, pair, whole
-from posefit.limits import SECONDS
+from posefit.limits import HEIGHTS, RATES, SECONDS
 from posefit.reading import quoted
 from posefit.settings import POPULATION_SIZE
 
@@ -56,10 +55,6 @@ def declared(field: "Field[Any]") -> Option:
     return field.metadata["option"]  # type: ignore[no-any-return]
 
 
-def _whole(least: int) -> Check:
-    return lambda name, value: whole(name, value, least)
-
-
 def _one_of(*choices: str) -> Check:
     def check(name: str, value: Any) -> Any:
         one_of(name, value, choices)
@@ -77,20 +72,12 @@ def _between(low: float, high: float, unit: str = "") -> Check:
     return check
 
 
-def _rate(name: str, value: Any) -> float:
-    from posefit.motion.motion import RATES
-
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < (rate := cast(Any, value)) < math.inf:
-        raise InputError(f"{name} must be a positive number, got {quoted(value)}")
-    if not RATES[0] <= rate <= RATES[1]:
-        raise InputError(f"{name} must lie in {RATES[0]:g} to {RATES[1]:g}, got {quoted(value)}")
-    return float(value)
+def _int(default: int | None, text: str, least: int, placeholder: str = "N", **others: Any) -> Any:
+    return option(default, text, lambda name, value: whole(name, value, least), placeholder, parse=int, **others)
 
 
-def _height(name: str, value: Any) -> float:
-    from posefit.footage.source import HEIGHTS
-
-    return float(_between(*HEIGHTS, " metres")(name, value))
+def _float(text: str, ends: tuple[float, float], placeholder: str, unit: str = "") -> Any:
+    return option(None, text, _between(*ends, unit), placeholder, parse=float)
 
 
 def _size(name: str, value: Any) -> tuple[int, int]:
@@ -206,9 +193,7 @@ class TrackOptions:
     size: tuple[int, int] | None = option(
         None, "Image of a rendered motion, by default 320x240.", _size, "WxH", parse=text_size
     )
-    fps: float | None = option(
-        None, "Rate to resample a motion to, or of masks; by default 30, or theirs.", _rate, "HZ", parse=float
-    )
+    fps: float | None = _float("Rate to resample a motion to, or of masks; by default 30, or theirs.", RATES, "HZ")
     frames: "Range" = option(
         (None, None),
         "Only these frames, (start, stop) in Python: of footage as filmed, of a motion after resampling.",
@@ -218,25 +203,20 @@ class TrackOptions:
         text_range,
     )
     extraction: "Extraction | None" = option(None, "How the person is taken out of video.", flag="")
-    height: float | None = option(None, "How tall the person in the footage stands.", _height, "METRES", parse=float)
+    height: float | None = _float("How tall the person in the footage stands.", HEIGHTS, "METRES", " metres")
     label: int | None = option(
         None, "Of masks: the value or the colour that the person has.", _label, "N", parse=text_label
     )
-    holes: float | None = option(
-        None,
+    holes: float | None = _float(
         "Of masks: fill holes up to this share of the person; by default 0.02.",
-        _between(0.0, 1.0, ", a share of the person's area"),
+        (0.0, 1.0),
         "SHARE",
-        parse=float,
+        ", a share of the person's area",
     )
-    evaluations: int | None = option(
-        None, "Budget of a frame; by default N (C + 1) = 2440.", _whole(1), "POSES", parse=int
-    )
-    population_size: int | None = option(None, "N, by default 40.", _whole(1), "N", parse=int)
-    iterations: int | None = option(None, "C, by default 60.", _whole(1), "C", parse=int)
-    ask_seconds: float | None = option(
-        None, "How long a plugin may take to propose a population.", _between(*SECONDS), "SECONDS", parse=float
-    )
+    evaluations: int | None = _int(None, "Budget of a frame; by default N (C + 1) = 2440.", 1, "POSES")
+    population_size: int | None = _int(None, "N, by default 40.", 1)
+    iterations: int | None = _int(None, "C, by default 60.", 1, "C")
+    ask_seconds: float | None = _float("How long a plugin may take to propose a population.", SECONDS, "SECONDS")
     translation: "Translation | None" = option(
         None,
         "Of the root: known (the truth), searched, or aligned.",
@@ -246,21 +226,15 @@ class TrackOptions:
     first_pose: Literal["searched", "given"] = option(
         "searched", "searched, or given (the true one).", _one_of("searched", "given"), "HOW"
     )
-    restarts: int | None = option(
-        None, "Searches of an unknown first pose: 8, or 0 for a tracker that looks ahead.", _whole(0), "N", parse=int
-    )
-    body_frames: int | None = option(
-        None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", _whole(0), "N", parse=int
-    )
-    hypotheses: int = option(
-        1, "Tracks from different initial guesses, each at the full budget; one is kept.", _whole(1), "N", parse=int
-    )
+    restarts: int | None = _int(None, "Searches of an unknown first pose: 8, or 0 for a tracker that looks ahead.", 0)
+    body_frames: int | None = _int(None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", 0)
+    hypotheses: int = _int(1, "Tracks from different initial guesses, each at the full budget; one is kept.", 1)
     smooth: bool | None = option(
         None, "The root moves smoothly, and feet do not slide; the default for footage.", parse=bool, identifies=False
     )
-    passes: int = option(1, "How often a smooth track is followed.", _whole(1), "N", parse=int, identifies=False)
-    seed: int = option(0, "Of all random numbers.", _whole(0), "N", parse=int)
-    threads: int = option(1, "The result is the same with any number.", _whole(1), "N", parse=int, identifies=False)
+    passes: int = _int(1, "How often a smooth track is followed.", 1, identifies=False)
+    seed: int = _int(0, "Of all random numbers.", 0)
+    threads: int = _int(1, "The result is the same with any number.", 1, identifies=False)
     device: str = option(
         "cpu", "Where poses are drawn: cpu, or cuda with a GPU.", _device, "cpu|cuda", identifies=False
     )

@@ -12,7 +12,7 @@ import posefit
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
 from posefit.fitting.problem import PoseProblem
-from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
+from posefit.fitting.tracker import Prediction, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import joint_distances
@@ -149,8 +149,8 @@ def test_a_frame_of_an_empty_mask_has_no_posterior() -> None:
     camera = Camera.around(np.zeros(3), 0.0, 3.5, (160, 120))
     task = Task(Body.of(built_in.motion("walk", frames=1).skeleton), [camera], 400, 0.0, np.zeros(3))
     prior = registry().prior("pca")().fit(walking_angles())
-    inner = SynthesisTracker(task, prior, registry().optimiser("sapso"), prediction=Prediction(modes=1))
-    frames = list(WeighingTracker(inner).track(observations, np.random.default_rng(0)))
+    tracker = WeighingTracker(task, prior, registry().optimiser("sapso"), prediction=Prediction(modes=1))
+    frames = list(tracker.track(observations, np.random.default_rng(0)))
     assert [frame.posterior is None for frame in frames] == [False, True, False]
     assert frames[1].evaluations == 0
 
