@@ -10,7 +10,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -19,13 +18,12 @@ from posefit.files import check_free
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
-from posefit.footage.masks import PackedMasks
+from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.scene import Scene
 from posefit.footage.source import body_of, training_clips, training_motions
 from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
 from posefit.progress import QUIET, Progress
-from posefit.silhouette.mask import Mask, Silhouette
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
@@ -78,7 +76,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     fps = chosen.fps or stream.fps
     masks = live_masks(stream, chosen.extraction, progress.log)
     first = list(islice(masks, TRIAL_FRAMES * TRIAL_STRIDE))
-    scene, straighten = _scene_of(first, source, fps, chosen)
+    scene, observed = _scene_of(first, source, fps, chosen)
     waiting: deque[LiveMask] = deque()
 
     def coming() -> Iterator[Observation]:
@@ -87,7 +85,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
             yield observation
         for live in masks:
             waiting.append(live)
-            yield Observation([Silhouette.of(*straighten(live))], usable=live.usable)
+            yield observed(live)
 
     with threadpool_limits(1):
         task = task_of(scene, chosen, training_motions(clips, fps))
@@ -103,32 +101,28 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
 
 def _scene_of(
     first: Sequence[LiveMask], name: str, fps: float, options: TrackOptions
-) -> tuple[Scene, Callable[[LiveMask], tuple[Mask, Mask]]]:
-    """Return the scene of the first frames, and what takes a lens's distortion out of a mask and its known pixels."""
+) -> tuple[Scene, Callable[[LiveMask], Observation]]:
+    """Return the scene of the first frames, and the function that makes an observation of a later one."""
     if not any(live.usable for live in first):
         raise InputError(f"{name}: expected a person in the first {len(first)} frames, got none")
     size = (first[0].mask.shape[1], first[0].mask.shape[0])
-    packed = PackedMasks(
-        [f"{name}, frame {live.source.number}" for live in first],
-        size,
-        np.array([np.packbits(live.mask) for live in first]),
-        np.array([np.packbits(live.valid) for live in first]),
-        np.array([live.usable for live in first]),
-    )
+
+    def packed(seen: Sequence[LiveMask]) -> PackedMasks:
+        names = [f"{name}, frame {live.source.number}" for live in seen]
+        planes = (np.packbits([getattr(live, part).ravel() for live in seen], axis=1) for part in ("mask", "valid"))
+        return PackedMasks(names, size, *planes, np.array([live.usable for live in seen]))
+
     facing = next(iter(options.view["view_degrees"]), None)
-    body, view = body_of(options.asf, options.height), CameraView(packed, (), name)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
+    body, view = body_of(options.asf, options.height), CameraView(packed(first), (), name)
     scene = combined([view], name, body, known, facing, options.up, fps)
-    distorted = [camera for camera in known if isinstance(camera, Calibration) and camera.distorted]
-    maps = distorted[0].maps(size) if distorted else None
+    maps = next((each.maps(size) for each in known if isinstance(each, Calibration) and each.distorted), None)
 
-    def straighten(live: LiveMask) -> tuple[Mask, Mask]:
-        if maps is None:
-            return live.mask, live.valid
-        mask, valid = (cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) for plane in (live.mask, live.valid))
-        return np.asarray(mask != 0), np.asarray(valid != 0)
+    def observed(live: LiveMask) -> Observation:
+        masks = packed([live])
+        return Views([masks if maps is None else undistorted(masks, maps)])[0]  # type: ignore[no-any-return]
 
-    return scene, straighten
+    return scene, observed
 
 
 def write_live(
