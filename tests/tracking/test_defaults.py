@@ -49,25 +49,16 @@ def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pyt
     assert (options.method, options.train) == ("annealed@loose", WALKS)
 
 
-@pytest.fixture(scope="module")
-def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("masks") / "masks.npz"
-    scene = scene_of(["09_01"], frames=(0, 8), size=(120, 90))
-    np.savez(path, masks=np.array([observation.silhouettes[0].mask for observation in scene.observations]))
-    return path
-
-
-def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(masks: Path) -> None:
-    log: list[str] = []
-    track = posefit.track(masks, evaluations=400, body_frames=5, progress=Progress(log.append))
+def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_path: Path) -> None:
+    scene, log = scene_of(["09_01"], frames=(0, 8), size=(120, 90)), list[str]()
+    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    np.savez(tmp_path / "masks.npz", masks=masks)
+    track = posefit.track(tmp_path / "masks.npz", evaluations=400, body_frames=5, progress=Progress(log.append))
     assert track.summary["method"] == "exemplars"
     assert track.summary["train"] == [clip.name for clip in recorded.clips()]
     assert track.summary["body"] is not None
     assert not any("looking for the first pose" in line for line in log)
     assert "fitting the person's build to 5 frames" in log
-
-
-def test_restarts_that_are_asked_for_are_made(masks: Path) -> None:
-    log: list[str] = []
-    posefit.track(masks, train=["walk-a"], evaluations=400, restarts=1, body_frames=0, progress=Progress(log.append))
+    more = {"train": ["walk-a"], "restarts": 1, "body_frames": 0}
+    posefit.track(tmp_path / "masks.npz", evaluations=400, progress=Progress(log.append), **more)
     assert "looking for the first pose, 1 times" in log

@@ -181,14 +181,3 @@ def test_interrupted_hypotheses_go_on_where_they_were(tmp_path: Path) -> None:
         assert len(costs[1]) == 3
         assert costs[0][:done] == costs[1][:done]
         assert resumed.summary["evaluations"] == whole.summary["evaluations"]
-
-
-@pytest.mark.slow
-def test_four_hypotheses_halve_the_swaps_of_a_side_view(cmu: Path) -> None:
-    def swap_rate(hypotheses: int) -> float:
-        clip, training = cmu / "16" / "16_17.amc", [cmu / "16" / "16_15.amc"]
-        options: dict[str, Any] = {"train": training, "view_degrees": 90.0, "frames": (0, 60)}
-        tracks = [posefit.track(clip, **options, hypotheses=hypotheses, seed=seed) for seed in range(5)]
-        return float(np.mean([track.summary["swap_rate"] for track in tracks]))
-
-    assert swap_rate(4) <= 0.5 * swap_rate(1)

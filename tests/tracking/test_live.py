@@ -59,10 +59,6 @@ def every_frame(monkeypatch):
     monkeypatch.setattr(Stream, "_read", lambda self, frames: read(self, paced(frames)))
 
 
-def piped(monkeypatch, content):
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
-
-
 def test_images_are_read_one_after_another():
     grey, colour = np.arange(6, dtype=np.uint8).reshape(2, 3), np.arange(18, dtype=np.uint8).reshape(2, 3, 3)
     content = b"P5 3 2 255\n" + grey.tobytes() + b"P6\n#a\n3\n2\n255 " + colour.tobytes()
@@ -102,47 +98,40 @@ def test_a_stalled_stream_ends_with_one_line(monkeypatch):
     os.close(writing)
 
 
-def test_the_first_frames_are_the_background(every_frame):
-    rng = np.random.default_rng(0)
-    empty = rng.integers(60, 90, (120, 160, 3), dtype=np.uint8)
-    person = empty.copy()
-    person[30:100, 70:95] = 220
-    ppm = [b"P6 160 120 255\n" + image.tobytes() for image in [*[empty] * 90, *[person] * 3]]
-    masks = list(live_masks(Stream("-", io.BytesIO(b"".join(ppm))), None, lambda _: None))
-    assert [mask.source.number for mask in masks] == [90, 91, 92]
-    overlap = (masks[0].mask & (person != empty).any(axis=2)).sum() / masks[0].mask.sum()
-    assert overlap > 0.95
-
-
-def test_a_picture_of_the_empty_scene_may_be_given(every_frame, tmp_path):
-    empty = np.full((120, 160, 3), 70, dtype=np.uint8)
+@each("given", [False, True])
+def test_the_background_is_that_of_the_first_frames_or_a_picture(given, every_frame, tmp_path):
+    empty = np.random.default_rng(0).integers(60, 90, (120, 160, 3), dtype=np.uint8)
     person = empty.copy()
     person[30:100, 70:95] = 220
     cv2.imwrite(str(tmp_path / "empty.png"), empty)
-    stream = Stream("-", io.BytesIO(b"".join(b"P6 160 120 255\n" + image.tobytes() for image in [empty, person])))
-    masks = list(live_masks(stream, Extraction(background=str(tmp_path / "empty.png")), lambda _: None))
-    assert [mask.source.number for mask in masks] == [0, 1]
-    assert masks[1].mask.sum() == pytest.approx(70 * 25, abs=8)  # corners are rounded
+    before = 1 if given else 90
+    ppm = [b"P6 160 120 255\n" + image.tobytes() for image in [*[empty] * before, *[person] * 3]]
+    extraction = Extraction(background=str(tmp_path / "empty.png")) if given else None
+    masks = list(live_masks(Stream("-", io.BytesIO(b"".join(ppm))), extraction, lambda _: None))
+    assert [mask.source.number for mask in masks] == [0, 1, 2, 3] if given else [90, 91, 92]
+    mask, true = masks[-1].mask, (person != empty).any(axis=2)
+    assert (mask & true).sum() > 0.95 * max(mask.sum(), true.sum())
 
 
-def test_masks_from_a_pipe_become_poses_on_disk(monkeypatch, every_frame, walk, tmp_path):
-    piped(monkeypatch, b"".join(map(pgm, walk)))
-    summary = write_live(track_live(**QUICK), tmp_path / "out")
-    rows = [json.loads(line) for line in (tmp_path / "out" / "frames.jsonl").read_text().splitlines()]
-    assert [row["frame"] for row in rows] == list(range(40))
-    assert (summary["frames"], summary["skipped"]) == (40, 0)
+@each("damaged", [0, 5])
+def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off(
+    damaged, monkeypatch, every_frame, walk, tmp_path
+):
+    content, count = b"".join(map(pgm, walk)), 39 if damaged else 40
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content[: len(content) - damaged])))
+    out = tmp_path / "out"
+    if damaged:
+        with pytest.raises(InputError, match="breaks off, after 39 frames"):
+            write_live(track_live(**QUICK), out)
+    else:
+        summary = write_live(track_live(**QUICK), out)
+        assert (summary["frames"], summary["skipped"]) == (40, 0)
+    rows = [json.loads(line) for line in (out / "frames.jsonl").read_text().splitlines()]
+    assert [row["frame"] for row in rows] == list(range(count))
     assert np.median([row["cost"] for row in rows]) < 30.0
-    with np.load(tmp_path / "out" / "poses.npz") as arrays:
-        assert arrays["poses"].shape == (40, 66)
-        assert arrays["translations"].shape == (40, 3)
-
-
-def test_a_broken_stream_leaves_its_frames_on_disk(monkeypatch, every_frame, walk, tmp_path):
-    piped(monkeypatch, b"".join(map(pgm, walk))[:-5])
-    with pytest.raises(InputError, match="breaks off, after 39 frames"):
-        write_live(track_live(**QUICK), tmp_path / "out")
-    with np.load(tmp_path / "out" / "poses.npz") as arrays:
-        assert len(arrays["poses"]) == 39
+    with np.load(out / "poses.npz") as arrays:
+        assert arrays["poses"].shape == (count, 66)
+        assert arrays["translations"].shape == (count, 3)
 
 
 @each(
