@@ -26,7 +26,7 @@ from posefit.tracking.smoothing.contours import (
     projected_body,
 )
 from posefit.tracking.smoothing.path import Visibility
-from posefit.tracking.smoothing.smooth import smoothed_frames
+from posefit.tracking.smoothing.smooth import smoothed
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 
@@ -269,15 +269,14 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
         Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0), posterior=posterior)
         for pose, place in zip(estimate.poses, estimate.translations, strict=True)
     ]
-    alone, none = smoothed_frames(scene, frames, 0.5)
-    smooth, shape = smoothed_frames(scene, frames, 0.5, average_shape(scene))
-    assert none is None
-    assert shape is not None
-    costs = [np.mean([frame.cost for frame in each]) for each in (smooth, alone)]
+    alone, both = (smoothed(scene, frames, shape, 0.5) for shape in (None, average_shape(scene)))
+    assert alone.shape is None
+    assert both.shape is not None
+    costs = [np.mean([frame.cost for frame in each.frames]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
-    assert shape.cost == pytest.approx(costs[0])
-    moved, pose = smooth[0].posterior, smooth[0].pose
+    assert both.shape.cost == pytest.approx(costs[0])
+    moved, pose = both.frames[0].posterior, both.frames[0].pose
     assert moved is not None
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]
-    np.testing.assert_allclose(moved.translations[1] - smooth[0].translation, apart)
+    np.testing.assert_allclose(moved.translations[1] - both.frames[0].translation, apart)

@@ -14,7 +14,7 @@ from scipy.linalg import solveh_banded
 
 from posefit.arrays import Array
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index
+from posefit.geometry.skeleton import JOINTS, angle_index
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, runs
 from posefit.silhouette.cost import only_camera
@@ -99,14 +99,11 @@ def standing_feet(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
     A foot that stands is low, and slow beside the root: who walks leaves it behind. y is up. A single camera, at
     `eyes` (T, 3), sees how slow it is across the line of sight alone; these are NaN where several see it.
     """
-    count = len(joints)
-    if count < 3:
-        return np.zeros((count, 2), dtype=bool)
     feet, sights = joints[:, BALLS], (joints[:, 0] - eyes)[:, [0, 2]]
     speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
     reach = max(round(0.5 * STRIDE_SECONDS * fps), 1)
     heights = feet[..., 1].min(axis=1)
-    lowest = np.array([heights[max(k - reach, 0) : k + reach + 1].min() for k in range(count)])
+    lowest = np.array([heights[max(k - reach, 0) : k + reach + 1].min() for k in range(len(joints))])
     slow = speed < np.maximum(STANDING_SPEED, STANDING_SPEED_SHARE * root)
     stands = slow & (feet[..., 1] < lowest[:, None] + STANDING_HEIGHT)
     for side in range(2):
@@ -180,11 +177,16 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
     """
     if len(motion) < 3:
         return motion
-    motion = replace(motion, translations=_bridged(motion.translations, visibility.usable))
+    frames, known = np.arange(len(motion)), np.flatnonzero(visibility.usable)
+    if len(known):  # the root goes straight on where frames show too little
+        lines = [np.interp(frames, known, line) for line in motion.translations[known].T]
+        motion = replace(motion, translations=np.column_stack(lines))
     poses, places = motion.poses.copy(), motion.translations.copy()
     for rows, kept in windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
-        smooth = _window(part, visibility.at(rows))
+        stands, seen = np.zeros((len(part), 2), dtype=bool), visibility.at(rows)
+        smooth = _solved(part, seen, stands)  # of the root alone, which shows which foot stands
+        smooth = _solved(part, seen, standing_feet(smooth.joints, smooth.fps, seen.eyes))
         poses[rows[kept]], places[rows[kept]] = smooth.poses[kept], smooth.translations[kept]
     return replace(motion, poses=poses, translations=places)
 
@@ -200,20 +202,6 @@ def windows_over(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.i
         rows = np.arange(max(start - overlap, 0), min(start + size + overlap, count))
         parts.append((rows, (rows >= start) & (rows < start + size)))
     return parts
-
-
-def _bridged(places: Array, usable: NDArray[np.bool_]) -> Array:
-    """Return places (T, 3) that go straight on where frames show too little, and stay where they were at both ends."""
-    known = np.flatnonzero(usable)
-    if not len(known):
-        return places
-    return np.column_stack([np.interp(np.arange(len(places)), known, line) for line in places[known].T])
-
-
-def _window(motion: Motion, visibility: Visibility) -> Motion:
-    """Return a smooth motion: first its root alone, which shows which foot stands, then the legs as well."""
-    smooth = _solved(motion, visibility, np.zeros((len(motion), 2), dtype=bool))
-    return _solved(motion, visibility, standing_feet(smooth.joints, smooth.fps, visibility.eyes))
 
 
 def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -> Motion:
@@ -253,12 +241,18 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
     The numbers of each frame are the root's place and these angles of it.
     """
     legs = [angle for angle in LEGS if angle in angles]
-    columns = [0, 1, 2, *(3 + angles.index(angle) for angle in legs)]
+    columns = [3 + angles.index(angle) for angle in legs]
+    turned = np.repeat(motion.poses[None], len(legs), axis=0)
+    for row, angle in enumerate(legs):
+        turned[row, :, angle] += DIFFERENCE
+    there = motion.skeleton.joints(turned, np.repeat(motion.translations[None], len(legs), axis=0))
+    joints = motion.joints
     for side, ball in enumerate(BALLS):
-        both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
-        feet, slopes = _moving_feet(motion.skeleton, motion.poses, motion.translations, ball, legs)
+        feet = joints[:, ball]
         ways = np.zeros((*feet.shape, 3 + len(angles)))
-        ways[..., columns] = slopes
+        ways[..., :3] = np.eye(3)
+        ways[..., columns] = np.moveaxis((there[:, :, ball] - feet) / DIFFERENCE, 0, 2)
+        both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
         squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING_SLIDE))
 
 
@@ -274,16 +268,3 @@ def _root_precisions(motion: Motion, visibility: Visibility, deviation: float) -
     less = 1.0 / along**2 - 1.0 / across[alone] ** 2
     precise[alone] += less[:, None, None] * sights[:, :, None] * sights[:, None, :]
     return np.asarray(precise)
-
-
-def _moving_feet(
-    skeleton: Skeleton, poses: Array, places: Array, ball: int, angles: Sequence[int]
-) -> tuple[Array, Array]:
-    """Return where a foot is (T, 3), and how that changes with the root and the angles (T, 3, 3 + angles)."""
-    feet = skeleton.joints(poses, places)[:, ball]
-    turned = np.repeat(poses[None], len(angles), axis=0)
-    for row, angle in enumerate(angles):
-        turned[row, :, angle] += DIFFERENCE
-    slopes = (skeleton.joints(turned, np.repeat(places[None], len(angles), axis=0))[:, :, ball] - feet) / DIFFERENCE
-    root = np.repeat(np.eye(3)[None], len(poses), axis=0)
-    return feet, np.concatenate([root, np.moveaxis(slopes, 0, 2)], axis=2)

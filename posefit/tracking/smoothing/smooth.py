@@ -6,8 +6,6 @@ cause, and a tracker cannot tell from that which way the person walks. In the se
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Self
 
 import numpy as np
 
@@ -38,17 +36,6 @@ class Pass:
     shape: Shape | None  # the build, where it was fitted
     number: int  # from 1
 
-    @classmethod
-    def smoothed(cls, scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float, number: int) -> Self:
-        """Return a pass whose frames were smoothed."""
-        smooth, shape = smoothed_frames(scene, frames, beta, shape)
-        return cls(scene if shape is None else replace(scene, body=shape.body), smooth, shape, number)
-
-    @cached_property
-    def cost(self) -> float:
-        """The mean cost of the frames that show enough of the person."""
-        return mean_cost(self.frames, np.array([observation.usable for observation in self.scene.observations]))
-
 
 def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: TrackOptions, progress: Progress) -> Pass:
     """Return a track smoothed; of several passes the last that costs not much more than the one kept before it.
@@ -56,7 +43,8 @@ def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: Track
     Each pass has the full budget, and follows the path of the one that was kept before it. The frames have the effort
     of all passes.
     """
-    passes, kept = [Pass.smoothed(guess.scene, frames, guess.shape, method.beta, 1)], 0
+    passes, kept = [smoothed(guess.scene, frames, guess.shape, method.beta)], 0
+    usable = np.array([observation.usable for observation in guess.scene.observations])
     for number in range(1, options.passes):
         before = passes[kept]
         scene, path = before.scene, [frame.translation for frame in before.frames]
@@ -66,19 +54,16 @@ def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: Track
         rng = stream(options.seed, "pass", number)
         tracker = method.relocalising(task, scene.truth is None)
         tracked = list(progress.steps(tracker.track(known, rng), scene.count))
-        passes.append(Pass.smoothed(scene, tracked, before.shape, method.beta, number + 1))
-        if passes[-1].cost < PASS_TOLERANCE * before.cost:
+        passes.append(smoothed(scene, tracked, before.shape, method.beta, number + 1))
+        if mean_cost(passes[-1].frames, usable) < PASS_TOLERANCE * mean_cost(before.frames, usable):
             kept = number
     return replace(passes[kept], frames=with_total_effort([done.frames for done in passes], kept))
 
 
-def smoothed_frames(
-    scene: Scene, frames: Sequence[Frame], beta: float, shape: Shape | None = None
-) -> tuple[list[Frame], Shape | None]:
-    """Return the frames of a scene smoothed, and the build fitted with them.
+def smoothed(scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: float, number: int = 1) -> Pass:
+    """Return a pass whose frames are smoothed, and with them the build fitted, where it was before: else it is known.
 
-    The build stays the scene's where it was not fitted before (`shape` is None). Costs and areas are those of the
-    smoothed frames, and their posteriors move as far as the pose and the root did.
+    Costs and areas are those of the smoothed frames, and their posteriors move as far as the pose and the root did.
     """
     visibility = Visibility.of(scene)
     motion = smooth_path(motion_of(scene, frames), visibility)
@@ -88,7 +73,7 @@ def smoothed_frames(
     smooth = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smooth, visibility.usable))
-    return smooth, shape
+    return Pass(scene, smooth, shape, number)
 
 
 def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
