@@ -21,7 +21,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
-from posefit.reading import SHOWN, cut, quoted
+from posefit.reading import cut
 from posefit.silhouette.foreground import Image
 from posefit.tracking.evaluation import unseen
 from posefit.tracking.identity import Digest, difference
@@ -42,9 +42,6 @@ _TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json", "camera.json"
 FILES = (*_MOTION_FILES, *_OPENSIM, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
-# The fields of a recorded frame, besides its posterior
-_ARRAYS = ("pose", "translation", "areas", "history", "coordinates", "spent")
-_PLAIN = ("cost", "evaluations", "seconds", "cpu_seconds", "lost", "activity", "details")
 
 
 class Output:
@@ -97,9 +94,10 @@ class OutputFolder(Output):
         left = Unfinished.interrupted(self.path)
         if not left:
             raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
-        for folder in left:
-            _check_mark(folder)
-        others = [difference(folder.info, self._spec) for folder in left]
+        try:
+            others = [difference(folder.info, self._spec) for folder in left]
+        except (AttributeError, TypeError):
+            raise InputError(f"{left[0].path / MARK}: expected the arguments of a track, got others") from None
         place = left[others.index(None)] if None in others else None
         for folder in left:
             if folder is not place:
@@ -171,11 +169,8 @@ class OutputFolder(Output):
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
-        row: dict[str, Any] = {name: getattr(frame, name) for name in _PLAIN} | {"state": state}
-        for name in _ARRAYS:
-            value = getattr(frame, name)
-            row[name] = None if value is None else np.asarray(value).tolist()
-        row["posterior"] = None if frame.posterior is None else frame.posterior.as_dict()
+        posterior = None if frame.posterior is None else frame.posterior.as_dict()
+        row = {**vars(frame), "posterior": posterior, "modes": (), "state": state}
         text = json.dumps(row, default=_encoded).encode()
         with (self._building / _RECORD).open("ab") as file:
             file.write(b"%08x %s\n" % (zlib.crc32(text), text))
@@ -215,7 +210,7 @@ def page_of(scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str
 
 
 def _encoded(value: Any) -> Any:
-    """Return what JSON holds of a value in a frame's details: arrays with their type, else what it prints as."""
+    """Return what JSON holds of a frame's values: arrays with their type, else what it prints as."""
     if isinstance(value, np.ndarray | np.generic):
         return {"dtype": str(value.dtype), "values": value.tolist()}
     return dict(value) if isinstance(value, Mapping) else str(value)
@@ -235,17 +230,8 @@ def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
         raise InputError("a damaged one")
     row = json.loads(text, object_hook=_decoded)
     state, posterior = row.pop("state"), row.pop("posterior")
-    row |= {name: np.array(row[name]) for name in _ARRAYS if row[name] is not None}
     np.random.default_rng(0).bit_generator.state = state  # raises where it is none
     return Frame(**row, posterior=None if posterior is None else Posterior.from_dict(posterior)), state
-
-
-def _check_mark(folder: Unfinished) -> None:
-    """Raise InputError where the arguments of an interrupted track are damaged."""
-    for digest in folder.info.values():
-        texts = isinstance(digest, dict) and digest.keys() == {"text", "digest"} and [*digest.values()]
-        if not texts or not all(isinstance(text, str) and text.isprintable() and len(text) <= SHOWN for text in texts):
-            raise InputError(f"{folder.path / MARK}: expected the arguments of a track, got {quoted(digest)}")
 
 
 def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
