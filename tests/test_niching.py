@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from posefit.fitting.box import displacement, draw_population, wrap
-from posefit.geometry.symmetry import mirrored_poses
-from posefit.motion import built_in
 from posefit.niching import (
     APART_MM,
     ARMS,
@@ -19,12 +17,10 @@ from posefit.niching import (
     REPORTED,
     STEPS,
     best_apart,
-    clipped,
     legs_and_arms,
     niche_instance,
     niche_space,
     scored,
-    stride_poses,
 )
 from posefit.uncertainty.modes import Posterior, poses_apart
 from tests.cases import each
@@ -63,24 +59,10 @@ def test_instances_are_of_their_kind() -> None:
     assert min(same) > 0.1
 
 
-def test_instances_differ_and_any_known_pose_may_be_the_true_one() -> None:
-    instance = [niche_instance(number) for number in range(0, 24, 3)]
-    assert len({one.known.tobytes() for one in instance}) == len(instance)
-    assert {one.true for one in instance} == {0, 1}
-
-
 def test_a_number_out_of_range_is_named() -> None:
     for number in (-1, COUNT, 1.5, "1", True, None):
         with pytest.raises(ValueError, match=f"instance must be .*, got {number!r}"):
             niche_instance(number)  # type: ignore[arg-type]
-
-
-def test_the_box_holds_the_mirror_image_of_what_it_holds() -> None:
-    skeleton = built_in.average_skeleton()
-    held = clipped(stride_poses()[::97])
-    mirrored = mirrored_poses(skeleton, held)
-    assert clipped(mirrored)[:, 3:] == pytest.approx(mirrored[:, 3:], abs=1e-9)
-    assert clipped(held) == pytest.approx(held, abs=1e-12)
 
 
 def test_legs_do_not_move_the_arms() -> None:

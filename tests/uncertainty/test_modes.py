@@ -90,9 +90,6 @@ def test_tracks_are_compared_by_the_mean_over_frames() -> None:
     assert [mode.weight for mode in modes] == pytest.approx([0.8, 0.2])
     np.testing.assert_array_equal(modes[1].poses, np.tile(turned(180), (4, 1)))
     assert modes[0].translations.shape == (4, 3)
-
-
-def test_rows_that_are_no_tracks_are_refused() -> None:
     for posteriors in ([], [posterior([STILL], [1.0])]):
         with pytest.raises(ValueError, match="coherent"):
             track_modes(SKELETON, posteriors)

@@ -97,12 +97,8 @@ def test_the_best_of_each_search_are_distinct_and_feasible() -> None:
     best, known = best_of_each(landscape, [(proposals, costs), (proposals[:1], costs[:1])], 2)
     np.testing.assert_array_equal(best[:, 0], [0.1, 0.3, 0.3])
     np.testing.assert_array_equal(known, [1.0, 3.0, 3.0])
-
-
-def test_searches_without_a_finite_cost_are_refused() -> None:
-    landscape = Landscape(Toy(1), lambda x: x[:, 0])
     with pytest.raises(ValueError, match="searches must have a finite cost, got none in 1 searches"):
-        weighed(landscape, [(np.zeros((3, 1)), np.full(3, np.inf))], 1.0, np.random.default_rng(0))
+        best_of_each(landscape, [(proposals, np.full(6, np.inf))], 2)
 
 
 def test_boltzmann_weights_are_exponentials_and_0_where_a_cost_is_not_finite() -> None:
