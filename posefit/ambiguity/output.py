@@ -17,7 +17,7 @@ from posefit.geometry.symmetry import facing
 from posefit.measuring.centres import PLACES
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, draw_body, side_view, write
+from posefit.tracking.drawing import BOTH, MISSED, SPILLED, TEXT, blank, draw_body, side_view, write
 from posefit.tracking.picture import SOLID
 from posefit.version import __version__
 
@@ -137,9 +137,9 @@ def picture_of(result: Ambiguity) -> Image:
     count = min(len(result.clusters), MAX_COLUMNS)
     camera, silhouette = nearer(result.problem.cameras[0], result.problem.silhouettes[0])
     columns = [_column(result, k, camera, silhouette) for k in range(count)]
-    columns += [_blank(len(columns[0]), WIDTH)] * (MIN_COLUMNS - count)
+    columns += [blank(len(columns[0]), WIDTH)] * (MIN_COLUMNS - count)
     bodies = np.hstack(columns)
-    title, rest = _blank(TITLE, bodies.shape[1]), len(result.clusters) - count
+    title, rest = blank(TITLE, bodies.shape[1]), len(result.clusters) - count
     heading = f"{result.scene.name}, frame {result.frame}: {len(result.states):,} poses within {result.within:g}"
     write(title, f"{heading} of the least" + (f", {rest} more modes" if rest else ""), (12, 23))
     return np.vstack([title, bodies, floors_of(result.floors, bodies.shape[1])])
@@ -163,12 +163,12 @@ def _column(result: Ambiguity, k: int, camera: Camera, silhouette: Image) -> Ima
     cluster, body = result.clusters[k], result.problem.body
     states = result.states.posterior
     pose, place = states.poses[cluster.best], states.translations[cluster.best]
-    head = _blank(BAND, WIDTH)
+    head = blank(BAND, WIDTH)
     write(head, f"{cluster.weight:.2f}", (12, 26), scale=0.75)
     write(head, cluster.image or ("first" if k == 0 else ""), (90, 26))
     away = f", {cluster.away_mm:.0f} from first" if k else ""
     write(head, f"spread {cluster.spread_mm:.0f} mm{away}", (12, 50), scale=0.42)
-    front = _blank(HEIGHT, WIDTH)
+    front = blank(HEIGHT, WIDTH)
     front[silhouette > 0] = GREY
     drawn = front.copy()
     draw_body(drawn, body, camera, pose, place)
@@ -190,7 +190,7 @@ def floors_of(floors: Sequence[Floor], width: int) -> Image:
     longest = width - LABEL - FIGURE * shown - 20
     bar = max(LINE // len(floors) - 1, 3)
     row = len(floors) * bar + 5
-    image = _blank(LEGEND * (len(floors) + 1) + 20 + row * len(names), width)
+    image = blank(LEGEND * (len(floors) + 1) + 20 + row * len(names), width)
     write(image, "spread of poses that cannot be distinguished, mm", (12, 20))
     for k, floor in enumerate(floors):
         label = f"{floor.spread_mm:.0f}  by {floor.views}, {floor.count:,} poses"
@@ -206,10 +206,6 @@ def floors_of(floors: Sequence[Floor], width: int) -> Image:
             if k < NUMBERED:
                 write(image, f"{spread[name]:4.0f}", (width - FIGURE * (shown - k) - 6, y + row - 6), scale=0.4)
     return image
-
-
-def _blank(height: int, width: int) -> Image:
-    return np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
 
 
 FILES = ("ambiguity.json", "ambiguity.png")

@@ -33,6 +33,11 @@ SIDE_COLOURS = {"left": LEFT, "right": RIGHT, "middle": MIDDLE}
 _ENDS = [JOINTS.index(side + name) for side in "lr" for name in ("wrist", "foot")]
 
 
+def blank(height: int, width: int) -> Image:
+    """Return a picture (height, width, 3) of nothing."""
+    return np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
+
+
 def write(image: Image, text: str, at: tuple[int, int], colour: Any = TEXT, scale: float = 0.5) -> None:
     """Write a text into an image."""
     cv2.putText(image, text, at, _FONT, scale, colour, 1, cv2.LINE_AA)
@@ -74,7 +79,7 @@ def side_view(
     body: Body, camera: Camera, pose: Array, translation: Array, side: int, solid: Array | None = None
 ) -> Image:
     """Return the body (side, side, 3) viewed from the camera's right: left limbs orange, right ones blue."""
-    image = np.full((side, side, 3), BACKGROUND, dtype=np.uint8)
+    image = blank(side, side)
     draw_body(image, body, side_camera(body, camera, pose, translation, side), pose, translation, solid)
     return image
 

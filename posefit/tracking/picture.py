@@ -23,6 +23,7 @@ from posefit.tracking.drawing import (
     MISSED,
     OTHER,
     SPILLED,
+    blank,
     draw_body,
     draw_stick,
     opacities,
@@ -74,7 +75,7 @@ class Painter:
         left = self.overlay(frame, observation, filmed, solid, other)
         width = left.shape[1]
         from_side = side_camera(body, camera, pose, place, PANEL)
-        side = np.full((PANEL, PANEL, 3), BACKGROUND, dtype=np.uint8)
+        side = blank(PANEL, PANEL)
         draw_body(side, body, from_side, pose, place, solid)
         self._draw_other(side, from_side, other)
         image = np.hstack([left, side])
@@ -130,7 +131,7 @@ class Painter:
         height = PANEL // -(-len(self._scene.cameras) // columns)
         for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
             mask, fitted = silhouette.mask, project(body, camera, frame.pose, frame.translation)
-            view = np.full((*mask.shape, 3), BACKGROUND, dtype=np.uint8)
+            view = blank(*mask.shape)
             view[mask & ~fitted], view[fitted & ~mask], view[mask & fitted] = MISSED, SPILLED, BOTH
             if solid is not None:
                 share = solid_map(body, camera, frame.pose, frame.translation, solid)[..., None]
@@ -152,12 +153,12 @@ class Painter:
         width = grid.shape[1]
         parts = []
         for note in notes:
-            head = np.full((LABEL_HEIGHT, width, 3), BACKGROUND, dtype=np.uint8)
+            head = blank(LABEL_HEIGHT, width)
             write(head, note, (12, 26), scale=SUMMARY_SCALE * min(1.0, (width - 24) / width_of(note, SUMMARY_SCALE)))
             parts.append(head)
         parts.append(grid)
         if self._scene.pictures is None:
-            parts.append(np.full((LABEL_HEIGHT, width, 3), BACKGROUND, np.uint8))
+            parts.append(blank(LABEL_HEIGHT, width))
             _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
         name = "error_degrees" if "error_degrees" in rows[0] else "cost"
         return np.vstack([*parts, curve([row[name] for row in rows], name.replace("_", " "), width, 180)])
@@ -196,7 +197,7 @@ def _grid(panels: list[Image], columns: int, background: int) -> Image:
 
 def curve(values: Sequence[float], name: str, width: int, height: int) -> Image:
     """Return a plot (height, width, 3) of values, one a frame, from 0 up."""
-    image = np.full((height, width, 3), BACKGROUND, dtype=np.uint8)
+    image = blank(height, width)
     left, right = 66, width - 16
     scale = (height - 56) / (max(max(values), 1e-9) * 1.15)
     for level in (0.0, float(np.mean(values)), max(values)):

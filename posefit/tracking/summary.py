@@ -40,11 +40,9 @@ def evaluate(
         frame if frame.posterior is None else replace(frame, modes=modes_of(skeleton, frame.posterior))
         for frame in smoothed.frames
     ]
-    posteriors = [frame.posterior for frame in frames if frame.posterior is not None]
-    whole = len(posteriors) == len(frames) and len({len(posterior) for posterior in posteriors}) == 1
-    trajectories = whole and all(posterior.coherent for posterior in posteriors)
-    modes = track_modes(skeleton, posteriors) if trajectories else []
-    none = [p.recalibration.none for p in posteriors if p.recalibration is not None]
+    posteriors = [frame.posterior for frame in frames]
+    modes = track_modes(skeleton, posteriors)
+    none = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
     for warning in method.audit.warnings:
         progress.warn(warning)
     rows, measures = evaluated(scene, frames, method.prior, task.angles, method.beta)

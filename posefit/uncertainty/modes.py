@@ -122,17 +122,18 @@ def poses_apart(skeleton: Skeleton, poses: Array, others: Array) -> Array:
     return np.asarray(sum(cdist(joints, targets) for joints, targets in pairs) / len(JOINTS))
 
 
-def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior], apart: float = APART) -> list[TrackMode]:
+def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior | None], apart: float = APART) -> list[TrackMode]:
     """Return the possible tracks of a clip, the likeliest first, by the posteriors of its frames.
 
-    Tracks are similar as poses are in `modes_of`, by the mean over frames. Raises ValueError where rows are no tracks.
+    Tracks are similar as poses are in `modes_of`, by the mean over frames. There are none where rows are no tracks.
     """
-    if not posteriors or any(not frame.coherent or len(frame) != len(posteriors[0]) for frame in posteriors):
-        raise InputError("posteriors must be coherent, of one length and at least one, to be tracks")
-    distances = np.mean([poses_apart(skeleton, frame.poses, frame.poses) for frame in posteriors], axis=0)
-    weights = np.mean([frame.weights for frame in posteriors], axis=0)
-    poses = np.array([frame.poses for frame in posteriors])
-    translations = np.array([frame.translations for frame in posteriors])
+    coherent = [frame for frame in posteriors if frame is not None and frame.coherent]
+    if len(coherent) < len(posteriors) or len({len(frame) for frame in coherent}) != 1:
+        return []
+    distances = np.mean([poses_apart(skeleton, frame.poses, frame.poses) for frame in coherent], axis=0)
+    weights = np.mean([frame.weights for frame in coherent], axis=0)
+    poses = np.array([frame.poses for frame in coherent])
+    translations = np.array([frame.translations for frame in coherent])
     clusters = _clusters(distances, weights, apart)
     return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row in clusters]
 

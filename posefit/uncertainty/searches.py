@@ -88,8 +88,6 @@ def best_of_each(landscape: Landscape, searched: Sequence[Searched], each: int) 
     chosen, chosen_costs = [], []
     for proposals, costs in searched:
         order = np.flatnonzero(np.isfinite(costs))
-        if len(order) > 4 * each:
-            order = order[costs[order] <= np.partition(costs[order], 4 * each)[4 * each]]
         order = order[np.argsort(costs[order], kind="stable")][: 4 * each]
         order = order[landscape.box.feasible(proposals[order])] if len(order) else order
         order = order[np.sort(np.unique(proposals[order], axis=0, return_index=True)[1])[:each]]
@@ -121,8 +119,6 @@ def widths(box: Box, searched: Sequence[Searched], modes: Array, costs: Array, t
     away = np.array([displacement(box, mode, proposals) ** 2 for mode in modes])  # (k, n, d)
     owners = away.sum(axis=2).argmin(axis=0)
     away, rises = away[owners, np.arange(len(known))], known - costs[owners]
-    if len(modes) == 1:
-        return _width(away, rises, temperature)[None]
     per_mode = np.tile(_width(away, rises, temperature), (len(modes), 1))
     for k in np.flatnonzero(np.bincount(owners, minlength=len(modes)) >= ENOUGH * modes.shape[1]):
         per_mode[k] = _width(away[owners == k], rises[owners == k], temperature)

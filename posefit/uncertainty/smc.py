@@ -63,7 +63,7 @@ class NormalMixture:
         parts = self._log_parts(box, proposals)
         top = parts.max(axis=1)
         near = top + np.log(np.exp(parts - top[:, None]).mean(axis=1))
-        return np.logaddexp(near + math.log(1.0 - self.broad), math.log(self.broad))
+        return np.asarray(np.logaddexp(near + math.log(1.0 - self.broad), math.log(self.broad)))
 
     def nearest(self, box: Box, proposals: Array) -> NDArray[np.int64]:
         """Return the densest normal distribution (n,) at each of proposals (n, d)."""

@@ -90,9 +90,7 @@ def test_tracks_are_compared_by_the_mean_over_frames() -> None:
     assert [mode.weight for mode in modes] == pytest.approx([0.8, 0.2])
     np.testing.assert_array_equal(modes[1].poses, np.tile(turned(180), (4, 1)))
     assert modes[0].translations.shape == (4, 3)
-    for posteriors in ([], [posterior([STILL], [1.0])]):
-        with pytest.raises(ValueError, match="coherent"):
-            track_modes(SKELETON, posteriors)
+    assert track_modes(SKELETON, [*frames, posterior([STILL], [1.0])]) == track_modes(SKELETON, [None]) == []
 
 
 def test_weights_of_modes_are_recalibrated() -> None:

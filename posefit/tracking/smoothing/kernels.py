@@ -33,6 +33,14 @@ def cone_distance(x, y, x0, y0, r0, x1, y1, r1):
 
 
 @jit
+def _bone_distance(x, y, bone, parents, centres, radii):
+    p, n = parents[bone], bone + 1
+    return cone_distance(
+        x, y, centres[p, 0], centres[p, 1], radii[bone, 0], centres[n, 0], centres[n, 1], radii[bone, 1]
+    )
+
+
+@jit
 def _add(curves, slopes, parent, bone, joints, share, across, down, wide, off, weight):
     """Add the square of one distance, which moves by (across, down) with its bone's axis and by `wide` with radii."""
     first = 2 * joints + 2 * bone
@@ -48,13 +56,8 @@ def _add(curves, slopes, parent, bone, joints, share, across, down, wide, off, w
 @jit
 def _covered(x, y, bone, parents, centres, radii):
     for b in range(parents.size):
-        p = parents[b]
-        if b != bone:
-            off, _, _, _ = cone_distance(
-                x, y, centres[p, 0], centres[p, 1], radii[b, 0], centres[b + 1, 0], centres[b + 1, 1], radii[b, 1]
-            )
-            if off < -COVERED:
-                return True
+        if b != bone and _bone_distance(x, y, b, parents, centres, radii)[0] < -COVERED:
+            return True
     return False
 
 
@@ -66,10 +69,7 @@ def _pull_points(points, parents, centres, radii, step, scale, curves, slopes):
         x, y = points[i, 0], points[i, 1]
         least, bone, share, nx, ny = np.inf, 0, 0.0, 0.0, 0.0
         for b in range(parents.size):
-            p = parents[b]
-            off, at, ox, oy = cone_distance(
-                x, y, centres[p, 0], centres[p, 1], radii[b, 0], centres[b + 1, 0], centres[b + 1, 1], radii[b, 1]
-            )
+            off, at, ox, oy = _bone_distance(x, y, b, parents, centres, radii)
             if off < least:
                 least, bone, share, nx, ny = off, b, at, ox, oy
         weight = step / (1.0 + (least / scale) ** 2)
