@@ -9,7 +9,6 @@ from typing import Any
 
 from posefit.errors import InputError
 from posefit.fitting.check import between, finite_number, whole
-from posefit.fitting.tracker import Prediction
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, load_motion, training_clips
 from posefit.motion import built_in, recorded
@@ -18,7 +17,7 @@ from posefit.registry import Offer, registry
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, settings_text, version_of
-from posefit.tracking.method import method_names, parsed_settings
+from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions, declared
 
 FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
@@ -61,7 +60,7 @@ def checked(spec: Mapping[str, Any]) -> dict[str, Any]:
 
 def families(method: str) -> tuple[str, ...]:
     """Return the names that settings of a method begin with. Raises ValueError where it is unknown."""
-    return tuple(_places(method))
+    return tuple(places_of(_offers(method)))
 
 
 @lru_cache(maxsize=256)
@@ -72,21 +71,13 @@ def _offers(method: str) -> tuple[Offer, ...]:
     return registry().offer("optimiser", names.optimiser), registry().offer("prior", names.prior)
 
 
-def _places(method: str) -> dict[str, tuple[str, Callable[..., Any]]]:
-    """Return the kind and the factory of each name that settings of a method begin with."""
-    places: dict[str, tuple[str, Callable[..., Any]]] = {
-        offer.name.partition(":")[0]: (offer.kind, offer.factory) for offer in _offers(method)
-    }
-    return places if len(places) == 1 else places | {"tracker": ("tracker", Prediction)}
-
-
 @lru_cache(maxsize=1024)
 def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], dict[str, Any]]:
     """Return a method's plugins, and the settings of texts such as `sapso.cooling=0.9`: sorted, as their types ask."""
-    places = _places(method)
-    parsed = parsed_settings(places, texts)
-    typed = {f"{name}.{one}": value for name, (kind, _) in places.items() for one, value in parsed[kind].items()}
-    return _offers(method), dict(sorted(typed.items()))
+    offers = _offers(method)
+    names = {kind: name for name, (kind, _) in places_of(offers).items()}
+    each = parsed_settings(offers, texts).items()
+    return offers, dict(sorted((f"{names[kind]}.{one}", value) for kind, mine in each for one, value in mine.items()))
 
 
 @lru_cache(maxsize=1024)
@@ -95,7 +86,7 @@ def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
     offer = _offers(method)[0]
     if offer.kind != "optimiser":
         return 1
-    return population(offer.factory, parsed_settings(_places(method), texts)["optimiser"], evaluations)
+    return population(offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations)
 
 
 @lru_cache(maxsize=1024)

@@ -109,8 +109,9 @@ def _scene_of(
 
     def packed(seen: Sequence[LiveMask]) -> PackedMasks:
         names = [f"{name}, frame {live.source.number}" for live in seen]
-        planes = (np.packbits([getattr(live, part).ravel() for live in seen], axis=1) for part in ("mask", "valid"))
-        return PackedMasks(names, size, *planes, np.array([live.usable for live in seen]))
+        masks = np.packbits([live.mask.ravel() for live in seen], axis=1)
+        valid = np.packbits([live.valid.ravel() for live in seen], axis=1)
+        return PackedMasks(names, size, masks, valid, np.array([live.usable for live in seen]))
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]

@@ -39,19 +39,14 @@ class Measure:
         return " ".join(word for word in (self.label, self.number(value), self.unit) if word)
 
 
-def _required(*figure: Any) -> Any:
-    """Return the field of a figure: all of `Measure` but the name."""
-    return field(metadata={"measure": figure})
-
-
-def _optional(*figure: Any) -> Any:
-    """Return the field of a figure that may be unknown: None."""
+def _figure(*figure: Any) -> Any:
+    """Return the field of a figure, None where it is unknown: all of `Measure` but the name."""
     return field(default=None, metadata={"measure": figure})
 
 
 def _share(label: str, meaning: str) -> Any:
-    """Return the field of a share, shown in percent, that may be unknown."""
-    return _optional(label, "%", 0, meaning, 100.0)
+    """Return the field of a share, shown in percent."""
+    return _figure(label, "%", 0, meaning, 100.0)
 
 
 @dataclass(frozen=True)
@@ -67,35 +62,35 @@ class Spread:
 class Measures:
     """What one track is worth. Baselines and skill are by the names of `BASELINES`."""
 
-    error_degrees: Spread | None = _optional(
+    error_degrees: Spread | None = _figure(
         "error",
         "degrees",
         2,
         "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
         "standard deviation and maximum. SAPSO (8)-(10)",
     )
-    geodesic_degrees: float | None = _optional(
+    geodesic_degrees: float | None = _figure(
         "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
     )
-    free_error_degrees: float | None = _optional(
+    free_error_degrees: float | None = _figure(
         "error of free angles", "degrees", 2, "the error over those angles alone that the skeleton lets move"
     )
-    mpjpe_mm: float | None = _optional(
+    mpjpe_mm: float | None = _figure(
         "MPJPE", "mm", 0, "mean distance of the 27 joints from the true ones, both roots at one point"
     )
-    pa_mpjpe_mm: float | None = _optional(
+    pa_mpjpe_mm: float | None = _figure(
         "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"
     )
-    iou: float = _required(
+    iou: float = _figure(
         "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
     )
-    cost: float = _required("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
+    cost: float = _figure("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
     swap_rate: float | None = _share("left/right swapped", "share of frames nearer to the truth when mirrored")
     lost_rate: float | None = _share("lost", "share of frames with an MPJPE above 150 mm")
     coverage: Mapping[str, float] | None = _share(
         "coverage", "share of joints but the root whose truth lies within their 50, 80 and 95 % intervals"
     )
-    interval_mm: Mapping[str, float] | None = _optional(
+    interval_mm: Mapping[str, float] | None = _figure(
         "interval",
         "mm",
         0,
@@ -110,11 +105,11 @@ class Measures:
     lost_said_rate: float | None = _share(
         "said lost", "share of frames that the method calls lost, where it reports it"
     )
-    acceleration: float | None = _optional(
+    acceleration: float | None = _figure(
         "acceleration", "m/s2", 1, "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter"
     )
-    acceleration_ratio: float | None = _optional("acceleration ratio", "", 1, "the same, over that of the true joints")
-    foot_slide_mm: float | None = _optional(
+    acceleration_ratio: float | None = _figure("acceleration ratio", "", 1, "the same, over that of the true joints")
+    foot_slide_mm: float | None = _figure(
         "foot slide",
         "mm a step",
         0,
@@ -122,31 +117,31 @@ class Measures:
         "the true one does, or, where that is unknown, where it is low and slow; about 20 of motion capture; none "
         "where no foot stands",
     )
-    held_frames: int = _required(
+    held_frames: int = _figure(
         "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
     )
-    skill: Mapping[str, float | None] | None = _optional(
+    skill: Mapping[str, float | None] | None = _figure(
         "skill", "", 2, "1 - error / the baseline's error: 1 is perfect, 0 no better than the baseline"
     )
-    baselines_degrees: Mapping[str, float] | None = _optional(
+    baselines_degrees: Mapping[str, float] | None = _figure(
         "baselines", "degrees", 2, "errors of trivial methods, given the true root and translation"
     )
-    baselines_mm: Mapping[str, float] | None = _optional(
+    baselines_mm: Mapping[str, float] | None = _figure(
         "baselines' MPJPE", "mm", 0, "MPJPE of trivial methods, given the same"
     )
-    prior_floor_degrees: float | None = _optional(
+    prior_floor_degrees: float | None = _figure(
         "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
     )
-    seconds_per_frame: float = _required("time", "ms a frame", 1, "wall time a frame", 1e3)
-    cpu_seconds_per_frame: float | None = _required(
+    seconds_per_frame: float = _figure("time", "ms a frame", 1, "wall time a frame", 1e3)
+    cpu_seconds_per_frame: float | None = _figure(
         "CPU time",
         "ms a frame",
         1,
         "of all threads, where a tracker reports it; a busy machine does not add to it",
         1e3,
     )
-    evaluations: int = _required("evaluations", "", 0, "poses whose cost was computed, in all frames together")
-    evaluations_per_second: float = _required("speed", "poses a second", 0, "evaluations over the time they took")
+    evaluations: int = _figure("evaluations", "", 0, "poses whose cost was computed, in all frames together")
+    evaluations_per_second: float = _figure("speed", "poses a second", 0, "evaluations over the time they took")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures by name, as JSON holds them."""

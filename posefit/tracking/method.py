@@ -143,10 +143,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
         return _tracker_method(_offered("tracker", chosen), options.settings)
     optimiser = _offered("optimiser", options.optimiser or names.optimiser)
     prior = None if options.prior is not None else registry().offer("prior", names.prior)
-    places: dict[str, tuple[str, Callable[..., Any]]] = {_family(optimiser.name): ("optimiser", optimiser.factory)}
-    if prior is not None:
-        places[_family(prior.name)] = "prior", prior.factory
-    mine = parsed_settings({**places, "tracker": ("tracker", Prediction)}, options.settings)
+    mine = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     mine.setdefault("prior", {})
     given = mine["optimiser"]
     mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations, options.population_size)
@@ -178,15 +175,22 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     return Method(label, learned, prediction.beta, mine, Audit(), prediction.relocalise_gap, make)
 
 
-def parsed_settings(
-    places: Mapping[str, tuple[str, Callable[..., Any]]], given: Mapping[str, Any] | Sequence[str]
-) -> dict[str, dict[str, Any]]:
+def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
+    """Return the kind and the factory of each name that settings of a method begin with, by the plugins it names."""
+    places: dict[str, tuple[str, Callable[..., Any]]] = {
+        offer.name.partition(":")[0]: (offer.kind, offer.factory) for offer in offers
+    }
+    return places if offers[0].kind == "tracker" else places | {"tracker": ("tracker", Prediction)}
+
+
+def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
-    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`. `places` has the kind and
-    the factory of each name before the dot. Raises InputError where a text has another form, names a plugin that is not
-    in use or a setting that it does not know, or where a value does not fit.
+    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`. Raises InputError where a
+    text has another form, names a plugin that is not among `offers` or a setting that it does not know, or where a
+    value does not fit.
     """
+    places = places_of(offers)
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
     for item in given:
         left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
@@ -207,12 +211,8 @@ def parsed_settings(
     return {kind: each[name] for name, (kind, _) in places.items()}
 
 
-def _family(name: str) -> str:
-    return name.partition(":")[0]
-
-
 def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> Method:
-    mine = parsed_settings({_family(offer.name): ("tracker", offer.factory)}, given)["tracker"]
+    mine = parsed_settings([offer], given)["tracker"]
     defaults = {setting.name: setting.default for setting in offer.settings}
     beta = {"beta": BETA, **defaults, **mine}["beta"]  # of the costs that it gives
     beta = float(beta) if isinstance(beta, float | int) else BETA

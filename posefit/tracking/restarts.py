@@ -164,8 +164,8 @@ class RelocalisingTracker:
                 costs.append(frame.cost)
 
         if len(self.task.before) > 1:  # a single one is what the track was begun with
-            for frame in self.task.before:
-                add(frame, frame.evaluations > 0)
+            for earlier in self.task.before:
+                add(earlier, earlier.evaluations > 0)
         for observation in coming:
             typical, high, tried = costs[:-few], costs[-few:], None
             costly = len(typical) >= many and min(high) > COST_RISE * float(np.median(typical))
