@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,15 +23,6 @@ COMPILE_SECONDS = 60.0  # that a plugin's first calls may take longer than its l
 WARM_UP_POPULATIONS = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Guess:
-    """Where tracking begins."""
-
-    scene: Scene  # with the person's build
-    task: Task
-    shape: Shape | None  # the build, where it was fitted
-
-
 def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
     """Return the task of tracking a scene, as far as it is known before anything is searched."""
     first_pose = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
@@ -49,8 +40,10 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
     )
 
 
-def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress) -> Guess:
-    """Return the first pose, where it is searched by restarts, and the person's build, where it is fitted."""
+def initialise(
+    scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress
+) -> tuple[Task, Shape | None]:
+    """Return a task with its first pose, where restarts search it, and the person's build, where it is fitted."""
     with _compiling_announced(progress.log):
         looks_ahead = _warm_up(method, task, scene)
     footage = scene.truth is None
@@ -70,7 +63,7 @@ def initialise(scene: Scene, method: Method, task: Task, options: TrackOptions, 
         height = options.height or (task.body.stature if alone else None)
         shape = fitted_build(task, scene.observations, method.follow, body_frames, height, options.seed)
         task = replace(task, body=shape.body)
-    return Guess(replace(scene, body=task.body), task, shape)
+    return task, shape
 
 
 def fitted_build(
@@ -95,14 +88,12 @@ def fitted_build(
 
 def first_seen_by_most(observations: Sequence[Observation]) -> int:
     """Return the first frame in which no fewer cameras see the person than in any other; 0 for one camera."""
-    best, most = 0, 0
-    for k, observation in enumerate(observations):
-        cameras = len(observation.silhouettes)
-        if (seeing := sum(silhouette.known for silhouette in observation.silhouettes)) > most:
-            best, most = k, seeing
-        if most == cameras or cameras == 1:
+    counts: list[int] = []
+    for observation in observations:
+        counts.append(sum(silhouette.known for silhouette in observation.silhouettes))
+        if len(observation.silhouettes) in (1, counts[-1]):
             break
-    return best
+    return int(np.argmax(counts))
 
 
 def _warm_up(method: Method, task: Task, scene: Scene) -> bool:

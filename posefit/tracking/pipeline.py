@@ -17,10 +17,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.errors import InputError
+from posefit.fitting.tracker import Task
 from posefit.footage.scene import Scene, on_device
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
-from posefit.tracking.initialise import Guess, initialise, task_of
+from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
@@ -59,11 +60,11 @@ def track_scene(
             progress.warn(warning)
         method = prepare(options, task)
         with progress.phase("build"):
-            guess = initialise(scene, method, task, options, progress)
+            task, shape = initialise(scene, method, task, options, progress)
+            scene = replace(scene, body=task.body)
         method.audit.clear()  # what was tried before the first frame is in no row
         with progress.phase("follow"):
-            hypotheses = follow(guess, method, options, output, progress)
-            scene, task = guess.scene, guess.task
+            hypotheses = follow(scene, task, method, options, output, progress)
             tracked = cheapest(scene, hypotheses, task.training)
             if scene.truth is None and method.looks_ahead(task):
                 frames, start = retrack_spins(task, scene.observations, tracked.frames, method.follow, options.seed)
@@ -72,25 +73,27 @@ def track_scene(
                     progress.log(
                         f"the body turned faster than a person can: tracked again both ways from frame {start}"
                     )
-                    guess = replace(guess, task=replace(task, fastest_turn=MAX_TURN_RATE))
-        smoothed = Pass(guess.scene, tracked.frames, guess.shape, 1)
+                    task = replace(task, fastest_turn=MAX_TURN_RATE)
+        smoothed = Pass(scene, tracked.frames, shape, 1)
         if options.smooth:
             with progress.phase("smooth"):
-                smoothed = smooth(guess, method, tracked.frames, options, progress)
-        return evaluate(smoothed, method, guess.task, tracked, options, output, progress, source or {})
+                smoothed = smooth(smoothed, task, method, options, progress)
+        return evaluate(smoothed, method, task, tracked, options, output, progress, source or {})
 
 
-def follow(guess: Guess, method: Method, options: TrackOptions, output: Output, progress: Progress) -> list[Hypothesis]:
+def follow(
+    scene: Scene, first: Task, method: Method, options: TrackOptions, output: Output, progress: Progress
+) -> list[Hypothesis]:
     """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again."""
     earlier, state = output.earlier()
-    scene, count, total = guess.scene, guess.scene.count, options.hypotheses
+    count, total = scene.count, options.hypotheses
     hypotheses: list[Hypothesis] = []
     for number in range(total):
-        name, task = SEARCHED, guess.task
+        name, task = SEARCHED, first
         if number:
             each = zip(hypotheses[0][1], scene.observations, strict=True)
-            first = next((frame for frame, seen in each if seen.usable), hypotheses[0][1][0])
-            name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", first)
+            sure = next((frame for frame, seen in each if seen.usable), hypotheses[0][1][0])
+            name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", sure)
         frames = list(earlier[number * count : (number + 1) * count])
         rng = stream(options.seed, "hypothesis", number) if number else np.random.default_rng(options.seed)
         which = f" of track {number + 1} of {total}, {name}" if total > 1 else ""

@@ -10,13 +10,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.fitting.shape import Shape
-from posefit.fitting.tracker import Frame
+from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.silhouette.cost import pose_costs
-from posefit.tracking.initialise import Guess
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import stream
@@ -37,22 +36,22 @@ class Pass:
     number: int  # from 1
 
 
-def smooth(guess: Guess, method: Method, frames: Sequence[Frame], options: TrackOptions, progress: Progress) -> Pass:
+def smooth(first: Pass, task: Task, method: Method, options: TrackOptions, progress: Progress) -> Pass:
     """Return a track smoothed; of several passes the last that costs not much more than the one kept before it.
 
     Each pass has the full budget, and follows the path of the one that was kept before it. The frames have the effort
     of all passes.
     """
-    passes, kept = [smoothed(guess.scene, frames, guess.shape, method.beta)], 0
-    usable = np.array([observation.usable for observation in guess.scene.observations])
+    passes, kept = [smoothed(first.scene, first.frames, first.shape, method.beta)], 0
+    usable = np.array([observation.usable for observation in first.scene.observations])
     for number in range(1, options.passes):
         before = passes[kept]
         scene, path = before.scene, [frame.translation for frame in before.frames]
-        task = replace(guess.task, body=scene.body, translation="known", anchor=path[0], before=())
+        again = replace(task, body=scene.body, translation="known", anchor=path[0], before=())
         known = (replace(seen, translation=place) for seen, place in zip(scene.observations, path, strict=True))
         progress.log(f"tracking again along its path, pass {number + 1} of {options.passes}")
         rng = stream(options.seed, "pass", number)
-        tracker = method.relocalising(task, scene.truth is None)
+        tracker = method.relocalising(again, scene.truth is None)
         tracked = list(progress.steps(tracker.track(known, rng), scene.count))
         passes.append(smoothed(scene, tracked, before.shape, method.beta, number + 1))
         if mean_cost(passes[-1].frames, usable) < PASS_TOLERANCE * mean_cost(before.frames, usable):
