@@ -1,6 +1,7 @@
-"""Two tracks are the same where their arguments have the same content, whatever the objects are."""
+"""A track goes on that ended too early, where its arguments have the same content, whatever the objects are."""
 
 import csv
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,27 +11,39 @@ import pytest
 import posefit
 from posefit.motion import built_in
 from posefit.tracking.identity import digest_of
+from posefit.tracking.outputs import OutputFolder
 from tests.cases import each
+from tests.fuzz.written import SPEC, mended, written
 from tests.tracking.scenes import stopping
 
-QUICK: dict[str, Any] = {"method": "sapso", "frames": (0, 8), "size": (120, 90), "evaluations": 200}
+QUICK: dict[str, Any] = {"frames": (0, 8), "size": (120, 90), "evaluations": 200}
 
 
 def camera(azimuth: float) -> posefit.Camera:
     return posefit.Camera.around(built_in.motion("walk").translations[0], azimuth, 4.0, (120, 90))
 
 
-def test_cameras_at_two_azimuths_are_not_the_same_track(tmp_path: Path) -> None:
+@each("method", ["sapso", "vsmm"])
+def test_a_track_goes_on_as_if_it_had_not_ended_too_early(method: str, tmp_path: Path) -> None:
     assert repr(camera(0.5)) == repr(camera(1.5))  # which is why texts are not enough
-    out = tmp_path / "out"
+    options: dict[str, Any] = {**QUICK, "method": method, "out": tmp_path / "out"}
     with pytest.raises(KeyboardInterrupt):
-        posefit.track("walk", camera=camera(0.5), out=out, progress=stopping(4), **QUICK)
+        posefit.track("walk", camera=camera(0.5), progress=stopping(4), **options)
     with pytest.raises(ValueError, match="camera must be .* as it was, to resume, got one with another content"):
-        posefit.track("walk", camera=camera(1.5), out=out, resume=True, **QUICK)
-    # another object, the same camera
-    resumed = posefit.track("walk", camera=camera(0.5), out=out, resume=True, **QUICK)
-    whole = posefit.track("walk", camera=camera(0.5), **QUICK)
-    np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
+        posefit.track("walk", camera=camera(1.5), resume=True, **options)
+    resumed = posefit.track("walk", camera=camera(0.5), resume=True, **options)  # another object, the same camera
+    whole = posefit.track("walk", camera=camera(0.5), **{**options, "out": None})
+    if method == "sapso":  # vsmm begins with new particles
+        np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
+    for before, after in zip(whole.estimates, resumed.estimates, strict=True):
+        assert after.cpu_seconds is not None
+        assert after.details.keys() == before.details.keys()
+    first, again = (track.estimates[0].details.get("probabilities", 0.0) for track in (whole, resumed))
+    np.testing.assert_array_equal(first, again)
+    with (tmp_path / "out" / "frames.csv").open(newline="") as file:
+        activities = [row["activity"] for row in csv.DictReader(file)]
+    assert [activity or None for activity in activities] == resumed.activity
+    assert (None in resumed.activity) == (method == "sapso")
 
 
 def test_a_file_or_a_folder_is_what_it_holds(tmp_path: Path) -> None:
@@ -61,19 +74,27 @@ def test_different_values_have_different_digests(first: Any, second: Any) -> Non
     assert digest_of(first)["digest"] != digest_of(second)["digest"]
 
 
-def test_resumed_frames_keep_their_details_and_processor_time(tmp_path: Path) -> None:
-    options: dict[str, Any] = {**QUICK, "method": "vsmm", "out": tmp_path / "out"}
-    with pytest.raises(KeyboardInterrupt):
-        posefit.track("walk", progress=stopping(4), **options)
-    resumed = posefit.track("walk", resume=True, **options)
-    whole = posefit.track("walk", **{**options, "out": None})
-    for before, after in zip(whole.estimates, resumed.estimates, strict=True):
-        assert after.cpu_seconds is not None
-        assert after.details.keys() == before.details.keys()
-    first, again = whole.estimates[0].details, resumed.estimates[0].details
-    np.testing.assert_array_equal(first["probabilities"], again["probabilities"])
-    assert resumed.summary["cpu_seconds_per_frame"] is not None
-    with (tmp_path / "out" / "frames.csv").open(newline="") as file:
-        written = [row["activity"] for row in csv.DictReader(file)]
-    assert written == resumed.activity == whole.activity
-    assert None not in whole.activity
+@each(
+    ("old", "new", "right", "reason"),
+    [
+        (b"40", b"4\xff", False, "a damaged one"),
+        (b'"lost": 0.5', b'"lost": 2', True, "lost of a frame must lie in 0 to 1, got 2"),
+        (b'"bit_generator": "PCG64"', b'"bit_generator": "none"', True, "state must be for a PCG64"),
+        (b'"evaluations"', b'"evaluation"', True, "unexpected keyword argument 'evaluation'"),
+    ],
+)
+def test_frames_before_the_first_damaged_one_are_kept(
+    old: bytes, new: bytes, right: bool, reason: str, tmp_path: Path
+) -> None:
+    lines = written(tmp_path)["frames"].splitlines(keepends=True)
+    assert old in lines[1]
+    lines[1] = lines[1].replace(old, new, 1)
+    (unfinished,) = (tmp_path / "made").iterdir()
+    (unfinished / "frames.jsonl").write_bytes(mended(b"".join(lines)) if right else b"".join(lines))
+    messages: list[str] = []
+    folder = OutputFolder(tmp_path / "made" / "subject", False, True, SPEC, messages.append)
+    with suppress(KeyboardInterrupt), folder as output:
+        assert len(output.earlier()[0]) == 1
+        raise KeyboardInterrupt
+    assert "frames.jsonl line 2: expected a frame, got" in messages[0]
+    assert reason in messages[0]
