@@ -214,7 +214,7 @@ def test_limbs_become_as_thick_as_the_persons_and_the_height_stays() -> None:
 
 
 def test_a_fit_that_costs_more_than_its_start_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    def astray(part: contours._Part, borders: object, scale: float, *, build: bool) -> contours._Part:
+    def astray(part: contours._Part, borders: object, scale: float) -> contours._Part:
         moved = replace(part.fitted, translations=part.fitted.translations + 1.0)
         return replace(part, fitted=moved, body=shaped(part.body, np.full(len(NAMES), 0.9)))
 

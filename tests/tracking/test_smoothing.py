@@ -51,7 +51,7 @@ def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
     rng = np.random.default_rng(3)
     count, numbers = 7, 3
     now, feet, ways = (rng.normal(size=size) for size in ((count, numbers), (count, 2), (count, 2, numbers)))
-    squares = Squares.of(count, numbers)
+    squares = Squares(count, numbers)
     squares.add(slice(0, 3), np.eye(3) * 4.0, 4.0 * now)
     squares.add_bends(slice(1, 3), now[:, 1:], 5.0)
     squares.add_steps(np.array([2, 3]), feet, ways, 6.0)

@@ -166,13 +166,9 @@ class _Part:
     estimate: Motion  # before it is fitted
     fitted: Motion
     body: Body
-    factors: Array  # (17,) logarithms of what the body was fitted by before
+    factors: Array  # (17,) logarithms of what the body was fitted by before; (0,) where the build is known
     height: float | None
     visibility: Visibility
-
-    @property
-    def angles(self) -> list[int]:
-        return np.flatnonzero(self.fitted.skeleton.free).tolist()
 
 
 def fit_contours(
@@ -216,11 +212,11 @@ def _fitted(
     observations = [scene.observations[k] for k in rows.tolist()]
     places = estimate.translations
     borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
-    factors, height = (np.zeros(len(SPREAD)), None) if shape is None else (np.log(shape.factors), shape.height)
+    factors, height = (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
     part = _Part(estimate, estimate, body, factors, height, visibility.at(rows))
     best, least = part, _mean_cost(scene, part, observations, beta)
     for scale in ROBUST_SCALES:
-        part = _stepped(part, borders, scale, build=shape is not None)
+        part = _stepped(part, borders, scale)
         if (cost := _mean_cost(scene, part, observations, beta)) < least:
             best, least = part, cost
     return best
@@ -235,9 +231,10 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
     return float(np.mean(costs)) if costs else np.inf
 
 
-def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float, *, build: bool) -> _Part:
+def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
     """Return a window one step of Gauss and Newton farther, towards the borders of all views."""
-    count, angles, factors = len(part.fitted), part.angles, len(part.factors) if build else 0
+    count, factors = len(part.fitted), len(part.factors)
+    angles = np.flatnonzero(part.fitted.skeleton.free).tolist()
     numbers, joints = 3 + len(angles), 1 + len(BONE_STARTS)
     curves, slopes = np.zeros((count, numbers, numbers)), np.zeros((count, numbers))
     mixed, curve, slope = np.zeros((count, numbers, factors)), np.zeros((factors, factors)), np.zeros(factors)
@@ -257,13 +254,20 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float, *, buil
         across = ways.transpose(0, 2, 1)
         curves += across @ (curvature @ ways)
         slopes += (across @ gradient[..., None])[..., 0]
-        if build:
+        if factors:
             grown = build_jacobian(part.body, view.camera, poses, places, part.height)
             mixed += across @ (curvature @ grown)
             curve += np.einsum("tqi,tqj->ij", grown, curvature @ grown)
             slope += np.einsum("tqi,tq->i", grown, gradient)
-    squares, turns = _squares(part, curves, slopes), np.zeros(len(part.factors))
-    if not build:
+    fitted, estimate, turns = part.fitted, part.estimate, np.zeros(factors)
+    squares, turned = Squares(count, numbers), slice(3, numbers)
+    squares.add(slice(None), curves, slopes)
+    add_root(squares, estimate, part.visibility, ROOT_DEVIATION, places - estimate.translations)
+    change = wrapped(poses - estimate.poses)[:, angles]
+    squares.add(turned, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
+    squares.add_bends(turned, change, fitted.fps**2 / ANGLE_ACCELERATION)
+    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.eyes), angles)
+    if not factors:
         way = squares.least()
     else:
         solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
@@ -276,20 +280,6 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float, *, buil
         way = way - answers @ turns
     poses = poses.copy()
     poses[:, angles] -= np.clip(way[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    body = shaped(part.body, np.exp(-turns), part.height) if build else part.body
-    fitted = replace(part.fitted, skeleton=body.skeleton, poses=poses, translations=places - way[:, :3])
+    body = shaped(part.body, np.exp(-turns), part.height) if factors else part.body
+    fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - way[:, :3])
     return replace(part, fitted=fitted, body=body, factors=part.factors - turns)
-
-
-def _squares(part: _Part, curves: Array, slopes: Array) -> Squares:
-    """Return what borders, by their curves and slopes, smoothness and standing feet ask of poses and way together."""
-    fitted, estimate, angles = part.fitted, part.estimate, part.angles
-    turned = slice(3, 3 + len(angles))
-    squares = Squares.of(len(fitted), 3 + len(angles))
-    squares.add(slice(None), curves, slopes)
-    add_root(squares, estimate, part.visibility, ROOT_DEVIATION, fitted.translations - estimate.translations)
-    change = wrapped(fitted.poses - estimate.poses)[:, angles]
-    squares.add(turned, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
-    squares.add_bends(turned, change, fitted.fps**2 / ANGLE_ACCELERATION)
-    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.eyes), angles)
-    return squares

@@ -23,17 +23,13 @@ BAND_REACH = 2  # frames to either side that a frame meets
 BEND = np.array([1.0, -2.0, 1.0])
 
 
-@dataclass(frozen=True, eq=False)
 class Squares:
     """Half the second derivative and half the gradient of a sum of squares, in T frames of n numbers each."""
 
-    curves: Array  # (BAND_REACH + 1, T, n, n): a frame with itself, with the next one, and with the one after that
-    slopes: Array  # (T, n)
-
-    @classmethod
-    def of(cls, frames: int, numbers: int) -> Self:
-        """Return the sum of nothing."""
-        return cls(np.zeros((BAND_REACH + 1, frames, numbers, numbers)), np.zeros((frames, numbers)))
+    def __init__(self, frames: int, numbers: int) -> None:
+        # a frame with itself, with the next one, and with the one after that
+        self.curves = np.zeros((BAND_REACH + 1, frames, numbers, numbers))
+        self.slopes = np.zeros((frames, numbers))
 
     def add(self, which: slice, precise: Array, slopes: Array) -> None:
         """Add squares of some numbers of each frame: their precision (m, m) or (T, m, m), and its product (T, m)."""
@@ -211,7 +207,7 @@ def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -
     change = np.zeros((len(motion), 3 + len(angles)))  # of the root, and of the angles
     poses, places = motion.poses.copy(), motion.translations.copy()
     for _ in range(GAUSS_NEWTON_STEPS):
-        squares = Squares.of(*change.shape)
+        squares = Squares(*change.shape)
         add_root(squares, motion, visibility, ROOT_DEVIATION, change[:, root])
         squares.add(legs, np.eye(len(angles)) / LEG_DEVIATION**2, change[:, legs] / LEG_DEVIATION**2)
         squares.add_bends(legs, change[:, legs], motion.fps**2 / LEG_ACCELERATION)
@@ -228,7 +224,14 @@ def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation
     `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth. The
     root's place is the first three numbers of each frame.
     """
-    root, precision = slice(0, 3), _root_precisions(motion, visibility, deviation)
+    root, across = slice(0, 3), np.where(visibility.usable, deviation, UNSEEN_DEVIATION)
+    precision = np.eye(3) / across[:, None, None] ** 2  # (T, 3, 3) the inverse of the covariance
+    alone = np.isfinite(visibility.eyes).all(axis=1)
+    sights = motion.translations[alone] - visibility.eyes[alone]
+    far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
+    sights = sights / far[:, None]
+    less = 1.0 / np.maximum(DEPTH_DEVIATION * far, across[alone]) ** 2 - 1.0 / across[alone] ** 2
+    precision[alone] += less[:, None, None] * sights[:, :, None] * sights[:, None, :]
     off = np.einsum("ti,tij,tj->t", moved, precision, moved)
     precision /= (1.0 + off / OUTLIER_DEVIATIONS**2)[:, None, None]
     squares.add(root, precision, np.einsum("tij,tj->ti", precision, moved))
@@ -254,17 +257,3 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
         ways[..., columns] = np.moveaxis((there[:, :, ball] - feet) / DIFFERENCE, 0, 2)
         both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
         squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING_SLIDE))
-
-
-def _root_precisions(motion: Motion, visibility: Visibility, deviation: float) -> Array:
-    """Return what the root's place in each frame is worth (T, 3, 3), the inverse of its covariance."""
-    across = np.where(visibility.usable, deviation, UNSEEN_DEVIATION)
-    precise = np.eye(3) / across[:, None, None] ** 2
-    alone = np.isfinite(visibility.eyes).all(axis=1)
-    sights = motion.translations[alone] - visibility.eyes[alone]
-    far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
-    sights = sights / far[:, None]
-    along = np.maximum(DEPTH_DEVIATION * far, across[alone])
-    less = 1.0 / along**2 - 1.0 / across[alone] ** 2
-    precise[alone] += less[:, None, None] * sights[:, :, None] * sights[:, None, :]
-    return np.asarray(precise)
