@@ -16,6 +16,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.rasteriser import NEAR
+from posefit.uncertainty.modes import Mode
 
 BACKGROUND = (28, 24, 22)
 BOTH, MISSED, SPILLED = (186, 214, 168), (90, 90, 235), (235, 160, 70)  # Y, R, B
@@ -104,9 +105,11 @@ def solid_map(body: Body, camera: Camera, pose: Array, translation: Array, solid
     return image / 255.0
 
 
-def draw_stick(image: Image, body: Body, camera: Camera, pose: Array, translation: Array) -> None:
-    """Draw a body's bones as thin lines; wrists and feet have the colours of their sides."""
-    pixels, depths = camera.project(body.skeleton.joints(pose, translation))
+def draw_other(image: Image, body: Body, camera: Camera, other: Mode | None) -> None:
+    """Draw another mode's bones as thin lines, if there is one; wrists and feet have the colours of their sides."""
+    if other is None:
+        return
+    pixels, depths = camera.project(body.skeleton.joints(other.pose, other.translation))
     thick = max(1, round(camera.height / 240))
     # pixel centres are at +0.5 here, and at whole numbers in OpenCV
     points = np.rint((np.nan_to_num(pixels) - 0.5) * 16).astype(np.int64).tolist()

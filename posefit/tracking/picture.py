@@ -25,7 +25,7 @@ from posefit.tracking.drawing import (
     SPILLED,
     blank,
     draw_body,
-    draw_stick,
+    draw_other,
     opacities,
     side_camera,
     solid_map,
@@ -77,7 +77,7 @@ class Painter:
         from_side = side_camera(body, camera, pose, place, PANEL)
         side = blank(PANEL, PANEL)
         draw_body(side, body, from_side, pose, place, solid)
-        self._draw_other(side, from_side, other)
+        draw_other(side, body, from_side, other)
         image = np.hstack([left, side])
         if self._count in self._wanted:
             self._stills.append(self._still(image, row))
@@ -120,13 +120,14 @@ class Painter:
         other: Mode | None = None,
     ) -> Image:
         """Return the body on what was `filmed`, or on the masks of all cameras, as a picture (height, width, 3)."""
+        body = self._scene.body
         if filmed is not None:
             drawn, camera = filmed.copy(), self._scene.cameras[0]
-            draw_body(drawn, self._scene.body, camera, frame.pose, frame.translation, solid)
+            draw_body(drawn, body, camera, frame.pose, frame.translation, solid)
             panel = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
-            self._draw_other(panel, _zoomed(camera, panel), other)
+            draw_other(panel, body, _zoomed(camera, panel), other)
             return panel
-        body, panels = self._scene.body, []
+        panels = []
         columns = min(2, len(self._scene.cameras))
         height = PANEL // -(-len(self._scene.cameras) // columns)
         for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
@@ -137,15 +138,11 @@ class Painter:
                 share = solid_map(body, camera, frame.pose, frame.translation, solid)[..., None]
                 view = np.asarray(share * view + (1.0 - share) * np.array(BACKGROUND), np.uint8)
             panel = _panel(view, height, sharp=True)
-            self._draw_other(panel, _zoomed(camera, panel), other)
+            draw_other(panel, body, _zoomed(camera, panel), other)
             panels.append(panel)
         wide = max(panel.shape[1] for panel in panels)
         panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]
         return _grid(panels, columns, 0)
-
-    def _draw_other(self, image: Image, camera: Camera, other: Mode | None) -> None:
-        if other is not None:
-            draw_stick(image, self._scene.body, camera, other.pose, other.translation)
 
     def summary(self, rows: Sequence[Mapping[str, float]], notes: Sequence[str] = ()) -> Image:
         """Return notes and stills of the track, above a curve of its error, or of its cost where truth is unknown."""

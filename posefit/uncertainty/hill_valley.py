@@ -63,36 +63,21 @@ def valleys(landscape: Landscape, proposals: Array, costs: Array, *, tolerance: 
         raise InputError(f"costs must be finite, got {costs[~np.isfinite(costs)][0]}")
     count, dimensions = proposals.shape
     order = np.argsort(costs, kind="stable")
-    pairs, probes = _pairs(landscape, proposals, order, edge_length(dimensions, max(count, 1)), least)
-    joined = same_valley(landscape, proposals, costs, pairs, probes, tolerance)
+    proposals, costs = proposals[order], costs[order]
+    away = np.linalg.norm(displacement(landscape.box, proposals[:, None], proposals), axis=2)
+    ranks = (np.argsort(away[k, :k], kind="stable") for k in range(count))
+    better = [nearest[: dimensions + 1].tolist() for nearest in ranks]  # MAREE2018 (nearest better)
+    pairs = np.array([(k, other) for k in range(count) for other in better[k]], dtype=np.int64).reshape(-1, 2)
+    edges = away[pairs[:, 0], pairs[:, 1]] / edge_length(dimensions, max(count, 1))
+    probes = least + edges.astype(np.int64)  # MAREE2018 (test points)
+    joined = iter(same_valley(landscape, proposals, costs, pairs, probes, tolerance).tolist())
     labels, lowest = np.full(count, -1, dtype=np.int64), list[int]()
-    first = np.concatenate([[0], np.minimum(np.arange(count), dimensions + 1).cumsum()])
-    for place, row in enumerate(order):
-        tried: set[int] = set()
-        for k in range(first[place], first[place + 1]):
-            valley = int(labels[pairs[k, 1]])
-            if valley in tried:  # there is a hill before another of its proposals
-                continue
-            if joined[k]:
-                labels[row] = valley
-                break
-            tried.add(valley)
-        if labels[row] < 0:
-            labels[row] = len(lowest)
-            lowest.append(int(row))
-    return Valleys(labels, np.array(lowest, dtype=np.int64))
-
-
-def _pairs(
-    landscape: Landscape, proposals: Array, order: NDArray[np.int64], edge: float, least: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return each proposal with those that are better (p, 2), nearest first, and how often to probe them (p,)."""
-    most, ranked = proposals.shape[1] + 1, proposals[order]
-    away = np.linalg.norm(displacement(landscape.box, ranked[:, None], ranked), axis=2)
-    pairs, far = [np.empty((0, 2), dtype=np.int64)], [np.empty(0)]
-    for place in range(1, len(order)):
-        nearest = np.argsort(away[place, :place], kind="stable")[:most]  # MAREE2018 (nearest better)
-        pairs.append(np.stack([np.full(len(nearest), order[place]), order[nearest]], axis=1))
-        far.append(away[place, nearest])
-    probes = least + (np.concatenate(far) / edge).astype(np.int64)  # MAREE2018 (test points)
-    return np.concatenate(pairs), probes
+    for k, others in enumerate(better):
+        each = [(int(labels[other]), joins) for other, joins in zip(others, joined, strict=False)]
+        nearest = dict(reversed(each))  # of a valley the nearest alone counts: there is a hill before its others
+        labels[k] = next((valley for valley, _ in each if nearest[valley]), len(lowest))
+        if labels[k] == len(lowest):
+            lowest.append(k)
+    by_row = np.empty_like(labels)
+    by_row[order] = labels
+    return Valleys(by_row, order[np.array(lowest, dtype=np.int64)])
