@@ -57,7 +57,7 @@ def modes(
     at_least("evaluations", evaluations, 1)
     positive("temperature", temperature)
     positive("share", share)
-    first = search(problem, make(problem.space, rng), evaluations)
+    first = gathered(searched(problem, make(problem.space, rng), evaluations))
     return further(problem, make, first, round(share * evaluations), rng, searches - 1, temperature)[0]
 
 
@@ -75,22 +75,22 @@ def further(
     count = min(searches, left // MIN_EVALUATIONS)
     for k in range(count):
         with suppress(BudgetError):  # a part that does not hold a population is left to those that come after
-            others.append(search(problem, make(anywhere, rng), left // (count - k)))
+            others.append(gathered(searched(problem, make(anywhere, rng), left // (count - k))))
             left -= len(others[-1][1])
     used = sum(len(costs) for _, costs in others)
     landscape = Landscape(problem.space, problem.evaluate)
     symmetric = symmetric_proposals(problem, first[0][np.nanargmin(first[1])])
-    searched = [first, *others, *([(symmetric, landscape.costs(symmetric))] if len(symmetric) else [])]
+    every = [first, *others, *([(symmetric, landscape.costs(symmetric))] if len(symmetric) else [])]
     left = evaluations - used - landscape.evaluations
-    sample = weighed(landscape, searched, temperature, rng, evaluations=left)
+    sample = weighed(landscape, every, temperature, rng, evaluations=left)
     proposals, weights = sample.even(POSTERIOR_POSES, rng)
     return Posterior(*problem.decode(proposals), weights), used + landscape.evaluations
 
 
-def search(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> Searched:
-    """Return all proposals (n, d) that an optimiser had evaluated within a budget, and their costs (n,)."""
+def searched(problem: PoseProblem, optimiser: Optimiser, evaluations: int) -> list[Searched]:
+    """Return all populations (n, d) that an optimiser had evaluated within a budget, with their costs (n,)."""
     found = populations(optimiser, problem.evaluate, evaluations)
-    return gathered([(np.array(proposals), costs) for proposals, costs in found])
+    return [(np.array(proposals), costs) for proposals, costs in found]
 
 
 def gathered(populations: list[Searched]) -> Searched:
@@ -163,23 +163,22 @@ class WeighingTracker(SynthesisTracker):
 
     def minimum(self, problem: PoseProblem, optimiser: Optimiser) -> Minimum:
         """Return the best of the search of a frame, and keep all that was evaluated."""
-        found = populations(optimiser, problem.evaluate, self.task.evaluations)
-        searched = [(np.array(proposals), costs) for proposals, costs in found]
-        self._latest[:] = [(problem, searched)]
-        return minimum_of(searched)
+        found = searched(problem, optimiser, self.task.evaluations)
+        self._latest[:] = [(problem, found)]
+        return minimum_of(found)
 
     def _posterior(
-        self, problem: PoseProblem, searched: list[Searched], rng: np.random.Generator
+        self, problem: PoseProblem, found: list[Searched], rng: np.random.Generator
     ) -> tuple[Posterior, int]:
         """Return the posterior of a frame, and how many evaluations it took."""
         how = self.prediction
         if how.modes == 1 and self.next_frame == "carry":
-            particles, costs = searched[-1]
+            particles, costs = found[-1]
             weights = boltzmann_weights(costs, how.posterior_temperature)
             if len(particles) > POSTERIOR_POSES:  # some of equal weight
                 particles = particles[systematic_rows(weights, 0.5, POSTERIOR_POSES)]
                 weights = np.full(POSTERIOR_POSES, 1.0 / POSTERIOR_POSES)
             return Posterior(*problem.decode(particles), weights), 0
         own = independent(rng)  # the track is the same as without
-        first, more = gathered(searched), round(how.modes_share * self.task.evaluations)
+        first, more = gathered(found), round(how.modes_share * self.task.evaluations)
         return further(problem, self.make, first, more, own, how.modes - 1, how.posterior_temperature)

@@ -73,7 +73,8 @@ def _between(low: float, high: float, unit: str = "") -> Check:
 
 
 def _int(default: int | None, text: str, least: int, placeholder: str = "N", **others: Any) -> Any:
-    return option(default, text, lambda name, value: whole(name, value, least), placeholder, parse=int, **others)
+    others = {"parse": int, **others}
+    return option(default, text, lambda name, value: whole(name, value, least), placeholder, **others)
 
 
 def _float(text: str, ends: tuple[float, float], placeholder: str, unit: str = "") -> Any:
@@ -93,12 +94,6 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
     if not all(end is None or _is_whole(end) for end in (start, stop)):
         raise InputError(f"{name} must be two whole numbers or None, got {quoted(value)}")
     return start, stop
-
-
-def _label(name: str, value: Any) -> int:
-    if not _is_whole(value):
-        raise InputError(f"{name} must be a whole number, got {quoted(value)}")
-    return int(value)
 
 
 def _is_whole(value: Any) -> bool:
@@ -204,9 +199,7 @@ class TrackOptions:
     )
     extraction: "Extraction | None" = option(None, "How the person is taken out of video.", flag="")
     height: float | None = _float("How tall the person in the footage stands.", HEIGHTS, "METRES", " metres")
-    label: int | None = option(
-        None, "Of masks: the value or the colour that the person has.", _label, "N", parse=text_label
-    )
+    label: int | None = _int(None, "Of masks: the value or the colour that the person has.", 0, parse=text_label)
     holes: float | None = _float(
         "Of masks: fill holes up to this share of the person; by default 0.02.",
         (0.0, 1.0),

@@ -25,7 +25,6 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
-from posefit.motion.motion import Motion
 from posefit.motion.steadiness import runs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.trajectory import effort_of, mean_cost, with_total_effort
@@ -233,27 +232,23 @@ def retrack_spins(
     often, or costs half as much again. The frames have the effort of both tracks.
     """
     usable = np.array([observation.usable for observation in observations])
-    before = _spin_count(task, frames, usable)
+
+    def spins(track: Sequence[Frame]) -> int:
+        return int(spin_mask(np.array([frame.pose[0] for frame in track]), usable, task.fps).sum())
+
+    before = spins(frames)
     start = anchor_frame(frames, facing_consensus(frames, task.cameras, usable, task.fps)) if before else None
     if start is None:
         return list(frames), None
     sure = replace(_after(task, frames[start]), before=(), fastest_turn=MAX_TURN_RATE)
-    back = replace(sure, training=[in_reverse(motion) for motion in task.training], backwards=True)
+    reverse = [replace(one, poses=one.poses[::-1], translations=one.translations[::-1]) for one in task.training]
+    back = replace(sure, training=reverse, backwards=True)
     ahead = list(follow(sure, (observations[k] for k in range(start, len(frames))), stream(seed, "spin", 0)))
     behind = list(follow(back, (observations[k] for k in range(start, -1, -1)), stream(seed, "spin", 1)))
     again = [*_joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
     cheap = mean_cost(again, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
-    better = cheap and _spin_count(task, again, usable) < before
+    better = cheap and spins(again) < before
     return with_total_effort([frames, again], int(better)), start if better else None
-
-
-def in_reverse(motion: Motion) -> Motion:
-    """Return a motion that goes backwards in time."""
-    return replace(motion, poses=motion.poses[::-1], translations=motion.translations[::-1])
-
-
-def _spin_count(task: Task, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> int:
-    return int(spin_mask(np.array([frame.pose[0] for frame in frames]), usable, task.fps).sum())
 
 
 def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:

@@ -122,7 +122,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
     assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.summary)
 
 
-def test_frames_and_tracks_have_modes(scene: Scene) -> None:
+def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(scene: Scene) -> None:
     frames = uncertain_frames(scene, CERTAIN, turned=0.25, coherent=True)
     track = tracked(scene, frames)
     for estimate, frame in zip(track.estimates, frames, strict=True):
@@ -136,16 +136,12 @@ def test_frames_and_tracks_have_modes(scene: Scene) -> None:
     apart = tracked(scene, uncertain_frames(scene, CERTAIN, turned=0.25))  # whose posteriors are no trajectories
     assert len(apart.estimates[0].modes) == 2
     assert (apart.modes, apart.summary["modes"]) == ([], None)
-
-
-def test_the_summary_has_the_probability_that_no_mode_of_a_frame_is_right(scene: Scene) -> None:
-    frames = []
-    for k, frame in enumerate(uncertain_frames(scene, CERTAIN, turned=0.25)):
+    for k, frame in enumerate(frames):
         assert frame.posterior is not None
-        frames.append(replace(frame, posterior=replace(frame.posterior, recalibration=Recalibration(none=0.1 * k))))
-    track = tracked(scene, frames)
-    assert track.summary["none_of_modes"] == pytest.approx(0.25)
-    assert [mode.weight for mode in track.estimates[5].modes] == pytest.approx([0.375, 0.125])
+        frames[k] = replace(frame, posterior=replace(frame.posterior, recalibration=Recalibration(none=0.1 * k)))
+    doubtful = tracked(scene, frames)
+    assert doubtful.summary["none_of_modes"] == pytest.approx(0.25)
+    assert [mode.weight for mode in doubtful.estimates[5].modes] == pytest.approx([0.375, 0.125])
 
 
 def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp_path: Path) -> None:

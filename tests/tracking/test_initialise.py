@@ -117,16 +117,12 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
     return [call for k, call in enumerate(calls) if call not in calls[:k]]
 
 
-def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many() -> None:
-    scene = walk(30, [90.0], (120, 90))
+def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_most_cameras_see_the_person() -> None:
+    scene = walk(40, [0.0, 90.0], (120, 90))
     observations = [scene.observations[k] for k in range(30)]
     thirds, all_of_them = frames_of_builds(scene, observations, 10, 11)
     assert thirds == (list(range(0, 30, 3)), scene.fps / 3)
     assert all_of_them == (list(range(11)), scene.fps)
-
-
-def test_a_build_begins_where_most_cameras_see_the_person() -> None:
-    scene = walk(40, [0.0, 90.0], (120, 90))
     unknown = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
     observations = [scene.observations[k] for k in range(40)]
     observations[:10] = [replace(seen, silhouettes=[seen.silhouettes[0], unknown]) for seen in observations[:10]]

@@ -163,7 +163,6 @@ def test_a_tracker_is_reached_by_name(installed: Any) -> None:
     assert summary["method"] == "bad"
     assert summary["prior_floor_degrees"] is None
     assert summary["skill"]["mean_pose"] is not None
-    installed("optimiser", planted.Sound)
 
 
 @each("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])

@@ -1,7 +1,6 @@
 """What a caller from Python or at the command line gets wrong is one clear line, and no option is ignored."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,12 +53,6 @@ def test_a_misuse_of_track_is_one_clear_error() -> None:
     for given, message in MISUSES:
         with pytest.raises(ValueError, match=message):
             posefit.track("walk", **{"evaluations": 80, "frames": (0, 2), **given})
-
-
-def test_what_masks_have_no_use_for_is_refused(tmp_path: Path) -> None:
-    np.savez(tmp_path / "a.npz", masks=np.zeros((2, 40, 40), dtype=bool))
-    with pytest.raises(ValueError, match="extraction must be given for video only, got Extraction.* for masks"):
-        posefit.track(tmp_path / "a.npz", extraction=Extraction())
 
 
 @pytest.fixture(scope="module")
