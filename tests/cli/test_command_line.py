@@ -198,6 +198,7 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
         (["walk", "--frames", "70:80"], "frames must choose some of the 60 frames, got 70:80"),
         (["walk", "--fps", "0"], "fps must lie in 0.001 to 1e+06, got 0"),
         (["walk", "--threads", "0"], "threads must be at least 1, got 0"),
+        (["walk", "--live", "-"], "SOURCE must be left out with --live, got walk"),
         (["walk", "--device", "tpu"], "device must be one of cpu, cuda, got 'tpu'"),
         (["walk", "--translation", "free"], "translation must be one of known, searched, aligned, got 'free'"),
         (["walk", "--camera", "no.json"], "no.json"),

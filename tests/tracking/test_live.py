@@ -3,7 +3,6 @@
 import io
 import json
 import os
-import subprocess
 import sys
 import threading
 import time
@@ -144,13 +143,6 @@ def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off
 def test_options_that_need_all_frames_are_refused(options, expected):
     with pytest.raises(InputError, match=expected):
         next(track_live(**options))
-
-
-def test_the_command_takes_no_source_beside_a_stream():
-    command = [sys.executable, "-m", "posefit", "track", "walk", "--live", "-"]
-    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    assert done.returncode == 2
-    assert done.stderr == "posefit: SOURCE must be left out with --live, got walk\n"
 
 
 def test_images_of_another_size_are_refused(every_frame, walk):

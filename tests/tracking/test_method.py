@@ -157,14 +157,6 @@ def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meet
         posefit.track("walk", method="@bad", **QUICK)
 
 
-def test_a_tracker_is_reached_by_name(installed: Any) -> None:
-    installed("tracker", planted.Holds)
-    summary = posefit.track("walk", method="bad", **QUICK).summary
-    assert summary["method"] == "bad"
-    assert summary["prior_floor_degrees"] is None
-    assert summary["skill"]["mean_pose"] is not None
-
-
 @each("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
 def test_every_prior_can_be_searched(prior: str) -> None:
     summary = posefit.track("walk", method=f"@{prior}", **QUICK).summary
