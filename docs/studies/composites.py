@@ -1,5 +1,6 @@
 """Videos made from the truth, tracked as any footage: each row is kept as it comes."""
 
+import importlib.util
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
+from angles import SAGITTAL, angle_errors, landmark_angles
 from composites_scene import (
     BEFORE,
     PLACES,
@@ -24,6 +26,7 @@ from composites_scene import (
     plate,
     situation,
 )
+from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting import metrics
@@ -31,6 +34,7 @@ from posefit.fitting.metrics import LOST_MM
 from posefit.footage.extract import extract
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
+from posefit.geometry.skeleton import BONES
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
@@ -75,6 +79,10 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
     away = 1e3 * np.linalg.norm(joints[:, 0] - true_joints[:, 0], axis=1)
     facing = np.cos(estimate.poses[:, 0] - actor.motion.poses[:, 0]) > 0.0
     said = {name: np.array([row.get(name, np.nan) for row in track.frames]) for name in ("lost", "unknown_sides")}
+    swapped = metrics.swapped(true_joints, joints)
+    known = seen & (said["unknown_sides"] == 0.0)
+    lengths = [np.linalg.norm(motion.skeleton.offsets, axis=1) for motion in (actor.motion, estimate)]
+    off = np.abs(lengths[1] / lengths[0] - 1.0)
     return {
         "seen": int(seen.sum()),
         "body_iou": _body_iou(estimate, body, situation, truth),
@@ -83,12 +91,23 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
         "place_mm": float(np.median(away[seen])),
         "facing_right": float(facing[seen].mean()),
         "lost": float((mpjpe[seen] > LOST_MM).mean()),
-        "swapped": float(metrics.swapped(true_joints, joints)[seen].mean()),
+        "swapped": float(swapped[seen].mean()),
         "said_lost": _share(said["lost"][seen] >= LOST, said["lost"][seen]),
         "said_unknown": _share(said["unknown_sides"][seen] == 1.0, said["unknown_sides"][seen]),
         "held": float(1.0 - np.array([row["usable"] for row in track.frames])[seen].mean()),
+        "known_wrong": float(swapped[known].mean()) if known.any() else None,
         "stature_cm": 100.0 * (body.stature - actor.body.stature),
+        **{name: float(off[[k for k, bone in enumerate(BONES) if bone[1:] in bones]].mean()) for name, bones in PARTS},
+        **angle_errors(actor.motion, clinical_angles(estimate.skeleton, estimate.poses), seen),
     }
+
+
+def inside(track: Track, radii: Array, situation: Situation, truth: Masks) -> float:
+    """Return the share of joints but the root whose truth lies within radii (T, 27), both roots at one point."""
+    actor, estimate = situation.actors[0].motion, track.motion
+    off = np.linalg.norm(actor.skeleton.joints(actor.poses) - estimate.skeleton.joints(estimate.poses), axis=2)
+    rows = np.asarray(uncut(truth).any(axis=0)) & np.isfinite(radii).all(axis=1)
+    return float((off <= radii)[rows, 1:].mean())
 
 
 def _body_iou(estimate: Motion, body: Body, situation: Situation, truth: Masks) -> float:
@@ -114,6 +133,7 @@ def _share(flags: NDArray[np.bool_], values: Array) -> float | None:
 
 
 Row = Mapping[str, Any]
+PARTS = (("arms", ("clavicle", "humerus", "radius")), ("legs", ("femur", "tibia")))  # bones whose lengths are compared
 
 # What a table shows of a row: its head, digits, and what a value is multiplied by.
 COLUMNS: Mapping[str, tuple[str, int, float]] = {
@@ -127,6 +147,10 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "said_lost": ("said lost %", 0, 100.0),
     "swapped": ("swapped %", 0, 100.0),
     "said_unknown": ("unknown %", 0, 100.0),
+    "known_wrong": ("known and wrong %", 0, 100.0),
+    "inside": ("inside 80 %", 0, 100.0),
+    **{name: (f"{name} off %", 0, 100.0) for name, _ in PARTS},
+    **{name: (f"{name.replace('_', ' ')} off, degrees", 1, 1.0) for name in SAGITTAL},
 }
 
 
@@ -220,8 +244,12 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
         row["minutes"] = (time.perf_counter() - began) / 60.0
         with np.load(folder / "track" / "poses.npz") as stored:
-            radii = stored["radii"]
+            radii, joint_radii = stored["radii"], stored["joint_radii"][:, list(stored["levels"]).index(0.8)]
         row |= track_figures(result, radii, scene, made.masks)
+        row["inside"] = inside(result, joint_radii, scene, made.masks)
+        if importlib.util.find_spec("mediapipe"):
+            angles = landmark_angles(made.videos[0], made.first, SIZE)
+            row["landmarks"] = angle_errors(scene.actors[0].motion, angles, uncut(made.masks)[0])
         row["warnings"] = [one.replace(f"{folder}/", "") for one in said if one.startswith("warning")]
         return row
 
@@ -264,6 +292,10 @@ def composites_lines(found: Sequence[Row]) -> Iterator[str]:
         ["situation", "cameras", "extraction", "seed", *(head for head, _, _ in COLUMNS.values())], table, 3
     )
     yield from (f"{row['situation']}, {row['extraction']}: {row['refused']}" for row in found if "refused" in row)
+    landmarks = [row["landmarks"] for row in found if "landmarks" in row]
+    if landmarks:
+        medians = [f"{np.median([row[name] for row in landmarks]):.1f}" for name in SAGITTAL]
+        yield f"MediaPipe's landmarks in the first camera, degrees off, medians: {', '.join(medians)}"
 
 
 @click.command(help=__doc__)
