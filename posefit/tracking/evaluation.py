@@ -15,7 +15,7 @@ from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
-from posefit.tracking.trajectory import motion_of
+from posefit.tracking.trajectory import effort_of, motion_of
 from posefit.uncertainty.calibration import LEVELS
 from posefit.uncertainty.intervals import joint_intervals
 from posefit.uncertainty.modes import unknown_sides
@@ -50,12 +50,7 @@ def evaluated(
             nearest_poses.append(nearest(scene, training, k, observation, beta))
     held, iou, cost = np.array(frames_held), np.array(ious), np.array([frame.cost for frame in frames])
     usable = np.ones(len(frames), dtype=bool) if held.all() else ~held
-    evaluations, seconds = [frame.evaluations for frame in frames], [frame.seconds for frame in frames]
-    cpu_seconds = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
-    errors: dict[str, Array] = {}
-    error_measures: dict[str, Any] = {}
-    if scene.truth is not None:
-        errors, error_measures = _errors(scene, frames, prior, training, np.array(nearest_poses))
+    errors, error_measures = _errors(scene, frames, prior, training, np.array(nearest_poses))
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
     columns: dict[str, Any] = {
         "cost": cost,
@@ -63,9 +58,10 @@ def evaluated(
         "usable": ~held,
         **errors,
         **certainty,
-        "evaluations": evaluations,
-        "seconds": seconds,
+        "evaluations": [frame.evaluations for frame in frames],
+        "seconds": [frame.seconds for frame in frames],
     }
+    effort = effort_of(frames)
     measures = Measures(
         **error_measures,
         **certainty_measures,
@@ -73,10 +69,10 @@ def evaluated(
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
         held_frames=int(held.sum()),
-        seconds_per_frame=sum(seconds) / len(frames),
-        cpu_seconds_per_frame=sum(cpu_seconds) / len(cpu_seconds) if cpu_seconds else None,
-        evaluations=sum(evaluations),
-        evaluations_per_second=sum(evaluations) / max(sum(seconds), 1e-9),  # a plugin may report 0
+        seconds_per_frame=effort["seconds"] / len(frames),
+        cpu_seconds_per_frame=None if effort["cpu_seconds"] is None else effort["cpu_seconds"] / len(frames),
+        evaluations=effort["evaluations"],
+        evaluations_per_second=effort["evaluations"] / max(effort["seconds"], 1e-9),  # a plugin may report 0
     )
     rows = [{"frame": k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))]
     return rows, measures
@@ -85,8 +81,9 @@ def evaluated(
 def _errors(
     scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, nearest_poses: Array
 ) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Return the columns and the measures that need a truth."""
-    assert scene.truth is not None
+    """Return the columns and the measures that need a truth; none where it is unknown."""
+    if scene.truth is None:
+        return {}, {}
     truth, places, skeleton = scene.truth.poses, scene.truth.translations, scene.body.skeleton
     estimate = motion_of(scene, frames)
     poses, joints, true_joints = estimate.poses, estimate.joints, scene.truth.joints  # the given body may be another
