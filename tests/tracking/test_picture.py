@@ -17,12 +17,10 @@ from posefit.uncertainty.modes import Mode
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, walk
 
-FRAMES = 1
-
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return walk(FRAMES, size=(160, 120))
+    return walk(1, size=(160, 120))
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +38,6 @@ def painted(
     """Return the picture of the first frame, and how wide its left half is."""
     image = Painter(scene).add(frame, scene.observations[0], values or row(), filmed, radii)
     return image, image.shape[1] - PANEL
-
-
-def with_modes(scene: Scene, frame: Frame, weight: float) -> Frame:
-    mirrored = mirrored_poses(scene.body.skeleton, frame.pose[None])[0]
-    modes = [Mode(1.0 - weight, frame.pose, frame.translation), Mode(weight, mirrored, frame.translation)]
-    return replace(frame, modes=modes)
 
 
 def pixels(image: Any, colour: tuple[int, int, int], close: int = 0) -> int:
@@ -98,7 +90,9 @@ def test_an_unsure_limb_fades_on_the_masks_and_beside_them(scene: Scene, frame: 
 def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(
     scene: Scene, frame: Frame, weight: float, drawn: bool
 ) -> None:
-    image, half = painted(scene, with_modes(scene, frame, weight))
+    mirrored = mirrored_poses(scene.body.skeleton, frame.pose[None])[0]
+    modes = [Mode(1.0 - weight, frame.pose, frame.translation), Mode(weight, mirrored, frame.translation)]
+    image, half = painted(scene, replace(frame, modes=modes))
     for part in (image[:, :half], image[: PANEL - 60, half:]):  # without the words
         assert (pixels(part, OTHER, close=12) > 100) == drawn
 

@@ -34,22 +34,22 @@ class Strip:
     """Pictures of every frame, or of every second, fourth, ... once there is no more room."""
 
     def __init__(self, room: int, every: int) -> None:
-        self.pictures: list[tuple[Box, list[str]]] = []
+        self.pictures: list[tuple[Any, ...]] = []  # a box, and the pictures
         self.every = every
         self._room, self._count = room, 0
 
     def add(self, box: Box, pictures: Callable[[], list[str]]) -> None:
         """Take the next frame, whose `pictures` are made if they are needed; the first is of the box."""
         if self._count % self.every == 0:
-            self.pictures.append((box, pictures()))
-            while len(self.pictures) > 1 and sum(len(text) for _, each in self.pictures for text in each) > self._room:
+            self.pictures.append((box, *pictures()))
+            while len(self.pictures) > 1 and sum(len(text) for _, *each in self.pictures for text in each) > self._room:
                 self.pictures = self.pictures[::2]
                 self.every *= 2
         self._count += 1
 
     def as_dict(self) -> dict[str, Any]:
         """Return the pictures, and the number of frames that each of them stands for."""
-        return {"every": self.every, "pictures": [[list(box), *each] for box, each in self.pictures]}
+        return {"every": self.every, "pictures": self.pictures}
 
 
 class Stills:
