@@ -27,19 +27,15 @@ def track() -> posefit.Track:
     return posefit.track(MASKS, camera=CAMERA, fps=25, **QUICK)
 
 
-def images(folder: Path) -> list[Path]:
-    paths = [folder / f"{k}.png" for k in range(len(MASKS))]
-    for path, mask in zip(paths, MASKS, strict=True):
-        cv2.imwrite(str(path), 255 * mask.astype(np.uint8))
-    return paths
-
-
 @each("kind", ["npy", "images", "list", "bytes", "folder"])
 def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp_path: Path) -> None:
     np.save(tmp_path / "masks.npy", MASKS)
+    paths = [tmp_path / f"{k}.png" for k in range(len(MASKS))]
+    for path, mask in zip(paths, MASKS, strict=True):
+        cv2.imwrite(str(path), 255 * mask.astype(np.uint8))
     sources: dict[str, Any] = {
         "npy": tmp_path / "masks.npy",
-        "images": images(tmp_path),
+        "images": paths,
         "list": list(MASKS),
         "bytes": 255 * MASKS.astype(np.uint8),
         "folder": tmp_path,
