@@ -49,9 +49,7 @@ def mutants() -> Iterator[Mutant]:
     for tag in equations.tags():
         tests = tuple(f"tests/sources/{name}" for name in equations.tests_of(tag))
         if tests:
-            lines = (ROOT / tag.path).read_text("utf-8").splitlines()
-            alone = lines[tag.line - 1].lstrip().startswith("#")  # a tag on its own is of the next line
-            yield from _of_lines(tag.path, {tag.line + alone}, tests)
+            yield from _of_lines(tag.path, {tag.line}, tests)
     for path in sorted(ROOT.glob("p*/**/kernels.py")):
         name = path.relative_to(ROOT).as_posix()
         folder = name.removesuffix("/kernels.py")

@@ -41,6 +41,7 @@ class Tag(NamedTuple):
     source: str
     step: str
     path: str
+    line: int  # of the code, from 1
     code: str
 
 
@@ -67,8 +68,9 @@ def tags() -> Iterator[Tag]:
                 match = _TAG.search(line)
                 if match is None:
                     continue
-                code = line[: match.start()].strip() or lines[number].strip()  # a tag on its own is of the next line
-                yield Tag(match["source"], match["step"], str(path.relative_to(ROOT)), code)
+                at = number if line[: match.start()].strip() else number + 1  # a tag on its own is of the next line
+                code = lines[at - 1].partition("  # ")[0].strip()
+                yield Tag(match["source"], match["step"], str(path.relative_to(ROOT)), at, code)
 
 
 def tests_of(tag: Tag) -> list[str]:
