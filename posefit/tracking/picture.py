@@ -105,11 +105,11 @@ class Painter:
         still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
         label = f"frame {self._count}, {worth}"
-        still[:LABEL_HEIGHT, : width_of(label, SUMMARY_SCALE) + 24] //= 4
-        write(still, label, (12, 26), scale=SUMMARY_SCALE)
         if row["lost"] >= LOST:
             _draw_border(still, BORDER // 2)
-        return still
+        head = blank(LABEL_HEIGHT, still.shape[1])
+        write(head, label, (12, 26), scale=SUMMARY_SCALE)
+        return np.vstack([head, still])
 
     def overlay(
         self,
