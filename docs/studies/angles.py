@@ -14,7 +14,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from clips import GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from clips import FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
 from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.fitting import metrics
@@ -26,7 +26,6 @@ from posefit_reproduce.jobs import each
 from table import WORKERS, Row, bar, markdown
 
 SAGITTAL = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
-FOUR: Views = (0.0, 90.0, 180.0, 270.0)
 
 
 def angle_errors(true: Motion, angles: Mapping[str, Array], seen: NDArray[np.bool_]) -> dict[str, float]:

@@ -90,6 +90,7 @@ Views = tuple[float, ...]
 
 SIDES: tuple[Views, ...] = ((0.0,), (45.0,), (90.0,), (135.0,), (180.0,))
 PAIRS: tuple[Views, ...] = ((0.0, 90.0), (45.0, 135.0))
+FOUR: Views = (0.0, 90.0, 180.0, 270.0)
 
 
 def cell_fields(clip: Clip, views: Views, frames: int, **fields: Any) -> dict[str, Any]:

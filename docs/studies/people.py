@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import click
 import numpy as np
 
-from clips import EVALUATIONS, GROUPS, METHOD, PAIRS, RUNS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from clips import EVALUATIONS, FOUR, GROUPS, METHOD, PAIRS, RUNS, SIDES, WALKS, Clip, Views, cell_fields, track_of
 from posefit.arrays import Array
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.space import Translation
@@ -75,7 +75,7 @@ class Task(NamedTuple):
 def design(method: str, quick: bool) -> Iterator[Task]:
     """Yield all tracks, or a few of them."""
     for group, clips in GROUPS.items():
-        views = {WALKS: (*SIDES, *PAIRS), RUNS: SIDES}.get(group, (*SIDES[:3], PAIRS[1]))
+        views = {WALKS: (*SIDES, *PAIRS, FOUR), RUNS: SIDES}.get(group, (*SIDES[:3], PAIRS[1], FOUR))
         for clip, view in product(clips[: 2 if quick else None], views[1:2] if quick else views):
             line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
             yield Task("groups", line, clip, view)
