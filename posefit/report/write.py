@@ -1,7 +1,6 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
 from collections.abc import Callable
-from math import comb
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from posefit.sweep.table import flat
 
 MAX_MISSING = 20  # instances that are named if they are not compared
 PRINTED = ("header", "answer", "leaderboard", "baselines", "claims", "selection", "times")
-LETTERS = "methods that share a letter are not shown to differ: Wilcoxon's signed ranks on paired {}, Holm over {}, 5 %"
 
 
 def write_report(
@@ -74,9 +72,6 @@ def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     lines = [report["answer"]] if report.get("answer") else []
     lines += _gap_lines(report["header"])
     lines += _board_lines(board)
-    if any(row["letters"] for row in board):
-        pairs = counted(comb(sum(row["taking_part"] for row in board), 2), "pair")
-        lines.append(LETTERS.format("instances" if "times" in report else "runs", pairs))
     return lines if report["out"] is None else [*lines, f"written to {report['out']}: open it in any browser"]
 
 
@@ -86,13 +81,12 @@ def _board_lines(board: list[dict[str, Any]]) -> list[str]:
     searches = "reached" in board[0]
     score, digits, head = ("reached", 1, "targets %") if searches else ("error", 2, "error deg")
     other, title = ("above", "above") if searches else ("skill_mean_pose", "skill")
-    group = "  group" if searches or any(row["letters"] for row in board) else ""
-    lines = [f"{'':32} {head:>9} {'95 % interval':>15} {title:>7}{group}"]
+    lines = [f"{'':32} {head:>9} {'95 % interval':>15} {title:>7}"]
     for row in board:
         ends = "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
         value = "-" if row[score] is None else f"{row[score]:.{digits}f}"
         more = "-" if row[other] is None else f"{row[other]:.2f}"
-        lines.append(f"{row['name'][:32]:32} {value:>9} {ends:>15} {more:>7}  {row['letters']}".rstrip())
+        lines.append(f"{row['name'][:32]:32} {value:>9} {ends:>15} {more:>7}")
     return lines
 
 
