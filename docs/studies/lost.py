@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from clips import GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from clips import FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
 from people import CHANGES
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -29,6 +29,7 @@ from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.tracking.evaluation import LOST
+from posefit.uncertainty.modes import mirrored_gain
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.jobs import Progress, each
 from scores import auroc, calibration_error, false_alarms, kept_errors
@@ -148,8 +149,7 @@ class Case(NamedTuple):
     @property
     def spec(self) -> dict[str, Any]:
         """The fields of the cell, without the noise of masks."""
-        settings = {"exemplars.parts": False}
-        return cell_fields(self.clip, self.views, FRAMES, settings=settings, **CONDITIONS[self.condition])
+        return cell_fields(self.clip, self.views, FRAMES, **CONDITIONS[self.condition])
 
 
 def cases(quick: bool) -> list[Case]:
@@ -161,12 +161,14 @@ def cases(quick: bool) -> list[Case]:
         tracks.append(Case(group, clip, VIEWS[(k + 2) % len(VIEWS)], MASKS))
         if group in COMMON and not quick:
             tracks.append(Case(group, clip, SIDES[(k + 4) % len(SIDES)], MASKS))
+            tracks.append(Case(group, clip, FOUR, MASKS))
     return sorted(set(tracks), key=lambda track: (track.clip.subject, track))
 
 
 Row = Mapping[str, Any]
 Flags = NDArray[np.bool_]
 
+EXCHANGED = 10.0  # millimetres by which a mirrored pose is nearer to the truth; below, its sides hardly differ
 STRENGTH = 0.03  # variance of the normal prior of weights
 SWAPPED = 0.05  # share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow it
 BOUNDS = (0.01, 0.5)  # of the probability from which sides are unknown
@@ -200,7 +202,7 @@ def lost_frames(rows: Sequence[Row]) -> Flags:
 
 def swapped_frames(rows: Sequence[Row]) -> Flags:
     """Return in which frames of all rows left and right are exchanged."""
-    return np.concatenate([np.array(row["swapped"]) > 0 for row in rows])
+    return np.concatenate([np.array(row["mirrored_gain_mm"]) > EXCHANGED for row in rows])
 
 
 def fit(rows: Sequence[Row]) -> dict[str, Any]:
@@ -320,6 +322,8 @@ def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
         seed = [track.clip.instance, *track.clip.name.encode()]
         scene = replace(scene, observations=MaskNoise(scene.observations, seed))
     result = track_of(cell, scene)
+    assert result.truth is not None
+    gains = 1e3 * mirrored_gain(result.truth.joints, result.motion.joints)
     row = {
         "subject": track.clip.subject,
         "group": track.group,
@@ -328,7 +332,7 @@ def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
         "condition": track.condition,
         "fps": scene.fps,
         "mpjpe_mm": [round(frame["mpjpe_mm"], 2) for frame in result.frames],
-        "swapped": [int(frame["swapped"]) for frame in result.frames],
+        "mirrored_gain_mm": [round(gain, 1) for gain in gains.tolist()],
         "cost": [round(frame["cost"], DIGITS) for frame in result.frames],
     }
     evidence = [frame.details.get("evidence", {}) for frame in result.estimates]

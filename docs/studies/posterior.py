@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -72,7 +72,7 @@ class Case(NamedTuple):
     @property
     def spec(self) -> dict[str, Any]:
         """The fields of the cell."""
-        own = {"exemplars.posterior_temperature": self.temperature, "exemplars.parts": False}
+        own = {"exemplars.posterior_temperature": self.temperature}
         settings = own if self.method == METHOD else dict(OTHERS[self.method])
         fields = {"method": self.method, "translation": self.translation, "settings": settings}
         return cell_fields(self.clip, self.views, self.frames, **fields)
@@ -125,9 +125,9 @@ class Samples:
     @property
     def skeleton(self) -> Skeleton:
         """The skeleton of the person."""
-        return _skeleton(self.case.clip.subject)
+        return recorded.clips(only=(self.case.clip.subject,))[0].skeleton
 
-    @cached_property
+    @property
     def off(self) -> Array:
         """The error of each joint (T, 27), metres, both roots at one point."""
         return joint_distances(self.skeleton.joints(self.truth), self.skeleton.joints(self.reported))
@@ -137,13 +137,8 @@ class Samples:
         return Posterior(self.drawn[k], np.zeros((len(self.weights[k]), 3)), self.weights[k], coherent=True)
 
 
-@lru_cache(maxsize=16)
-def _skeleton(subject: str) -> Skeleton:
-    return recorded.clips(only=(subject,))[0].skeleton
-
-
-def sampled(case: Case) -> Samples:
-    """Return the track of a clip by a library without its person."""
+def sampled(case: Case) -> dict[str, Array]:
+    """Return the arrays of `Samples` of the track of a clip by a library without its person."""
     cell = cell_of(case.spec)
     track = track_of(cell, cell_scene(cell))
     assert track.truth is not None
@@ -155,7 +150,7 @@ def sampled(case: Case) -> Samples:
         assert frame is not None
         drawn[k, : len(frame)], weights[k, : len(frame)] = frame.poses, frame.weights
     costs = np.array([frame.cost for frame in track.estimates])
-    return Samples(case, track.truth.poses, track.motion.poses, drawn, weights, costs)
+    return dict(zip(ARRAYS, (track.truth.poses, track.motion.poses, drawn, weights, costs), strict=True))
 
 
 ARRAYS = ("truth", "reported", "drawn", "weights", "costs")
@@ -400,7 +395,8 @@ def posterior(
             tracks = load_tracks(again)
         else:
             base, more = planned_tracks(quick)
-            tracks = list(each({case: partial(sampled, case) for case in (*base, *more)}, workers, progress).values())
+            arrays = each({case: partial(sampled, case) for case in (*base, *more)}, workers, progress)
+            tracks = [Samples(case, **some) for case, some in arrays.items()]
             if file is not None:
                 save_tracks(tracks, file)
         every = [TrackFeatures.of(track) for track in tracks]

@@ -118,10 +118,10 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
     "ahead": float,  # metres a second by which the root goes where it faces
     "speed": float,  # metres a second by which it goes anywhere
     "across": float,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
-    "views": float,  # cameras that show something of the person, at most `MAX_VIEWS`
+    "views": math.log2,  # cameras that show something of the person, at most `MAX_VIEWS`
 }
-DEFAULTS = {"reflected": 1.0, "mirrored": 1.0}  # before the first value; of other evidence 0
-MAX_VIEWS = 2  # nothing was fitted with more cameras
+DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}  # before the first value; of other evidence 0
+MAX_VIEWS = 4  # nothing was fitted with more cameras
 TWIN_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
 MOTION_SECONDS = 0.5  # over which the root's motion is measured
 MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence

@@ -165,7 +165,12 @@ _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15.
+    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15."""
+    return mirrored_gain(targets, joints) > 0.0
+
+
+def mirrored_gain(targets: Array, joints: Array) -> Array:
+    """Return how much nearer (T,) joints (T, 27, 3) are to targets (T, 27, 3) when they are mirrored, metres.
 
     The mirror is the plane through the root between the hips; left and right are exchanged. Roots are at one point, and
     only joints that have a counterpart count.
@@ -176,7 +181,7 @@ def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
     mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
     named = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(axis=1)
     traded = np.linalg.norm(targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1).mean(axis=1)
-    return np.asarray(traded < named)
+    return np.asarray(named - traded)
 
 
 def second_side(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:

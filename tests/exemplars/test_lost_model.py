@@ -41,11 +41,11 @@ def frame_of(walker: Walk, usable: bool = True) -> Frame:
 
 
 def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() -> None:
-    memory, at = EvidenceMeans(30.0), [*EVIDENCE].index("views")
+    memory, at = EvidenceMeans(30.0), [*EVIDENCE].index("speed")
     rows = [k * len(EVIDENCE) + at for k in range(3)]
-    first = memory.features({"views": 1.0})
+    first = memory.features({"speed": 1.0})
     assert first[rows].tolist() == [1.0, 1.0, 1.0]
-    memory.features({"views": 0.0})
+    memory.features({"speed": 0.0})
     third = memory.features({})
     shares = [math.exp(-1.0 / (30.0 * seconds)) for seconds in REACHES.values()]
     means = [share**2 / (1.0 + share + share**2) for share in shares]  # older frames count less
@@ -63,14 +63,14 @@ def test_evidence_of_a_frame(walker: Walk) -> None:
     assert evidence["farthest"] == pytest.approx(float(np.linalg.norm(pose - mirrored, axis=1).mean()))
 
 
-def test_cameras_that_show_nothing_do_not_count_and_more_than_two_count_as_two(walker: Walk) -> None:
+def test_cameras_that_show_nothing_do_not_count_and_more_than_four_count_as_four(walker: Walk) -> None:
     evidence = []
-    for visible in (1, 2, 4):
-        areas = np.array([[1, 1, 1]] * visible + [[0, 0, 0]] * (4 - visible))
+    for visible in (1, 2, 4, 5):
+        areas = np.array([[1, 1, 1]] * visible + [[0, 0, 0]] * (5 - visible))
         frame = replace(frame_of(walker), areas=areas)
-        values = evidence_of(walker.motion.skeleton, frame, [walker.task.cameras[0]] * 4)
+        values = evidence_of(walker.motion.skeleton, frame, [walker.task.cameras[0]] * 5)
         evidence.append((values["views"], values["across"] > 0.0))
-    assert evidence == [(1.0, True), (2.0, False), (2.0, False)]
+    assert evidence == [(1.0, True), (2.0, False), (4.0, False), (4.0, False)]
 
 
 def test_a_person_in_a_side_view_faces_across_the_only_camera() -> None:

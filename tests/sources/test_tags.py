@@ -22,8 +22,8 @@ def test_each_tag_has_one_home_and_a_test_and_each_test_a_tag_with_a_home() -> N
 def test_the_tests_that_the_page_of_items_names_are_there() -> None:
     tests = Path(__file__).parents[1]
     page = tests.parent / "docs" / "background" / "coverage.md"
-    cells = [row.split(" | ")[3] for row in page.read_text("utf-8").splitlines() if row.startswith("| ")]
-    assert len(cells) > 90
+    cells = [row.split(" | ")[2] for row in page.read_text("utf-8").splitlines() if row.startswith("| ")]
+    assert len(cells) > 80
     for cell in cells:
         name = ""
         for file, test in re.findall(r"([\w/]+\.py)::|\b(test_\w+)\b(?!\.py)", cell):
