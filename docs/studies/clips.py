@@ -86,6 +86,20 @@ GROUPS: dict[str, tuple[Clip, ...]] = {
     ),
 }
 
+# Clips that no study learned from or was tuned on, for one report at the end.
+ASIDE: dict[str, tuple[Clip, ...]] = {
+    WALKS: (Clip("16_32", 120, 0, "walks straight"), Clip("16_21", 78, 0, "walks fast")),
+    RUNS: (Clip("09_05", 36, 0, "runs"), Clip("16_45", 34, 0, "jogs")),
+    "jumps": (Clip("16_06", 100, 0, "jumps forward"), Clip("127_26", 62, 0, "runs and leaps")),
+    "turns": (Clip("16_29", 71, 0, "walks fast and turns right"), Clip("16_30", 67, 0, "walks and turns right")),
+    "dances": (
+        Clip("05_10", 120, 0, "dances"),
+        Clip("49_21", 120, 0, "turns many times"),
+        Clip("49_07", 118, 0, "cartwheel"),
+    ),
+    "everyday": (Clip("02_08", 120, 0, "swings something"), Clip("14_33", 120, 0, "stands, goes a step")),
+}
+
 Views = tuple[float, ...]
 
 SIDES: tuple[Views, ...] = ((0.0,), (45.0,), (90.0,), (135.0,), (180.0,))

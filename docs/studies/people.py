@@ -17,7 +17,21 @@ from typing import Any, NamedTuple
 import click
 import numpy as np
 
-from clips import EVALUATIONS, FOUR, GROUPS, METHOD, PAIRS, RUNS, SIDES, WALKS, Clip, Views, cell_fields, track_of
+from clips import (
+    ASIDE,
+    EVALUATIONS,
+    FOUR,
+    GROUPS,
+    METHOD,
+    PAIRS,
+    RUNS,
+    SIDES,
+    WALKS,
+    Clip,
+    Views,
+    cell_fields,
+    track_of,
+)
 from posefit.arrays import Array
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.space import Translation
@@ -98,9 +112,17 @@ def design(method: str, quick: bool) -> Iterator[Task]:
         yield from (Task("methods", name, *place, {"method": name}) for place in compared)
 
 
-def people_lines(method: str, quick: bool, workers: int | None, ledger: str | None) -> Iterator[str]:
+def kept_aside() -> Iterator[Task]:
+    """Yield the tracks of clips that nothing was tuned on."""
+    for group, clips in ASIDE.items():
+        for clip, view in product(clips, (*SIDES[:3], PAIRS[1], FOUR)):
+            yield Task("kept aside", f"{group}, {len(view)} camera{'s' * (len(view) > 1)}", clip, view)
+
+
+def people_lines(
+    tracks: Sequence[Task], method: str, by_view: bool, workers: int | None, ledger: str | None
+) -> Iterator[str]:
     """Yield the tables: by group, the effect of each change and each step, and other methods."""
-    tracks = list(design(method, quick))
     specs = [track.spec(method) for track in tracks]
     different = {repr(spec): spec for spec in specs}  # a plan has no cell twice
     results = dict(zip(different, rows(Plan.of({"cells": [*different.values()]}), workers, ledger), strict=True))
@@ -111,7 +133,7 @@ def people_lines(method: str, quick: bool, workers: int | None, ledger: str | No
         named = [{**row, "line": line} for line, row in lines]
         yield from grouped(named, lambda row: [row["line"]], [table])
         yield ""
-    if not quick:
+    if by_view:
         yield from grouped(
             [
                 {**results[repr(spec)], "group": track.line.partition(",")[0]}
@@ -247,12 +269,16 @@ def recovery_lines(method: str, quick: bool, workers: int | None) -> Iterator[st
 @click.command(help=__doc__)
 @click.option("--method", default=METHOD, show_default=True, help="A tracker, or OPTIMISER@PRIOR.")
 @click.option("--recovery", is_flag=True, help="Gaps, and coming back, instead.")
+@click.option("--aside", is_flag=True, help="Clips that nothing was tuned on, instead.")
 @click.option("--quick", is_flag=True, help="A few tracks: a look, not a measurement.")
 @LEDGER
 @WORKERS
-def main(method: str, recovery: bool, quick: bool, ledger: str | None, workers: int | None) -> None:
-    lines = recovery_lines(method, quick, workers) if recovery else people_lines(method, quick, workers, ledger)
-    for line in lines:
+def main(method: str, recovery: bool, aside: bool, quick: bool, ledger: str | None, workers: int | None) -> None:
+    tracks = [*(kept_aside() if aside else design(method, quick))]
+    by_view = not quick and not aside
+    for line in (
+        recovery_lines(method, quick, workers) if recovery else people_lines(tracks, method, by_view, workers, ledger)
+    ):
         click.echo(line)
 
 

@@ -128,5 +128,6 @@ else $("curves").remove();
 look(0.7, 0.15);
 turnable($("turning"), paint);
 for (const masks of D.masks) for (const [, uri] of masks.pictures) pictureOf(uri);
+for (const [, ...uris] of D.film?.pictures ?? []) uris.forEach(pictureOf);
 play(shown > 1 && !matchMedia("(prefers-reduced-motion: reduce)").matches);
 new ResizeObserver(paint).observe($("picture"));
