@@ -250,6 +250,7 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         if importlib.util.find_spec("mediapipe"):
             angles = landmark_angles(made.videos[0], made.first, SIZE)
             row["landmarks"] = angle_errors(scene.actors[0].motion, angles, uncut(made.masks)[0])
+        row["trust"] = result.trust
         row["warnings"] = [one.replace(f"{folder}/", "") for one in said if one.startswith("warning")]
         return row
 
