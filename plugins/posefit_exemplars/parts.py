@@ -246,8 +246,9 @@ class Composer:
         part = self.parts[k]
         centres = part.centres[: 2 * count // 3]
         first = self._evaluated(window, k, t, part.angles[centres], self.seconds * part.rates[centres])
-        groups = _least(first.fits, -(-(count - len(centres)) // MEMBERS))
-        states = np.concatenate([rng.choice(part.members[group], MEMBERS) for group in groups])
+        left = count - len(centres)
+        groups = _least(first.fits, -(-left // MEMBERS))
+        states = np.concatenate([rng.choice(part.members[group], MEMBERS) for group in groups])[:left]
         more = self._evaluated(window, k, t, part.angles[states], self.seconds * part.rates[states])
         every = pool, first, more
         return _Candidates(

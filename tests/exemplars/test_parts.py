@@ -3,12 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from posefit.fitting.tracker import Observation
 from posefit.geometry.skeleton import BONES, LIMBS, turns_of
 from posefit.motion import built_in
 from posefit_exemplars.exemplars import Exemplars
-from posefit_exemplars.parts import HIGHEST, OUTER, PARTS, part_steps, parts_of
+from posefit_exemplars.parts import HIGHEST, OUTER, PARTS, Composer, Window, part_steps, parts_of
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.exemplars.conftest import Walk, walk_of
 
@@ -90,3 +91,18 @@ def test_a_composed_pose_is_reported_after_the_lag_within_the_budget(walker: Wal
             assert len(taken) - number <= tracker.lag
             assert 500 < frame.evaluations <= 1000
         assert tracker.lag == (lag + 6 if lag else 0)
+
+
+def test_sweeps_use_at_most_their_evaluations(walker: Walk, monkeypatch: pytest.MonkeyPatch) -> None:
+    compose, over = Composer.compose, []
+
+    def watched(composer: Composer, window: Window, evaluations: float, rng: np.random.Generator) -> float:
+        used = compose(composer, window, evaluations, rng)
+        over.append(used - evaluations * sum(look.usable for look in window.looks[window.fixed :]))
+        return used
+
+    monkeypatch.setattr(Composer, "compose", watched)
+    for evaluations in (300, 700, 1000, 1700, 2440):
+        tracker = ExemplarTracker(replace(walker.task, evaluations=evaluations), parts=True)
+        list(tracker.track(walker.observations, np.random.default_rng(0)))
+    assert max(over) <= 0.0
