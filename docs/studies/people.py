@@ -69,6 +69,7 @@ STEPS: dict[str, Mapping[str, Any]] = {
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")
 CHANGED_WALKS, COMPARED_WALKS, COMPARED_OTHERS = 7, 5, 2  # clips of which one thing is changed, that others follow
+MANY = 4 * EVALUATIONS  # by one camera: enough to compose poses of parts
 SEEDS = (1, 2)  # with which walks in one view are followed again: which half-cycle is chosen depends on a few draws
 
 
@@ -95,6 +96,8 @@ def design(method: str, quick: bool) -> Iterator[Task]:
             yield Task("groups", line, clip, view)
             if len(view) > 1:
                 yield Task("groups", f"{line}, no parts", clip, view, {"settings": {"exemplars.parts": False}})
+            if len(view) == 1 and view in SIDES[:3]:
+                yield Task("groups", f"{line}, {MANY:,} evaluations", clip, view, {"evaluations": MANY})
             if group == WALKS and len(view) == 1 and not quick:
                 yield from (Task("groups", line, clip, view, {"seed": seed}) for seed in SEEDS)
     changed = [*product(GROUPS[WALKS][: 1 if quick else CHANGED_WALKS], SIDES[1:2] if quick else SIDES[:3])]
@@ -116,7 +119,10 @@ def kept_aside() -> Iterator[Task]:
     """Yield the tracks of clips that nothing was tuned on."""
     for group, clips in ASIDE.items():
         for clip, view in product(clips, (*SIDES[:3], PAIRS[1], FOUR)):
-            yield Task("kept aside", f"{group}, {len(view)} camera{'s' * (len(view) > 1)}", clip, view)
+            line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
+            yield Task("kept aside", line, clip, view)
+            if len(view) == 1:
+                yield Task("kept aside", f"{line}, {MANY:,} evaluations", clip, view, {"evaluations": MANY})
 
 
 def people_lines(

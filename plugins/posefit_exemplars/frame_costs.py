@@ -59,13 +59,17 @@ class FrameCosts:
         costs, counts = pose_costs(*self._scene, pose[None], place[None])
         return float(costs[0]), counts[:, 0]
 
+    def reflected(self, poses: Array, place: Array) -> Array:
+        """Return poses (n, 66) at about `place` (3,) reflected along each camera's line of sight (cameras n, 66)."""
+        each = (reflected_poses(self.skeleton, poses, facing(camera, place)) for camera in self._task.cameras)
+        return np.concatenate([*each])
+
     def twins(self, pose: Array, place: Array) -> Array:
         """Return the costs of a pose's twins (1 + cameras,): mirrored, and reflected along each camera's line of sight.
 
         Where roots are aligned, a twin is as far off the reported place as both aligned places are apart.
         """
-        skeleton, poses = self.skeleton, pose[None]
-        reflected = [reflected_poses(skeleton, poses, facing(camera, place)) for camera in self._task.cameras]
-        poses = np.concatenate([poses, mirrored_poses(skeleton, poses), *reflected])
+        poses = pose[None]
+        poses = np.concatenate([poses, mirrored_poses(self.skeleton, poses), self.reflected(poses, place)])
         places = self.placed(poses, np.repeat(place[None], len(poses), axis=0))
         return self.full(poses[1:], place + places[1:] - places[0])

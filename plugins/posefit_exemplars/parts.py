@@ -4,6 +4,10 @@ No clip may show somebody who bends down while an arm waves; one shows such a tr
 of frames gets many candidates for one part after the other, while the other parts stay: states of the library, the
 frames beside it, and the part itself, changed by differences of similar states. Their costs are exact, and the
 likeliest sequence through the window is Viterbi's.
+
+One camera leaves open which way the trunk leans or faces. So there a second hypothesis is followed: unlike states of
+each frame, and reflections of some, are composed by themselves, and the likeliest sequence of these is swept as well.
+Both are fused part by part.
 """
 
 import time
@@ -11,7 +15,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import chain, pairwise
+from itertools import chain, pairwise, product
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -48,6 +52,8 @@ KEPT = 60  # candidates of a frame of which a path is made
 NEAR_GROUPS = 3  # whose states are similar to one
 SCALES = (0.25, 0.5, 1.0)  # of the differences by which a part is changed
 YAW = np.radians(3.0)  # standard deviation of the changes of its yaw
+REFLECTED = 3  # poses of a frame whose reflections are composed by themselves, too
+ALONE = 0.4  # share of the evaluations for poses by themselves; the rest is for sweeps over both hypotheses
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,15 +215,19 @@ class Composer:
                 if wide:
                     pool = self._from_everywhere(pool, window, k, t, count - len(angles), rng)
                 tried += len(pool.fits) if looks[t].usable else 0
-            reached, steps = part.coded(pool.angles), np.zeros(len(pool.fits))
+            reached, beside = part.coded(pool.angles), np.zeros(len(pool.fits))
             if t > 0:
-                steps += part_steps(self.spread, codes[[t - 1]], rates[[t - 1]], reached, pool.rates)[0]
+                beside += part_steps(self.spread, codes[[t - 1]], rates[[t - 1]], reached, pool.rates)[0]
             if t + 1 < len(looks):
-                steps += part_steps(self.spread, reached, pool.rates, codes[[t + 1]], rates[[t + 1]])[:, 0]
+                beside += part_steps(self.spread, reached, pool.rates, codes[[t + 1]], rates[[t + 1]])[:, 0]
             # half of them for the frames beside it as they are, the others for what these may become
-            kept = np.union1d(_least(pool.fits + steps, KEPT // 2), _least(pool.fits, KEPT // 2))
+            kept = np.union1d(_least(pool.fits + beside, KEPT // 2), _least(pool.fits, KEPT // 2))
             pools.append((pool.chosen(kept), reached[kept]))
-        path = [*zip(pools, self._likeliest(pools), strict=True)]
+        steps = (
+            part_steps(self.spread, one, before.rates, then, pool.rates)
+            for (before, one), (pool, then) in pairwise(pools)
+        )
+        path = [*zip(pools, _likeliest([pool.fits for pool, _ in pools], steps), strict=True)]
         window.poses[:, part.turns] = [pool.angles[row] for (pool, _), row in path]
         window.places[:] = [pool.places[row] for (pool, _), row in path]
         return np.array([pool.rates[row] for (pool, _), row in path]), tried
@@ -273,17 +283,112 @@ class Composer:
             costs = look.full(poses, places)
         return _Candidates(angles, rates, places, costs / self.temperature)
 
-    def _likeliest(self, pools: Sequence[tuple[_Candidates, Codes]]) -> list[int]:
-        """Return the candidate of each frame on the path of least cost."""
-        totals, origins = pools[0][0].fits, []
-        for (before, codes), (pool, later) in pairwise(pools):
-            ways = totals[:, None] + part_steps(self.spread, codes, before.rates, later, pool.rates)
-            origins.append(ways.argmin(axis=0))
-            totals = ways.min(axis=0) + pool.fits
-        path = [int(totals.argmin())]
-        for origin in reversed(origins):
-            path.append(int(origin[path[-1]]))
-        return path[::-1]
+    def alone(
+        self, look: FrameCosts, poses: Array, places: Array, evaluations: float, rng: np.random.Generator
+    ) -> tuple["Whole", float]:
+        """Return poses (n, 66) of a frame, each composed by itself, and the evaluations used, at most so many."""
+        share, used = evaluations / len(poses) - 1.0, float(len(poses))
+        windows = [
+            Window([look], pose[None].copy(), place[None].copy(), 0, np.zeros(ANGLES))
+            for pose, place in zip(poses, places, strict=True)
+        ]
+        used += sum(self.compose(window, share, rng) for window in windows)
+        poses, places = (np.concatenate([getattr(window, name) for window in windows]) for name in ("poses", "places"))
+        return self._whole(poses, places, look.full(poses, places), None), used
+
+    def _whole(self, poses: Array, places: Array, costs: Array, rates: Sequence[Codes] | None) -> "Whole":
+        """Return poses with their codes; without rates they are at rest."""
+        codes = [_round(part, part.coded(poses[:, part.turns])) for part in self.parts]
+        return Whole(poses, places, costs / self.temperature, codes, rates or [np.zeros_like(code) for code in codes])
+
+    def _path(self, frames: Sequence["Whole"]) -> list[int]:
+        """Return the pose of each frame on the path of least cost."""
+        steps = (
+            np.sum(
+                [
+                    part_steps(self.spread, *each)
+                    for each in zip(one.codes, one.rates, then.codes, then.rates, strict=True)
+                ],
+                axis=0,
+            )
+            for one, then in pairwise(frames)
+        )
+        return _likeliest([frame.fits for frame in frames], steps)
+
+    def compose_both(
+        self, window: Window, others: Sequence["Whole | None"], evaluations: float, rng: np.random.Generator
+    ) -> float:
+        """Compose the window's poses, and the likeliest sequence of the others, and fuse both; as `compose`."""
+        other = self.through(window, others)
+        share = 0.5 * (evaluations - 2.0 ** len(self.parts))
+        return sum(self.compose(one, share, rng) for one in (window, other)) + self.fused(window, other)
+
+    def through(self, window: Window, frames: Sequence["Whole | None"]) -> Window:
+        """Return a window with the likeliest sequence of the frames' poses; None is for a frame that stays."""
+        stays = [
+            self._whole(window.poses[t : t + 1], window.places[t : t + 1], np.zeros(1), None)
+            for t in range(len(frames))
+        ]
+        given = [frame or stay for frame, stay in zip(frames, stays, strict=True)]
+        rows = self._path(given)
+        poses, places = (
+            np.array([getattr(frame, name)[row] for frame, row in zip(given, rows, strict=True)])
+            for name in ("poses", "places")
+        )
+        return replace(window, poses=poses, places=places)
+
+    def fused(self, window: Window, other: Window) -> float:
+        """Give a window the likeliest sequence of poses whose parts are its own or those of another window's.
+
+        Return the evaluations used.
+        """
+        both, rates = (window, other), []
+        for one in both:
+            rates.append([_rates(_round(part, part.coded(one.poses[:, part.turns]))) for part in self.parts])
+        choices, frames = [*product((0, 1), repeat=len(self.parts))], []
+        for t, look in enumerate(window.looks):
+            poses = np.repeat(window.poses[t : t + 1], len(choices), axis=0)
+            for row, choice in enumerate(choices):
+                for part, which in zip(self.parts, choice, strict=True):
+                    poses[row, part.turns] = both[which].poses[t, part.turns]
+            places = np.array([both[choice[0]].places[t] for choice in choices])
+            costs = look.full(poses, places) if look.usable and t >= window.fixed else np.zeros(len(poses))
+            speeds = [np.array([rates[choice[k]][k][t] for choice in choices]) for k in range(len(self.parts))]
+            frames.append(self._whole(poses, places, costs, speeds))
+        for t, row in enumerate(self._path(frames)):
+            window.poses[t], window.places[t] = frames[t].poses[row], frames[t].places[row]
+        return float(len(choices) * sum(look.usable for look in window.looks[window.fixed :]))
+
+
+class Whole(NamedTuple):
+    """Whole poses of one frame."""
+
+    poses: Array  # (n, 66)
+    places: Array  # (n, 3)
+    fits: Array  # (n,) costs of silhouettes over the temperature
+    codes: Sequence[Codes]  # (n, D) of each part; a yaw is on a circle
+    rates: Sequence[Codes]
+
+
+def _round(part: Part, codes: Codes) -> Codes:
+    """Return codes whose yaw, if they have one, is a point on a circle, so that a full turn is no distance."""
+    if not part.yaw:
+        return codes
+    yaws = codes[:, -1:] / part.yaw
+    return np.hstack([codes[:, :-1], part.yaw * np.cos(yaws), part.yaw * np.sin(yaws)])
+
+
+def _likeliest(fits: Sequence[Array], steps: Iterable[Array]) -> list[int]:
+    """Return the row of each frame on the path of least cost: `fits` (n,) of each, and steps (n, m) between them."""
+    totals, origins = fits[0], []
+    for step, fit in zip(steps, fits[1:], strict=True):
+        ways = totals[:, None] + step
+        origins.append(ways.argmin(axis=0))
+        totals = ways.min(axis=0) + fit
+    path = [int(totals.argmin())]
+    for origin in reversed(origins):
+        path.append(int(origin[path[-1]]))
+    return path[::-1]
 
 
 def _rates(codes: Codes) -> Codes:
@@ -302,34 +407,47 @@ def composed(
 
     Several frames are composed together, with a few before them that stay and a few later ones, which come again.
     """
-    waiting: list[Estimate] = []
+    waiting: list[tuple[Estimate, Whole | None]] = []
     latest: deque[Estimate] = deque(maxlen=BEHIND)
     offset = np.zeros(ANGLES)
     for frame in chain(frames, [None]):
-        waiting += [] if frame is None else [frame]
+        if frame is not None:
+            waiting.append(_with_others(frame, composer, ALONE * evaluations, rng))
         if not waiting or (frame is not None and len(waiting) <= delay):
             continue
         count = len(waiting) if frame is None else max(len(waiting) - AHEAD, 1)
         start, cpu_start = time.perf_counter(), time.process_time()
-        some = [*latest, *waiting]
+        some = [*latest, *(one for one, _ in waiting)]
         poses, places = np.array([one.pose for one in some]), np.array([one.place for one in some])
         window = Window([one.look for one in some], poses.copy(), places, len(latest), offset)
-        usable = [one.look.usable for one in waiting]
+        usable = [one.look.usable for one, _ in waiting]
         shared = evaluations * sum(usable[:count]) / max(sum(usable), 1)
-        used = composer.compose(window, shared, rng) / max(sum(usable[:count]), 1)
+        others = [None] * len(latest) + [whole for _, whole in waiting]
+        if any(others):
+            used = composer.compose_both(window, others, (1.0 - ALONE) * shared, rng)
+        else:
+            used = composer.compose(window, shared, rng)
+        used /= max(sum(usable[:count]), 1)
         offset = wrapped(window.poses - poses)[len(latest) + count - 1]
         spent = (time.perf_counter() - start) / count, (time.process_time() - cpu_start) / count
         moved = [*zip(waiting, window.poses[window.fixed :], window.places[window.fixed :], strict=True)]
-        waiting = [replace(one, pose=pose, place=place) for one, pose, place in moved[count:]]
-        for one, pose, place in moved[:count]:
-            latest.append(
-                replace(
-                    one,
-                    pose=pose,
-                    place=one.look.placed(pose[None], place[None])[0] if one.look.usable else place,
-                    evaluations=one.evaluations + used * one.look.usable,
-                    seconds=one.seconds + spent[0],
-                    cpu_seconds=one.cpu_seconds + spent[1],
-                )
-            )
+        waiting = [(replace(one, pose=pose, place=place), whole) for (one, whole), pose, place in moved[count:]]
+        for (one, _), pose, place in moved[:count]:
+            place = one.look.placed(pose[None], place[None])[0] if one.look.usable else place
+            latest.append(replace(one.longer(used * one.look.usable, *spent), pose=pose, place=place))
             yield latest[-1]
+
+
+def _with_others(
+    frame: Estimate, composer: Composer, evaluations: float, rng: np.random.Generator
+) -> tuple[Estimate, Whole | None]:
+    """Return a frame and its other hypotheses, each composed by itself, or None; the frame has their evaluations."""
+    if frame.others is None or not frame.look.usable:
+        return frame, None
+    start, cpu_start = time.perf_counter(), time.process_time()
+    poses = np.concatenate([frame.pose[None], frame.others[0]])
+    places = np.concatenate([frame.place[None], frame.others[1]])
+    poses = np.concatenate([poses, frame.look.reflected(poses[:REFLECTED], frame.place)])
+    places = np.concatenate([places, places[:REFLECTED]])
+    whole, used = composer.alone(frame.look, poses, places, evaluations, rng)
+    return frame.longer(used, time.perf_counter() - start, time.process_time() - cpu_start), whole

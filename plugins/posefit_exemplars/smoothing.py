@@ -3,8 +3,8 @@
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -29,6 +29,12 @@ class Estimate:
     seconds: float
     cpu_seconds: float
     paths: SampledPaths | None = None
+    others: tuple[Array, Array] | None = field(default=None, repr=False)  # poses (n, 66) and places: other hypotheses
+
+    def longer(self, evaluations: float, seconds: float, cpu_seconds: float) -> Self:
+        """Return the estimate, which took so much more."""
+        more = self.evaluations + evaluations, self.seconds + seconds, self.cpu_seconds + cpu_seconds
+        return replace(self, evaluations=more[0], seconds=more[1], cpu_seconds=more[2])
 
 
 def smoothed(frames: Iterable[Estimate], spread: float, ahead: int) -> Iterator[Frame]:

@@ -44,6 +44,9 @@ WIDTH = 400  # states of a beam
 FULL = 0.35  # share of the budget that is for full-size costs of states
 REFINED = 0.2  # share that is for refining
 COMPOSED = 0.25  # share that is for composing poses of parts; without parts it is for refining, too
+COMPOSED_ALONE = 0.75  # by one camera, where two hypotheses are composed; the other shares are of what is left
+ALONE_EVALUATIONS = 9000  # of a frame, from which that is worth its evaluations by one camera
+UNLIKE = 8  # states of a frame that the second hypothesis begins with
 TOGETHER = 7  # frames that are composed at once
 AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere
 GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated; in the first frame more
@@ -82,7 +85,8 @@ class ExemplarTracker:
         mirrored: whether the mirror images of all clips are learned from as well.
         refiner: the optimiser that searches around the path, or "none".
         pull: cost of a standard deviation away from the path, beside the silhouette, 0 or more.
-        parts: whether trunk, legs and arms may each come from another pose; none: where several cameras see them.
+        parts: whether trunk, legs and arms may each come from another pose, by one camera in two hypotheses that are
+            fused; none: where several cameras see them, or a frame has 9,000 evaluations.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
         samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
@@ -131,14 +135,19 @@ class ExemplarTracker:
         self.power = temperature / posterior_temperature  # of the likelihoods in the posterior
         # the number of waiting frames that are only for smoothing
         self.ahead = min(math.ceil(SMOOTHED * self.smoothing), lag)
+        alone = len(task.cameras) == 1
         if parts is None:
-            parts = len(task.cameras) > 1
+            parts = not alone or task.evaluations >= ALONE_EVALUATIONS
+        self.hypotheses = parts and alone
+        share = COMPOSED_ALONE if self.hypotheses else COMPOSED
+        self.composed = share * task.evaluations  # of a frame
+        self.evaluations = (1.0 - share) / (1.0 - COMPOSED) * task.evaluations  # of which the other shares are
         self.delay = TOGETHER - 1 if parts and lag else 0  # frames that wait to be composed
         self.lag = lag + self.delay
         self.composer: Composer | None = None
         if parts:
             self.composer = Composer.of(self.exemplars, task.body, self.steps, self.temperature, 1.0 / task.fps)
-        self.refined = int((REFINED if parts else REFINED + COMPOSED) * task.evaluations)  # evaluations of a frame
+        self.refined = int((REFINED if parts else REFINED + COMPOSED) * self.evaluations)  # evaluations of a frame
         self.make: Make | None = None  # the optimiser that refines
         if refiner != "none":
             factory = registry().optimiser(refiner)
@@ -148,8 +157,7 @@ class ExemplarTracker:
         """Yield a `Frame` for each observation, `lag` observations later."""
         estimates = self._refined(observations, rng)
         if self.composer is not None:
-            own, budget = rng.spawn(1)[0], COMPOSED * self.task.evaluations
-            estimates = composed(estimates, self.composer, budget, self.delay, own)
+            estimates = composed(estimates, self.composer, self.composed, self.delay, rng.spawn(1)[0])
         frames = smoothed(estimates, self.smoothing, self.ahead)
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
@@ -181,9 +189,9 @@ class ExemplarTracker:
             if root is not None:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
-        full = int(FULL * self.task.evaluations)
+        full = int(FULL * self.evaluations)
         last = 3 + look.cameras  # the reported pose, its twins, and what is left of a small picture's share
-        small = int(((1.0 - REFINED - COMPOSED) * self.task.evaluations - full - last) / look.share)
+        small = int(((1.0 - REFINED - COMPOSED) * self.evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
@@ -271,6 +279,10 @@ class ExemplarTracker:
         row, likely, oldest = viterbi_state(window), state_weights(window), waiting.popleft()
         paths = sampler.draw(window, row)
         beam, look, evaluations = oldest.states.beam, oldest.look, oldest.evaluations
+        others = None
+        if self.hypotheses:
+            unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, UNLIKE))
+            others = self._poses(unlike), unlike.places
         codes = self.exemplars.codes[beam.states]
         path, place, code = mean_near(row, likely, codes, self._poses(beam), beam.places)
         pose = path + off if look.usable else path
@@ -287,7 +299,7 @@ class ExemplarTracker:
             place = look.placed(pose[None], place[None])[0]
         seconds = oldest.seconds + time.perf_counter() - start
         cpu_seconds = oldest.cpu_seconds + time.process_time() - cpu_start
-        return Estimate(pose, place, look, evaluations, seconds, cpu_seconds, paths), off
+        return Estimate(pose, place, look, evaluations, seconds, cpu_seconds, paths, others), off
 
 
 def yaw_costs(yaws: Array, known: float | None) -> Array:
