@@ -9,6 +9,8 @@ from typing import Any
 
 from posefit.errors import printable
 
+WARNING = "warning: "
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -30,17 +32,22 @@ class Progress:
 
     def warn(self, warning: str) -> None:
         """Log a warning."""
-        self.log(f"warning: {warning}")
+        self.log(f"{WARNING}{warning}")
 
 
 QUIET = Progress()
 
 
+def _show_warning(message: str) -> None:
+    if message.startswith(WARNING) and sys.stderr is not None:
+        print(printable(message), file=sys.stderr)
+
+
 def interactive() -> Progress:
-    """Return messages and bars on stderr where that is a terminal, bars in a notebook; elsewhere nothing."""
+    """Return messages and bars on stderr where that is a terminal, bars in a notebook; elsewhere warnings alone."""
     terminal = sys.stderr is not None and sys.stderr.isatty()
     if not terminal and "ipykernel" not in sys.modules:
-        return QUIET
+        return Progress(_show_warning)
     from tqdm.auto import tqdm
 
     def log(message: str) -> None:

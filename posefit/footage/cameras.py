@@ -67,6 +67,8 @@ def combined(
             calibration = camera if view.filmed else _fitting(camera, size, scaled=True)
             camera = calibration.camera(size, world)
             maps = calibration.maps(size) if calibration.distorted else None
+        if (camera.width, camera.height) != size:
+            raise _of_another_size("", size, (camera.width, camera.height))
         cameras.append(camera)
         masks.append(view.masks if maps is None else undistorted(view.masks, maps))
         if k == 0 and pictures is not None and maps is not None:
@@ -193,6 +195,8 @@ def _fitting(calibration: Calibration, size: tuple[int, int], *, scaled: bool = 
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration
-    raise InputError(
-        f"camera {quoted(calibration.name)} must be calibrated for {size[0]}x{size[1]}, got {width}x{height}"
-    )
+    raise _of_another_size(f" {quoted(calibration.name)}", size, (width, height))
+
+
+def _of_another_size(name: str, size: tuple[int, int], came: tuple[int, int]) -> InputError:
+    return InputError(f"camera{name} must be calibrated for {size[0]}x{size[1]}, got {came[0]}x{came[1]}")

@@ -132,6 +132,9 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps)
 
 
+NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
+
+
 def _checked_stack(name: str, arrays: Mapping[str, Stored | NDArray[Any]]) -> Stored | NDArray[Any]:
     """Return the masks of arrays. Raises InputError where one of them has another shape or type."""
     if "masks" not in arrays:
@@ -140,6 +143,10 @@ def _checked_stack(name: str, arrays: Mapping[str, Stored | NDArray[Any]]) -> St
     shape = tuple(stack.shape)
     if len(shape) != 3 or 0 in shape or stack.dtype.kind not in "buif":
         raise InputError(f"{name}: masks must have shape (frames, height, width), got {_described(stack)}")
+    if shape[2] * NARROW < shape[1]:
+        raise InputError(
+            f"{name}: masks must have shape (frames, height, width), got {shape[2]} as the width of {shape}"
+        )
     if shape[1] * shape[2] > PIXELS:
         raise InputError(
             f"{name}: expected at most {PIXELS // 10**6} million pixels a frame, got {shape[2]}x{shape[1]}"

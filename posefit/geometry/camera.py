@@ -83,8 +83,11 @@ class Camera:
     ) -> "Camera":
         """Return a level camera at the world's origin that looks along -z, of focal lengths and centre in pixels.
 
-        By default `fy` is `fx`, and the centre is that of the image.
+        By default `fy` is `fx`, and the centre is that of the image. Raises InputError where a focal length is less
+        than a tenth of the width: it is in millimetres.
         """
+        if 0.0 < fx < 0.1 * width:
+            raise InputError(f"fx must be in pixels, for {width} of them at least {0.1 * width:g}, got {fx:g}")
         focal = np.array([fx, fx if fy is None else fy])
         centre = np.array([width / 2.0 if cx is None else cx, height / 2.0 if cy is None else cy])
         return cls(width, height, focal, centre, np.diag([1.0, -1.0, -1.0]), np.zeros(3))

@@ -9,6 +9,7 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -70,10 +71,16 @@ class Track:
         """What the person does in each frame, such as `walk`; None where the method does not say."""
         return [frame.activity for frame in self.estimates]
 
+    @property
+    def unknown_sides(self) -> NDArray[np.bool_]:
+        """In which frames (T,) left and right are unknown; between two of these they may be exchanged as well."""
+        return np.isin(np.arange(len(self)), self.summary["unknown_sides"] or [])
+
     def angles(self, name: str) -> Array:
         """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.
 
-        Raises InputError listing the names where there is none of that name.
+        Where sides are unknown, see `unknown_sides`, the left one may be the right one. Raises InputError listing the
+        names where there is none of that name.
         """
         angles = self._angles()
         if name not in angles:
@@ -104,7 +111,9 @@ class Track:
         return table
 
     def frame(self, k: int) -> "Fit":
-        """Return frame k alone."""
+        """Return frame k alone. Raises InputError where there is none."""
+        if not -len(self) <= k < len(self):
+            raise InputError(f"frame must lie in 0 to {len(self) - 1}, got {k}")
         frame, row = self.estimates[k], self.frames[k]
         summary = {name: value for name, value in self.summary.items() if name != "history"}
         return Fit(frame.pose, frame.translation, row["cost"], row["iou"], frame.history, summary, self, k)

@@ -85,3 +85,8 @@ def test_a_wrong_camera_file_is_refused_in_one_line(tmp_path: Path, key: str, te
         Camera.from_json(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_a_focal_length_in_millimetres_is_refused() -> None:
+    with pytest.raises(ValueError, match="fx must be in pixels, for 640 of them at least 64, got 4.2"):
+        Camera.pinhole(640, 480, fx=4.2)

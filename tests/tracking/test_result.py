@@ -51,11 +51,22 @@ def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp
         (np.zeros((2, 6, 8), bool), "a mask with a person"),
         ([np.zeros((6, 8)), np.zeros((8, 6))], "masks must have one shape"),
         (["missing.png"], "missing.png: expected a file"),
+        (np.moveaxis(MASKS, 0, 2), "must have shape .frames, height, width., got 3 as the width"),
     ],
 )
 def test_arrays_that_are_no_masks_are_named(masks: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         posefit.track(masks, **QUICK)
+
+
+def test_a_camera_of_another_size_is_named() -> None:
+    with pytest.raises(InputError, match="camera must be calibrated for 80x60, got 160x120"):
+        posefit.track(MASKS, camera=posefit.Camera.pinhole(160, 120, fx=150), **QUICK)
+
+
+def test_warnings_are_shown_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    posefit.track(~MASKS, camera=CAMERA, **QUICK)
+    assert "warning: " in capsys.readouterr().err
 
 
 def test_joints_angles_and_the_table_are_those_of_the_motion(track: posefit.Track) -> None:
@@ -70,6 +81,9 @@ def test_joints_angles_and_the_table_are_those_of_the_motion(track: posefit.Trac
 
 def test_a_frame_is_a_fit_with_a_picture(track: posefit.Track) -> None:
     frame = track.frame(1)
+    with pytest.raises(InputError, match="frame must lie in 0 to 2, got 3"):
+        track.frame(3)
+    assert not track.unknown_sides.any()  # the method does not say
     assert (frame.cost, frame.iou) == (track.frames[1]["cost"], track.frames[1]["iou"])
     np.testing.assert_array_equal(frame.joints, track.joints[1])
     picture = np.asarray(frame.overlay())
