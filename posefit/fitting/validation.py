@@ -50,11 +50,11 @@ class CheckedOptimiser:
         evaluations: int | None = None,
     ) -> None:
         self._optimiser, self._space, self._name, self._limit = optimiser, space, name, limit
-        self._evaluations, self._first = evaluations, True
+        self._evaluations, self._first, self._drawn = evaluations, True, PoseCount()
 
     def ask(self) -> Array:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
-        with plugin_errors(self._name, "ask", self._limit):
+        with self._called("ask"):
             proposals = self._optimiser.ask()
         plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
         if not plain or proposals.shape[1:] != (self._space.dimensions,):
@@ -77,14 +77,22 @@ class CheckedOptimiser:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs on."""
         self._first = False
-        with plugin_errors(self._name, "tell", self._limit):
+        with self._called("tell"):
             self._optimiser.tell(proposals, costs)
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
         self._space, self._first = space, True
-        with plugin_errors(self._name, "advance", self._limit):
+        with self._called("advance"):
             self._optimiser.advance(space)  # type: ignore[attr-defined]
+
+    @contextmanager
+    def _called(self, what: str) -> Iterator[None]:
+        """Raise BrokenRuleError where the body fails, or draws poses: all evaluations are the search's."""
+        with self._drawn.counting(), plugin_errors(self._name, what, self._limit):
+            yield
+        if self._drawn.poses:
+            raise self._broken(f"{what} must leave evaluations to the search, got {self._drawn.poses:g} of its own")
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")

@@ -37,12 +37,13 @@ class PluginCase:
 def construction(case: PluginCase) -> None:
     """A factory takes what its kind is given, and keyword-only settings."""
     kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
+    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
     by_position = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
+    taken = ", ".join(case.arguments)
     expect(
         len(by_position) == len(case.arguments),
-        f"a factory must take ({', '.join(case.arguments)}) and keyword-only settings, got {len(by_position)} others",
+        f"a factory must take ({taken}) and keyword-only settings, got {len(by_position)} that are not keyword-only",
     )
-    expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
     case.build()
 
 

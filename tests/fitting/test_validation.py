@@ -10,6 +10,7 @@ import pytest
 from posefit import minimise
 from posefit.fitting.optimiser import BudgetError
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
+from posefit.silhouette.drawn import count_poses
 from posefit.testing.toy import Toy, sphere
 
 
@@ -28,6 +29,11 @@ class Answers:
 def forever() -> None:
     while True:
         time.sleep(0.01)
+
+
+def peeks() -> Any:
+    count_poses(40.0)
+    return np.zeros((4, 9))
 
 
 def fails() -> None:
@@ -56,6 +62,7 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
         (np.full((4, 9), np.nan), "ask must return finite proposals, got nan"),
         (np.full((4, 9), 0.25), "tell must not fail, got KeyError: 'lost'"),
         (fails, "ask must not fail, got ZeroDivisionError: division by zero"),
+        (peeks, "ask must leave evaluations to the search, got 40 of its own"),
         (forever, "ask must return within 0.2 s, and did not"),
         (exits, "ask must not end the program, got SystemExit: 0"),
     ]
