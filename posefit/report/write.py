@@ -80,13 +80,17 @@ def _board_lines(board: list[dict[str, Any]]) -> list[str]:
         return []
     searches = "reached" in board[0]
     score, digits, head = ("reached", 1, "targets %") if searches else ("error", 2, "error deg")
-    other, title = ("above", "above") if searches else ("skill_mean_pose", "skill")
-    lines = [f"{'':32} {head:>9} {'95 % interval':>15} {title:>7}"]
+    others = {"above": ("above", 2, 1.0)}
+    if not searches:
+        others = {"lost %": ("lost", 1, 100.0), "skill": ("skill_mean_pose", 2, 1.0)}
+    lines = [f"{'':32} {head:>9} {'95 % interval':>15}{''.join(f'{title:>8}' for title in others)}"]
     for row in board:
         ends = "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
         value = "-" if row[score] is None else f"{row[score]:.{digits}f}"
-        more = "-" if row[other] is None else f"{row[other]:.2f}"
-        lines.append(f"{row['name'][:32]:32} {value:>9} {ends:>15} {more:>7}")
+        figures = [
+            "-" if row[name] is None else f"{factor * row[name]:.{places}f}" for name, places, factor in others.values()
+        ]
+        lines.append(f"{row['name'][:32]:32} {value:>9} {ends:>15}{''.join(f'{figure:>8}' for figure in figures)}")
     return lines
 
 

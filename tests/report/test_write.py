@@ -97,7 +97,7 @@ def test_failures_and_instances_left_out_are_named_above_the_leaderboard(tmp_pat
         "2 finished runs are left out of the comparison, as some method has no run to pair them with",
         "left out of the comparison, for every method: 1 instance",
         "  walk, view 45°, instance 1: no run of sapso@pca",
-        f"{'':32} error deg   95 % interval   skill",
+        f"{'':32} error deg   95 % interval  lost %   skill",
     ]
     header = data_in(page)["header"]
     assert header["failed_by"] == {"sapso@pca": 2}
