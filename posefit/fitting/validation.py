@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from traceback import extract_tb
 from typing import Any, Self
 
 import numpy as np
@@ -28,6 +29,9 @@ from posefit.silhouette.drawn import PoseCount, uncounted
 
 UNCOUNTED_POSES = 10  # ours: a frame may draw so many beyond its evaluations, as to draw its result once more
 COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in another order
+
+
+POSEFIT = Path(__file__).parents[1]  # whose lines are not a plugin's
 
 
 class BrokenRuleError(InputError):
@@ -125,7 +129,14 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
     """Return the error that names the plugin which raised another."""
     if isinstance(error, SystemExit):
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
-    return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}")
+    return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}{_place_of(error)}")
+
+
+def _place_of(error: BaseException) -> str:
+    """Return the file and line of the plugin where an error was raised, or passed on from a library; "" of none."""
+    frames = [frame for frame in extract_tb(error.__traceback__) if POSEFIT not in Path(frame.filename).parents]
+    own = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
+    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
 
 
 class CheckedPrior:

@@ -60,8 +60,8 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
         (np.full((4, 9), 1.5), r"ask must return proposals in \[-1, 1\], got 1.5"),
         (np.full((4, 9), -np.inf), r"ask must return proposals in \[-1, 1\], got -inf"),
         (np.full((4, 9), np.nan), "ask must return finite proposals, got nan"),
-        (np.full((4, 9), 0.25), "tell must not fail, got KeyError: 'lost'"),
-        (fails, "ask must not fail, got ZeroDivisionError: division by zero"),
+        (np.full((4, 9), 0.25), r"tell must not fail, got KeyError: 'lost' \(test_validation.py:[0-9]+\)"),
+        (fails, r"ask must not fail, got ZeroDivisionError: division by zero \(test_validation.py:[0-9]+\)"),
         (peeks, "ask must leave evaluations to the search, got 40 of its own"),
         (forever, "ask must return within 0.2 s, and did not"),
         (exits, "ask must not end the program, got SystemExit: 0"),
@@ -70,7 +70,7 @@ def test_a_broken_rule_is_named_with_the_plugin() -> None:
         checked = CheckedOptimiser(Answers(answer), Toy(9), "optimiser 'bad' of posefit-bad 1.0", 0.2)
         with pytest.raises(BrokenRuleError, match=rf"^optimiser 'bad' of posefit-bad 1.0: {rule}$"):
             minimise(sphere, checked, 40)
-    with pytest.raises(BrokenRuleError, match="^it: ask must not fail, got TimeoutError: the network$"):
+    with pytest.raises(BrokenRuleError, match="^it: ask must not fail, got TimeoutError: the network .*$"):
         CheckedOptimiser(Answers(late), Toy(9), "it").ask()  # the plugin's own, as there is no limit
     with pytest.raises(BrokenRuleError, match="advance must not fail, got AttributeError"):
         CheckedOptimiser(Answers(np.zeros((4, 9))), Toy(9), "it").advance(Toy(9))
