@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry import symmetry
+from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, Skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
@@ -81,6 +82,7 @@ def groups(codes: Codes, most: int) -> tuple[Rows, Rows]:
 
 KINDS = 40  # of poses, as unlike as can be
 GROUPS = 1000  # of similar poses; fewer where there are fewer poses
+NEAR_CENTRES = 4  # groups among whose poses the nearest ones are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +176,27 @@ class Exemplars:
     def group_members(self, group: int) -> Rows:
         """Return the poses of a group."""
         return self.members[self.bounds[group] : self.bounds[group + 1]]
+
+    def similar(self, poses: Array, count: int, spread: float) -> tuple[Array, Array]:
+        """Return the mean (n, 66) of up to `count` poses of clips nearest to each of `poses`, whose yaw it has.
+
+        And the squared distance (n,) of the nearest one. Weights fall with squared distances, over the `spread`. Only
+        the groups whose centres are nearest are looked at.
+        """
+        codes, means, squares = self.coding.coded(poses), poses.copy(), np.empty(len(poses))
+        near = min(NEAR_CENTRES, len(self.centres))
+        away = self.squares[self.centres] - 2.0 * (codes @ self.codes[self.centres].T)
+        groups = np.argpartition(away, near - 1, axis=1)[:, :near]
+        for k, code in enumerate(codes):
+            rows = np.concatenate([self.group_members(group) for group in groups[k]])
+            apart = ((self.codes[rows] - code) ** 2).sum(axis=1)
+            best = np.argpartition(apart, min(count, len(rows)) - 1)[:count]
+            squares[k] = apart[best].min()
+            shares = np.exp(-0.5 * (apart[best] - squares[k]) / spread**2)
+            off = wrapped(self.poses[rows[best]] - poses[k])
+            off[:, 0] = 0.0
+            means[k] += shares @ off / shares.sum()
+        return means, squares
 
     def turned(self, states: Rows, yaws: Array) -> Array:
         """Return copies of the poses (n, 66) of some states, turned to yaws (n,)."""

@@ -7,8 +7,8 @@ from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, only_camera, pose_costs
-from posefit.silhouette.limbs import Limb
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
+from posefit_exemplars.contours import FrameContours
 
 SMALL = 40  # pixels: no side of a small picture is shorter
 FACTORS = (4, 2, 1)
@@ -18,7 +18,7 @@ class FrameCosts:
     """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
 
     def __init__(self, task: Task, observation: Observation) -> None:
-        self._task, silhouettes = task, observation.silhouettes
+        self._task, self._observation, silhouettes = task, observation, observation.silhouettes
         sides = [side for camera in task.cameras for side in (camera.width, camera.height)]
         factor = next((factor for factor in FACTORS if min(sides) >= factor * SMALL), 1)
         self._scene = task.body, task.cameras, silhouettes
@@ -38,9 +38,13 @@ class FrameCosts:
 
     def placed(self, poses: Array, places: Array) -> Array:
         """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
-        if self.root is not None:
-            return np.repeat(self.root[None], len(poses), axis=0)
-        return places if self._task.translation == "known" else align(*self._scene, poses, places)
+        if self.root is not None or self._task.translation == "known":
+            return self.at_root(places)
+        return align(*self._scene, poses, places)
+
+    def at_root(self, places: Array) -> Array:
+        """Return where the root is known to be, once for each of `places` (n, 3); else these."""
+        return places if self.root is None else np.repeat(self.root[None], len(places), axis=0)
 
     def small(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses in the small picture."""
@@ -50,9 +54,9 @@ class FrameCosts:
         """Return the costs (n,) of poses."""
         return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
 
-    def limb(self, limb: Limb, pose: Array, place: Array, angles: Array) -> Array:
-        """Return the costs (n,) of a pose with each of the `angles` (n, k) of a limb."""
-        return limb.costs(*self._scene[1:], pose, place, angles)
+    def contours(self, place: Array) -> FrameContours:
+        """Return the contours of the masks, of a person whose root is about at `place` (3,)."""
+        return FrameContours.of(self._task.cameras, self._observation, place)
 
     def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""

@@ -11,14 +11,12 @@ from typing import cast
 
 import numpy as np
 
-from posefit import settings
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES
-from posefit.registry import registry
+from posefit_exemplars import hypotheses
 from posefit_exemplars.beam import (
     TURN,
     Beam,
@@ -34,20 +32,21 @@ from posefit_exemplars.beam import (
 from posefit_exemplars.exemplars import Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
-from posefit_exemplars.parts import Composer, composed
-from posefit_exemplars.refinement import Make, refined, surroundings
 from posefit_exemplars.smoothing import SMOOTHED, Estimate, smoothed
-from posefit_exemplars.window import FrameStates, Sampler, frame_states, mean_near, state_weights, viterbi_state
+from posefit_exemplars.window import (
+    FrameStates,
+    SampledPaths,
+    Sampler,
+    frame_states,
+    mean_near,
+    state_weights,
+    viterbi_state,
+)
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 WIDTH = 400  # states of a beam
-FULL = 0.35  # share of the budget that is for full-size costs of states
-REFINED = 0.2  # share that is for refining
-COMPOSED = 0.25  # share that is for composing poses of parts; without parts it is for refining, too
-COMPOSED_ALONE = 0.75  # by one camera, where two hypotheses are composed; the other shares are of what is left
-ALONE_EVALUATIONS = 9000  # of a frame, from which that is worth its evaluations by one camera
-UNLIKE = 8  # states of a frame that the second hypothesis begins with
-TOGETHER = 7  # frames that are composed at once
+FULL = 0.6  # share of the beam's evaluations that is for full-size costs of states
+FITTED = 0.8  # share of the budget that is for fitting hypotheses
 AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere
 GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated; in the first frame more
 FIRST_GROUPS = 200
@@ -61,7 +60,7 @@ PACE = 30.0
 class _PendingFrame:
     """A frame whose pose is not reported yet."""
 
-    states: FrameStates
+    states: FrameStates[Beam]
     look: FrameCosts
     evaluations: float
     seconds: float
@@ -81,12 +80,9 @@ class ExemplarTracker:
         straying: distance of an aligned root from where its clip goes on, to the side or up, metres; above 0.
         depth: the same towards or away from a single camera, metres; above 0.
         pace: distance of a known root from where its clip goes on, metres; above 0.
-        lag: later frames that are used before a pose is reported, 0 or more; parts use 6 more.
+        lag: later frames that are used before a pose is reported, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
-        refiner: the optimiser that searches around the path, or "none".
-        pull: cost of a standard deviation away from the path, beside the silhouette, 0 or more.
-        parts: whether trunk, legs and arms may each come from another pose, by one camera in two hypotheses that are
-            fused; none: where several cameras see them, or a frame has 9,000 evaluations.
+        fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
         samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
@@ -104,11 +100,9 @@ class ExemplarTracker:
         straying: float = 0.01,
         depth: float = 0.03,
         pace: float = 0.008,
-        lag: int = 15,
+        lag: int = 20,
         mirrored: bool = True,
-        refiner: str = "cma",
-        pull: float = 0.3,
-        parts: bool | None = None,
+        fitted: bool = True,
         smoothing: float = 1.0,
         transitions: str = "clips",
         samples: int = 24,
@@ -118,7 +112,7 @@ class ExemplarTracker:
         temperatures = {"temperature": temperature, "posterior_temperature": posterior_temperature}
         for name, value in {**distances, "turning_degrees": turning_degrees, **temperatures}.items():
             positive(name, value)
-        for name, value in {"jump": jump, "pull": pull, "smoothing": smoothing, "lag": lag, "samples": samples}.items():
+        for name, value in {"jump": jump, "smoothing": smoothing, "lag": lag, "samples": samples}.items():
             at_least(name, value, 0)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
@@ -130,58 +124,52 @@ class ExemplarTracker:
         self.transitions: Transitions = partial(transition_costs, steps=self.steps)
         if transitions != "clips":
             self.transitions = partial(_checked, _named(transitions))
-        self.temperature, self.pull, self.samples = temperature / intervals, pull, samples
+        self.temperature = temperature / intervals
         self.smoothing = smoothing * task.fps / 30.0  # frames
-        self.power = temperature / posterior_temperature  # of the likelihoods in the posterior
         # the number of waiting frames that are only for smoothing
         self.ahead = min(math.ceil(SMOOTHED * self.smoothing), lag)
-        alone = len(task.cameras) == 1
-        if parts is None:
-            parts = not alone or task.evaluations >= ALONE_EVALUATIONS
-        self.hypotheses = parts and alone
-        share = COMPOSED_ALONE if self.hypotheses else COMPOSED
-        self.composed = share * task.evaluations  # of a frame
-        self.evaluations = (1.0 - share) / (1.0 - COMPOSED) * task.evaluations  # of which the other shares are
-        self.delay = TOGETHER - 1 if parts and lag else 0  # frames that wait to be composed
-        self.lag = lag + self.delay
-        self.composer: Composer | None = None
-        if parts:
-            self.composer = Composer.of(self.exemplars, task.body, self.steps, self.temperature, 1.0 / task.fps)
-        self.refined = int((REFINED if parts else REFINED + COMPOSED) * self.evaluations)  # evaluations of a frame
-        self.make: Make | None = None  # the optimiser that refines
-        if refiner != "none":
-            factory = registry().optimiser(refiner)
-            self.make = partial(factory, **settings.planned(factory, {}, self.refined))
+        self.lag, self.evaluations = lag, float(task.evaluations)  # for the beam, of a frame
+        self.hypotheses: hypotheses.HypothesisFilter | None = None
+        self.samples, self.power = samples, temperature / posterior_temperature  # of likelihoods in the posterior
+        share = FITTED * task.evaluations
+        if fitted and share >= hypotheses.MIN_EVALUATIONS:
+            self.evaluations -= share
+            delay = (lag - self.ahead) // 2
+            self.hypotheses = hypotheses.HypothesisFilter(
+                task, self.exemplars, self.steps, self.temperature, share, delay, samples, self.power
+            )
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        estimates = self._refined(observations, rng)
-        if self.composer is not None:
-            estimates = composed(estimates, self.composer, self.composed, self.delay, rng.spawn(1)[0])
+        estimates = self._path(observations, rng)
+        if self.hypotheses is not None:
+            estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
         frames = smoothed(estimates, self.smoothing, self.ahead)
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
-    def _refined(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
-        """Yield the estimate of each frame, before it is smoothed."""
+    def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
+        """Yield the estimate of each frame on the likeliest path of the beam."""
         waiting: deque[_PendingFrame] = deque()
-        latest: FrameStates | None = None
-        off, sampler = np.zeros(ANGLES), Sampler(self.exemplars, self.samples, self.power, rng)
+        latest: FrameStates[Beam] | None = None
+        delay, sampler = self.lag - self.ahead, None
+        if self.hypotheses is None:
+            sampler = Sampler(self.samples, self.power, rng.spawn(1)[0])
+        else:
+            delay -= self.hypotheses.delay
         for observation in observations:
             start, cpu_start = time.perf_counter(), time.process_time()
             look = FrameCosts(self.task, observation)
             latest, used = self._evaluated(look, latest, rng)
             seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
             waiting.append(_PendingFrame(latest, look, used, seconds, cpu_seconds))
-            if len(waiting) > self.lag - self.ahead - self.delay:
-                estimate, off = self._estimated(waiting, off, sampler, rng)
-                yield estimate
+            if len(waiting) > delay:
+                yield self._estimated(waiting, sampler)
         while waiting:
-            estimate, off = self._estimated(waiting, off, sampler, rng)
-            yield estimate
+            yield self._estimated(waiting, sampler)
 
     def _evaluated(
-        self, look: FrameCosts, before: FrameStates | None, rng: np.random.Generator
-    ) -> tuple[FrameStates, float]:
+        self, look: FrameCosts, before: FrameStates[Beam] | None, rng: np.random.Generator
+    ) -> tuple[FrameStates[Beam], float]:
         """Return the states of a frame, and the evaluations that they took."""
         latest, seconds, root = None if before is None else before.beam, 1.0 / self.task.fps, look.root
         if latest is not None and not look.usable:
@@ -191,7 +179,7 @@ class ExemplarTracker:
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         full = int(FULL * self.evaluations)
         last = 3 + look.cameras  # the reported pose, its twins, and what is left of a small picture's share
-        small = int(((1.0 - REFINED - COMPOSED) * self.evaluations - full - last) / look.share)
+        small = int((self.evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
@@ -211,7 +199,7 @@ class ExemplarTracker:
         best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used
 
-    def _joined(self, beam: Beam, fits: Array, before: FrameStates | None, look: FrameCosts) -> FrameStates:
+    def _joined(self, beam: Beam, fits: Array, before: FrameStates[Beam] | None, look: FrameCosts) -> FrameStates[Beam]:
         """Return a frame, joined to the one before."""
         if before is None:
             return frame_states(beam, fits, None, None)
@@ -267,39 +255,24 @@ class ExemplarTracker:
         off = root_deviation_costs(places, beam.places, look.eye, self.steps)
         return replace(beam, places=places, totals=beam.totals + off)
 
-    def _estimated(
-        self, waiting: deque[_PendingFrame], off: Array, sampler: Sampler, rng: np.random.Generator
-    ) -> tuple[Estimate, Array]:
-        """Return the estimate of the oldest waiting frame, refined around the path, and its offset from the path.
-
-        The path's pose is the weighted mean of similar states. The search begins at the offset of the frame before.
-        """
+    def _estimated(self, waiting: deque[_PendingFrame], sampler: Sampler | None) -> Estimate:
+        """Return the estimate of the oldest waiting frame: the weighted mean of the states like that of the path."""
         start, cpu_start = time.perf_counter(), time.process_time()
         window = [frame.states for frame in waiting]
         row, likely, oldest = viterbi_state(window), state_weights(window), waiting.popleft()
-        paths = sampler.draw(window, row)
-        beam, look, evaluations = oldest.states.beam, oldest.look, oldest.evaluations
-        others = None
-        if self.hypotheses:
-            unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, UNLIKE))
+        beam, look, others, paths = oldest.states.beam, oldest.look, None, None
+        if self.hypotheses is not None:
+            unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, self.hypotheses.unlike))
             others = self._poses(unlike), unlike.places
         codes = self.exemplars.codes[beam.states]
-        path, place, code = mean_near(row, likely, codes, self._poses(beam), beam.places)
-        pose = path + off if look.usable else path
-        if self.make is not None and look.usable:
-            space = surroundings(self.exemplars, path, code, off)
-
-            def cost(poses: Array) -> Array:
-                return look.full(poses, look.placed(poses, np.repeat(place[None], len(poses), axis=0)))
-
-            pose, used = refined(space, cost, self.make, self.pull, self.refined, rng)
-            evaluations += used
-            off = wrapped(pose - path)
+        pose, place = mean_near(row, likely, codes, self._poses(beam), beam.places)
         if look.usable:
             place = look.placed(pose[None], place[None])[0]
+        if sampler is not None and (rows := sampler.draw(window)) is not None:
+            paths = SampledPaths.of(self.task.body.skeleton, self._poses(beam)[rows], beam.places[rows], pose)
         seconds = oldest.seconds + time.perf_counter() - start
         cpu_seconds = oldest.cpu_seconds + time.process_time() - cpu_start
-        return Estimate(pose, place, look, evaluations, seconds, cpu_seconds, paths, others), off
+        return Estimate(pose, place, look, oldest.evaluations, seconds, cpu_seconds, paths, others)
 
 
 def yaw_costs(yaws: Array, known: float | None) -> Array:

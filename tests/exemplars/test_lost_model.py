@@ -114,9 +114,9 @@ def test_evidence_of_a_track(walker: Walk) -> None:
         assert all(frame.lost is not None and 0.0 < frame.lost < 1.0 for frame in frames)
         return [set(frame.details["evidence"]) for frame in frames]
 
-    first, *others = names(walker.hidden(4, 6).track(0, 6, refiner="none"))
+    first, *others = names(walker.hidden(4, 6).track(0, 6, evaluations=2440))
     motion, fit = {"ahead", "speed"}, {"cost", "reflected", "mirrored"}
     assert first == EVIDENCE.keys() - motion
     assert others == [EVIDENCE.keys()] * 3 + [EVIDENCE.keys() - fit] * 2
-    unsampled = walker.track(0, 2, samples=0, refiner="none", lag=0, smoothing=0.0)
+    unsampled = walker.track(0, 2, samples=0, evaluations=2440, lag=0, smoothing=0.0)
     assert [frame.lost for frame in unsampled] == [None, None]

@@ -1,0 +1,89 @@
+"""Poses fitted to the contours of one frame's masks, against a slow twin and by law."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import ANGLES
+from posefit.motion import built_in
+from posefit.tracking.smoothing import contours, kernels
+from posefit_exemplars.contours import EVERY, FrameContours, precisions
+from posefit_exemplars.frame_costs import FrameCosts
+from tests.cases import each
+from tests.exemplars.conftest import EMPTY, Walk, walk_of
+
+REACHES = (0.09, 0.065, 0.045, 0.045, 0.033, 0.033)
+LOOSE = precisions(np.radians(8.0), 0.003)
+
+
+def off(walk: Walk, k: int, radians: float, seed: int = 0) -> tuple[Array, Array]:
+    """Return some poses about the true one of a frame, and the true place for each."""
+    poses = np.repeat(walk.motion.poses[k : k + 1], 5, axis=0)
+    poses += np.random.default_rng(seed).normal(0.0, radians, poses.shape) * walk.motion.skeleton.free
+    return poses, np.repeat(walk.motion.translations[k : k + 1], 5, axis=0)
+
+
+def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, reach: float) -> Array:
+    """Return the step of Gauss and Newton (69,) by the smoothing's loops and difference quotients."""
+    curve, slope = np.diag(LOOSE), LOOSE * np.append(pose - mean, np.zeros(3))
+    for number, camera in enumerate(walk.task.cameras):
+        view = contours.MaskContours.of(camera, number, [walk.observations[k]], place[None])
+        body = contours.projected_body(walk.task.body, view.camera, pose[None], place[None])[0]
+        joints = 1 + len(contours.BONE_STARTS)
+        drawn = contours.BONE_STARTS, body[: 2 * joints].reshape(-1, 2), body[2 * joints :].reshape(-1, 2)
+        curves, slopes = np.zeros((contours.BODY_NUMBERS, contours.BODY_NUMBERS)), np.zeros(contours.BODY_NUMBERS)
+        scale = max(reach * view.metres[0], contours.MIN_ROBUST_SCALE)
+        step = EVERY * view.step
+        kernels._pull_points.py_func(view.points[::EVERY], *drawn, step, scale, curves, slopes)
+        field = view.fields[0], view.corners[0], view.sizes[0]
+        kernels._pull_bones.py_func(*field, *drawn, 2.0 * step, scale, curves, slopes)
+        deviation = contours.BORDER_DEVIATION**2 + (contours.PIXEL_DEVIATION / view.metres[0]) ** 2
+        worth = 1.0 / (view.metres[0] ** 3 * contours.CORRELATION_LENGTH * deviation)
+        ways = contours.pose_jacobian(walk.task.body, view.camera, pose[None], place[None], range(ANGLES))[0]
+        ways = np.hstack([ways[:, 3:], ways[:, :3]])  # the place comes last
+        curve += worth * ways.T @ curves @ ways
+        slope += worth * ways.T @ slopes
+    free = np.append(walk.motion.skeleton.free, [True] * 3)
+    steps = np.zeros(ANGLES + 3)
+    steps[free] = np.linalg.solve(curve[np.ix_(free, free)], slope[free])
+    return steps
+
+
+@pytest.mark.pure
+@each("views", [(45.0,), (20.0, 110.0)])
+def test_a_step_is_that_of_a_slow_twin(views: tuple[float, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    from posefit_exemplars import contour_kernels
+
+    monkeypatch.setattr(kernels, "CAP", contour_kernels.CAP)
+    walk = walk_of(built_in.motion("walk-a", frames=2), views)
+    poses, places = off(walk, 1, 0.05)
+    frame = FrameContours.of(walk.task.cameras, walk.observations[1], places[0])
+    moved, shifted = frame.fitted(walk.task, poses[:1], places[:1], poses[1:2], LOOSE, (0.09,))
+    expected = step_of_twin(walk, 1, poses[0], places[0], poses[1], 0.09)
+    np.testing.assert_allclose(poses[0] - moved[0], expected[:ANGLES], atol=2e-4)
+    np.testing.assert_allclose(places[0] - shifted[0], expected[ANGLES:], atol=2e-5)
+
+
+@each("views", [(45.0,), (0.0, 45.0, 90.0, 135.0)])
+def test_fitted_poses_cost_less_and_the_true_one_stays(views: tuple[float, ...]) -> None:
+    walk = walk_of(built_in.motion("walk-a", frames=3), views)
+    look = FrameCosts(walk.task, walk.observations[2])
+    poses, places = off(walk, 2, 0.1)
+    poses[0] = walk.motion.poses[2]
+    frame = look.contours(places[0])
+    moved, _ = frame.fitted(walk.task, poses, places, poses, LOOSE, REACHES)
+    before, after = look.full(poses, places), look.full(moved, places)
+    assert after[1:].sum() < 0.6 * before[1:].sum()
+    joints = walk.motion.skeleton.joints
+    assert np.linalg.norm(joints(moved[0]) - joints(poses[0]), axis=1).mean() < 0.01
+    np.testing.assert_array_equal(moved[:, ~walk.motion.skeleton.free], poses[:, ~walk.motion.skeleton.free])
+
+
+def test_without_a_contour_a_pose_goes_to_its_mean(walker: Walk) -> None:
+    poses, places = off(walker, 0, 0.03)
+    frame = FrameContours.of(walker.task.cameras, replace(walker.observations[0], silhouettes=EMPTY), places[0])
+    moved, shifted = frame.fitted(walker.task, poses, places, poses[::-1], LOOSE, (0.09,))
+    np.testing.assert_allclose(moved, poses[::-1], atol=1e-9)
+    np.testing.assert_allclose(shifted, places, atol=1e-12)

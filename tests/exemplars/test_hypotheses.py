@@ -1,0 +1,103 @@
+"""Hypotheses of each frame: what steps cost, which go on, and people as no clip shows them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.geometry.skeleton import JOINTS, LIMBS, turns_of
+from posefit.geometry.symmetry import turned_poses
+from posefit.motion import built_in
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.hypotheses import HIGHEST, PARTS, Hypotheses, step_costs
+from posefit_exemplars.smoothing import Estimate
+from posefit_exemplars.tracker import ExemplarTracker
+from tests.exemplars.conftest import Walk, walk_of
+
+BUDGET = 9760
+
+
+def one(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
+    """Return a hypothesis one joint of which is so far from the origin, and moves so far a frame, in codes' metres."""
+    joints, rates = np.zeros((2, 1, len(JOINTS), 3))
+    joints[0, JOINTS.index(joint), 1], rates[0, JOINTS.index(joint), 1] = np.sqrt(len(JOINTS)) * np.array([code, rate])
+    still, nothing = np.zeros((1, 66)), np.zeros((1, 3))
+    return Hypotheses(still, nothing, joints, still, nothing, rates, np.array([-1]), np.zeros(1))
+
+
+def test_every_joint_is_in_one_part() -> None:
+    assert sorted(np.concatenate(PARTS)) == list(range(len(JOINTS)))
+
+
+def test_what_steps_cost_by_hand() -> None:
+    def cost(code: float, rate: float, later: float, later_rate: float) -> float:
+        return float(step_costs(0.03, one(code, rate), one(later, later_rate))[0, 0])
+
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)  # it goes on as it does
+    np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-5)
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.0, 0.06), 0.3, atol=1e-5)  # it stops for a frame, at speed 0
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.03, 0.06), 0.1, atol=1e-5)  # half as fast
+    # off by a spread at speed 1, a half; at the speed 1.4 it is off by 0.09 - 0.084, which is 0.02, and 0.15
+    np.testing.assert_allclose(cost(0.0, 0.06, 0.09, 0.06), 0.17, atol=1e-5)
+    # at rest, then at a spread's rate: 0.015 off and the rates a spread apart, an eighth and a half; at speed 0.5,
+    # 0.0075 off and half the rates, 1/32 and 1/8, and 0.1
+    np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5)
+    assert cost(0.0, 0.0, 1.0, 0.0) == HIGHEST
+    # two parts that are far off cost twice as much as one
+    assert float(step_costs(0.03, one(0.0, 0.0), one(1.0, 0.0))[0, 0]) == HIGHEST
+    both = one(1.0, 0.0)
+    both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
+    assert float(step_costs(0.03, one(0.0, 0.0), both)[0, 0]) == 2.0 * HIGHEST
+
+
+def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
+    # nobody in the training clips walks with such arms
+    walk, other = built_in.motion("walk-a", frames=12), built_in.motion("jump", frames=40)
+    arms = np.concatenate([turns_of(LIMBS["left arm"]), turns_of(LIMBS["right arm"])])
+    poses = walk.poses.copy()
+    poses[:, arms] = other.poses[14:26, arms]
+    scene = walk_of(replace(walk, name="both", poses=poses), (0.0, 70.0))
+    errors = {
+        fitted: np.mean(
+            [scene.errors_mm(scene.track(evaluations=2440, fitted=fitted, seed=s)).mean() for s in range(3)]
+        )
+        for fitted in (False, True)
+    }
+    assert errors[True] < 0.6 * errors[False]
+
+
+def hypotheses_of(walk: Walk) -> ExemplarTracker:
+    return ExemplarTracker(replace(walk.task, evaluations=BUDGET))
+
+
+def estimates(walk: Walk, poses: Array, others: Array) -> Iterator[Estimate]:
+    """Yield frames with these poses on the path, and beside each one other hypothesis."""
+    for observation, pose, other, place in zip(
+        walk.observations, poses, others, walk.motion.translations, strict=False
+    ):
+        look = FrameCosts(walk.task, observation)
+        yield Estimate(pose, place, look, 0.0, 0.0, 0.0, others=(other[None], place[None]))
+
+
+def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turned_round(walker: Walk) -> None:
+    count = 10
+    truth = walker.motion.poses[:count]
+    noise = np.random.default_rng(0).normal(0.0, 0.05, truth.shape) * walker.motion.skeleton.free
+    follower = hypotheses_of(walker).hypotheses
+    assert follower is not None
+    frames = list(follower.follow(estimates(walker, turned_poses(truth), truth + noise), np.random.default_rng(0)))
+    skeleton = walker.motion.skeleton
+    apart = np.linalg.norm(skeleton.joints(np.array([frame.pose for frame in frames])) - skeleton.joints(truth), axis=2)
+    assert np.median(apart.mean(axis=1)) < 0.04
+    assert all(frame.paths is not None and len(frame.paths.poses) == 24 for frame in frames)
+
+
+def test_hypotheses_are_as_many_as_the_budget_allows(walker: Walk) -> None:
+    few, many = (ExemplarTracker(replace(walker.task, evaluations=evaluations)) for evaluations in (2440, BUDGET))
+    assert few.hypotheses is not None
+    assert many.hypotheses is not None
+    assert (few.hypotheses.fresh, few.hypotheses.unlike) < (many.hypotheses.fresh, many.hypotheses.unlike)
+    assert few.hypotheses.going < many.hypotheses.going
+    assert ExemplarTracker(replace(walker.task, evaluations=600)).hypotheses is None  # too few: the path alone
+    assert ExemplarTracker(walker.task, fitted=False).hypotheses is None
