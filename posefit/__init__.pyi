@@ -44,7 +44,6 @@ from posefit.silhouette.cost import mismatch as mismatch
 from posefit.silhouette.cost import pose_costs as pose_costs
 from posefit.silhouette.cost import project as project
 from posefit.silhouette.cuda.device import moved_to as moved_to
-from posefit.silhouette.limbs import Limb as Limb
 from posefit.silhouette.mask import Silhouette as Silhouette
 from posefit.statistics.intervals import iqm_intervals as iqm_intervals
 from posefit.statistics.ranks import friedman as friedman

@@ -24,7 +24,6 @@ from clips import (
     GROUPS,
     METHOD,
     PAIRS,
-    RUNS,
     SIDES,
     WALKS,
     Clip,
@@ -62,15 +61,15 @@ CHANGES: dict[str, Mapping[str, Any]] = {
 }
 # the same without one of the tracker's steps
 STEPS: dict[str, Mapping[str, Any]] = {
-    "the path alone": {"settings": {"exemplars.refiner": "none", "exemplars.parts": False, "exemplars.smoothing": 0.0}},
-    "no parts": {"settings": {"exemplars.parts": False}},
-    "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
+    "the path alone": {"settings": {"exemplars.fitted": False}},
     "no mirror images": {"settings": {"exemplars.mirrored": False}},
+    "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")
-CHANGED_WALKS, COMPARED_WALKS, COMPARED_OTHERS = 7, 5, 2  # clips of which one thing is changed, that others follow
-MANY = 4 * EVALUATIONS  # by one camera: enough to compose poses of parts
-SEEDS = (1, 2)  # with which walks in one view are followed again: which half-cycle is chosen depends on a few draws
+CHANGED_WALKS, COMPARED_WALKS, COMPARED_OTHERS = 4, 5, 2  # clips of which one thing is changed, that others follow
+SEEDED = 3  # clips of a group that are followed with more seeds
+FEW = 2440  # evaluations of a frame, the default of other methods
+SEEDS = (1, 2)  # with which tracks of one camera are followed again: which hypothesis is chosen depends on a few draws
 
 
 class Task(NamedTuple):
@@ -90,21 +89,19 @@ class Task(NamedTuple):
 def design(method: str, quick: bool) -> Iterator[Task]:
     """Yield all tracks, or a few of them."""
     for group, clips in GROUPS.items():
-        views = {WALKS: (*SIDES, *PAIRS, FOUR), RUNS: SIDES}.get(group, (*SIDES[:3], PAIRS[1], FOUR))
+        views = (*SIDES, *PAIRS) if group == WALKS else (*SIDES[:3], PAIRS[1])
         for clip, view in product(clips[: 2 if quick else None], views[1:2] if quick else views):
             line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
             yield Task("groups", line, clip, view)
-            if len(view) > 1:
-                yield Task("groups", f"{line}, no parts", clip, view, {"settings": {"exemplars.parts": False}})
-            if len(view) == 1 and view in SIDES[:3]:
-                yield Task("groups", f"{line}, {MANY:,} evaluations", clip, view, {"evaluations": MANY})
-            if group == WALKS and len(view) == 1 and not quick:
-                yield from (Task("groups", line, clip, view, {"seed": seed}) for seed in SEEDS)
+            if len(view) == 1 and view in SIDES[:3] and not quick:
+                yield Task("groups", f"{line}, {FEW:,} evaluations", clip, view, {"evaluations": FEW})
+                if clip in clips[:SEEDED]:
+                    yield from (Task("groups", line, clip, view, {"seed": seed}) for seed in SEEDS)
     changed = [*product(GROUPS[WALKS][: 1 if quick else CHANGED_WALKS], SIDES[1:2] if quick else SIDES[:3])]
-    runs = [] if quick else [*product(GROUPS[RUNS], SIDES[:3])]
+    others = [] if quick else [*product(GROUPS["everyday"][:4], SIDES[:3])]
     for table, changes, places in (
         ("changes", CHANGES, changed),
-        ("steps", STEPS if method == METHOD else {}, [*changed, *runs]),
+        ("steps", STEPS if method == METHOD else {}, [*changed, *others]),
     ):
         for name, change in {"base": {}, **changes}.items():
             yield from (Task(table, name, *place, change) for place in places)
@@ -121,8 +118,6 @@ def kept_aside() -> Iterator[Task]:
         for clip, view in product(clips, (*SIDES[:3], PAIRS[1], FOUR)):
             line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
             yield Task("kept aside", line, clip, view)
-            if len(view) == 1:
-                yield Task("kept aside", f"{line}, {MANY:,} evaluations", clip, view, {"evaluations": MANY})
 
 
 def people_lines(

@@ -92,27 +92,3 @@ def add_mismatch(areas, scale, beta, costs):
         spilled = b / (b + y) if b + y > 0.0 else 1.0
         missed = r / (r + y) if r + y > 0.0 else 1.0
         costs[i] += scale * ((1.0 - beta) * spilled + beta * missed)  # SAPSO (4)
-
-
-@jit
-def rest_of(chain, radii, view, pose, place, joint, observed, valid):
-    """Return where a joint of a pose is (3,) and its frame (3, 3), and what the bones with radii leave of bit images.
-
-    These are `observed` and `valid`; last come the pixels B and Y that are taken.
-    """
-    work = scratch(view, chain.parents.size, pose.size)
-    image, _ = draw_pose(chain, radii, view, pose, place, work)
-    frames = work[0][2]
-    body, overlap = 0, 0
-    left = np.empty_like(observed), np.empty_like(valid)
-    for s in range(image.shape[0]):
-        for i in range(image.shape[1]):
-            left[0][s, i], left[1][s, i] = observed[s, i] & ~image[s, i], valid[s, i] & ~image[s, i]
-            body += popcount(valid[s, i] & image[s, i])
-            overlap += popcount(observed[s, i] & image[s, i])
-    origin, frame = np.empty(3), np.empty((3, 3))
-    for i in range(3):
-        origin[i] = frames[joint, 3, i]
-        for k in range(3):
-            frame[i, k] = frames[joint, k, i]
-    return origin, frame, left, (body - overlap, overlap)

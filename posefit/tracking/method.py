@@ -37,6 +37,7 @@ from posefit.tracking.restarts import GAP, RelocalisingTracker
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
 DEFAULT_TRACKER = "exemplars"  # where it is installed
+DEFAULT_TRACKER_EVALUATIONS = 9760  # of a frame
 FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
 
 
@@ -71,7 +72,7 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
 def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     """Return options whose method and training motions are known, by default those of the source.
 
-    That is `exemplars`, which learns from the library of recorded motions. A built-in motion, and all else for which an
+    That is `exemplars`, which learns from the library of recorded motions and has a budget of its own. A built-in motion, and all else for which an
     optimiser, a prior or settings of theirs are given, is tracked by `annealed@pca`, or the optimiser that settings
     name; footage with the prior `loose`. These and other trackers learn from the other styles of a built-in motion, or
     else from the built-in walks.
@@ -88,7 +89,10 @@ def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     if not train and method == DEFAULT_TRACKER:
         train = [recorded.LIBRARY]
     train = train or built_in.other_styles(str(source) if known else "walk")
-    return options.changed(method=method, train=train)
+    evaluations = options.evaluations
+    if method == DEFAULT_TRACKER and evaluations is options.iterations is options.population_size is None:
+        evaluations = DEFAULT_TRACKER_EVALUATIONS
+    return options.changed(method=method, train=train, evaluations=evaluations)
 
 
 @dataclass(frozen=True, eq=False)

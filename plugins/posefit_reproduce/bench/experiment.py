@@ -13,7 +13,6 @@ from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.geometry.camera import Camera
 from posefit.silhouette.cost import areas, project
-from posefit.silhouette.limbs import Limb
 from posefit.silhouette.mask import Silhouette
 from posefit.sweep.command import cores
 from posefit_reproduce.bench.environments import vector_env
@@ -23,7 +22,6 @@ from posefit_reproduce.bench.processor import processor
 from posefit_swarm.sapso import SAPSO
 
 FEW, MANY = 40, 4000  # poses in a call
-LIMB = 100  # candidates of a limb in a call
 LARGE = (1280, 960)  # beside the usual size
 NAMES = {1: "full", 2: "half", 4: "quarter"}
 
@@ -40,21 +38,18 @@ def seen_at(problem: PoseProblem, size: tuple[int, int]) -> PoseProblem:
 
 
 def many_figures() -> dict[str, float]:
-    """Return microseconds a pose on one thread: in calls of 40 and 4,000, of an arm alone, at every size."""
+    """Return microseconds a pose on one thread: in calls of 40 and 4,000, at every size."""
     problem = bench_problem()
     body, camera, rng = problem.body, problem.cameras[0], np.random.default_rng(0)
     proposals = draw_population(problem.space, rng, MANY)
     poses, places = problem.decode(proposals)
     few = proposals[:FEW].copy(), poses[:FEW].copy(), places[:FEW].copy()
     observed = problem.silhouettes[0]
-    arm, some = Limb.of(body, "left arm"), slice(0, LIMB)
     jobs: dict[str, tuple[Callable[[], object], int]] = {
         f"evaluate_{FEW}": (lambda: problem.evaluate(few[0]), FEW),
         f"evaluate_{MANY}": (lambda: problem.evaluate(proposals), MANY),
         f"areas_{FEW}": (lambda: areas(body, camera, observed, few[1], few[2]), FEW),
         f"areas_{MANY}": (lambda: areas(body, camera, observed, poses, places), MANY),
-        f"areas_{LIMB}": (lambda: areas(body, camera, observed, poses[some], places[some]), LIMB),
-        f"arm_{LIMB}": (lambda: arm.areas(camera, observed, poses[0], places[0], poses[some][:, arm.turns]), LIMB),
     }
     for one in (problem, seen_at(problem, LARGE)):
         size = "x".join(str(side) for side in one.silhouettes[0].size)
