@@ -170,7 +170,7 @@ Flags = NDArray[np.bool_]
 
 EXCHANGED = 10.0  # millimetres by which a mirrored pose is nearer to the truth; below, its sides hardly differ
 STRENGTH = 0.03  # variance of the normal prior of weights
-SWAPPED = 0.05  # share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow it
+SWAPPED = 0.02  # share of exchanged sides among the frames whose sides are known, where `BOUNDS` allow it
 BOUNDS = (0.01, 0.5)  # of the probability from which sides are unknown
 DIGITS = 6
 # The features of each model: evidence of a frame, and its means
