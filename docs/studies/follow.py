@@ -4,22 +4,27 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from timeit import repeat
 
 import click
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from posefit.fitting.tracker import Observation
-from posefit.footage.scene import synthetic
+from clips import EVALUATIONS
+from posefit.fitting.tracker import Observation, Task
+from posefit.footage.scene import Scene, synthetic
 from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
+from posefit_exemplars.contours import precisions
+from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.hypotheses import KNOWN_SHIFT, REACHES, TURN
 from posefit_reproduce.bench.processor import check_named
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
+POSES = 40  # of a call, by which the effort of a step is measured
 SETTLED = 100  # frames after which memory should grow no more
-BUDGET = 2440
 
 
 def follow_figures(frames: int) -> dict[str, float]:
@@ -27,13 +32,14 @@ def follow_figures(frames: int) -> dict[str, float]:
 
     `library_s` is reading the library, `states_s` making a tracker's states of it; `ms` is the CPU time of a frame, and
     `slowest_ms` that of the slowest one; `mb` is the process's peak memory after 100 frames, and `mb_end` at the end.
+    `step_poses` is how many costs of poses take as long as a step of a fit.
     """
     began = time.process_time()
     others = recorded.clips(without=[recorded.clip(CLIP).subject])
     library = time.process_time() - began
     training = [clip.motion() for clip in others]
     scene = synthetic(recorded.clip(CLIP).motion(), (45.0,), (320, 240), [], (None, None))
-    task = replace(task_of(scene, TrackOptions(translation="aligned", evaluations=BUDGET), training), yaw=None)
+    task = replace(task_of(scene, TrackOptions(translation="aligned", evaluations=EVALUATIONS), training), yaw=None)
     began = time.process_time()
     with threadpool_limits(1):
         tracker = registry().offer("tracker", "exemplars").factory(task)
@@ -60,7 +66,20 @@ def follow_figures(frames: int) -> dict[str, float]:
         "slowest_ms": float(milliseconds.max()),
         "mb": settled,
         "mb_end": _peak_mb(),
+        "step_poses": _step_poses(task, scene),
     }
+
+
+def _step_poses(task: Task, scene: Scene) -> float:
+    truth = scene.truth
+    assert truth is not None
+    poses, places = (np.repeat(array[:1], POSES, axis=0) for array in (truth.poses, truth.translations))
+    poses += np.random.default_rng(0).normal(0.0, 0.1, poses.shape) * truth.skeleton.free
+    look = FrameCosts(task, scene.observations[0])
+    contours, weights = look.contours(places[0]), precisions(TURN, KNOWN_SHIFT)
+    jobs = (lambda: contours.fitted(task, poses, places, poses, weights, REACHES), lambda: look.full(poses, places))
+    fit, cost = (min(repeat(job, number=1, repeat=20)) for job in jobs)
+    return fit / len(REACHES) / cost
 
 
 def _peak_mb() -> float:

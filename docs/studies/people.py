@@ -62,12 +62,12 @@ CHANGES: dict[str, Mapping[str, Any]] = {
 # the same without one of the tracker's steps
 STEPS: dict[str, Mapping[str, Any]] = {
     "the path alone": {"settings": {"exemplars.fitted": False}},
-    "no mirror images": {"settings": {"exemplars.mirrored": False}},
     "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")
 CHANGED_WALKS, COMPARED_WALKS, COMPARED_OTHERS = 4, 5, 2  # clips of which one thing is changed, that others follow
-SEEDED = 3  # clips of a group that are followed with more seeds
+SEEDED = 2  # clips of a group that are followed with more seeds, from 45 and 90 degrees
+FEW_CLIPS = 3  # that are followed with few evaluations
 FEW = 2440  # evaluations of a frame, the default of other methods
 SEEDS = (1, 2)  # with which tracks of one camera are followed again: which hypothesis is chosen depends on a few draws
 
@@ -94,8 +94,9 @@ def design(method: str, quick: bool) -> Iterator[Task]:
             line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
             yield Task("groups", line, clip, view)
             if len(view) == 1 and view in SIDES[:3] and not quick:
-                yield Task("groups", f"{line}, {FEW:,} evaluations", clip, view, {"evaluations": FEW})
-                if clip in clips[:SEEDED]:
+                if clip in clips[:FEW_CLIPS]:
+                    yield Task("groups", f"{line}, {FEW:,} evaluations", clip, view, {"evaluations": FEW})
+                if clip in clips[:SEEDED] and view in SIDES[1:3]:
                     yield from (Task("groups", line, clip, view, {"seed": seed}) for seed in SEEDS)
     changed = [*product(GROUPS[WALKS][: 1 if quick else CHANGED_WALKS], SIDES[1:2] if quick else SIDES[:3])]
     others = [] if quick else [*product(GROUPS["everyday"][:4], SIDES[:3])]

@@ -17,7 +17,7 @@ from posefit_exemplars import contour_kernels
 EVERY = 3  # points of a mask's border, of which one is looked at
 MAX_TURN = np.radians(20.0)  # of an angle in a step
 RIGID = 1e9  # precision of an angle that the person has not
-SHARE = 40.0  # effort of a step, as a share of a pose's cost: docs/studies/follow.py measures it
+SHARE = 40.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures
 
 
 @dataclass(frozen=True, eq=False)
