@@ -38,15 +38,14 @@ LIBRARY_TURN = np.radians(15.0)  # that it may be off similar poses of clips
 KNOWN_SHIFT, ALIGNED_SHIFT = 0.003, 0.05  # metres that a known root, and an aligned one, may be off
 SIMILAR_POSES = 8  # of clips, whose mean pulls a hypothesis that goes on
 SIMILAR = 0.03  # metres: that they are off the nearest of them
-LIBRARY_DISTANCE, LIBRARY_COST = 0.05, 4.0  # metres off the clips, and what they cost: LIBRARY_COST log(1 + d^2 / 2)
+LIBRARY_DISTANCE = 0.05  # metres: d times that off the clips costs LIBRARY_COST log(1 + d^2 / 2)
+LIBRARY_COST = 4.0  # for a thirtieth of a second
 SHARPNESS = 2.0  # times what a silhouette costs on the path, as fitted poses are nearer
 SPREAD = 4.0 / 3.0  # times the spread of the path's steps
 SAME = 0.03  # metres: hypotheses that are nearer to each other go on as one
 _LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.values()]
-PARTS: Sequence[Rows] = [
-    np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS)),
-    *_LIMBS,
-]  # the trunk's joints first
+_TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
+PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # joints
 SPEEDS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}  # at which a part goes on: what each costs
 HIGHEST = 4.0  # cost of a step of one part
 
@@ -112,6 +111,7 @@ class HypothesisFilter:
         self._task, self._exemplars, self._steps, self.delay = task, exemplars, steps, delay
         self._temperature, self._spread = temperature / SHARPNESS, SPREAD * steps.spread
         self._samples, self._power = samples, power / SHARPNESS
+        self._library_cost = LIBRARY_COST * 30.0 / task.fps
         evaluations = max(evaluations / len(task.cameras), MIN_EVALUATIONS)  # several cameras leave less open
         self.fresh = max(int(FRESH * evaluations / FRESH_EVALUATIONS), 2)
         self.going = int((evaluations - self.fresh * FRESH_EVALUATIONS) / GOING_EVALUATIONS)
@@ -184,7 +184,7 @@ class HypothesisFilter:
         if look.usable:
             _, squares = self._exemplars.similar(poses, 1, SIMILAR)
             fits = look.full(poses, places) / self._temperature
-            fits += LIBRARY_COST * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
+            fits += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if latest is not None:
             steps = step_costs(self._spread, latest, hypotheses)
             if look.root is None:

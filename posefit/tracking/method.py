@@ -72,10 +72,10 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
 def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     """Return options whose method and training motions are known, by default those of the source.
 
-    That is `exemplars`, which learns from the library of recorded motions and has a budget of its own. A built-in motion, and all else for which an
-    optimiser, a prior or settings of theirs are given, is tracked by `annealed@pca`, or the optimiser that settings
-    name; footage with the prior `loose`. These and other trackers learn from the other styles of a built-in motion, or
-    else from the built-in walks.
+    That is `exemplars`, which learns from the library of recorded motions and has a budget of its own. A built-in
+    motion, and all else for which an optimiser, a prior or settings of theirs are given, is tracked by `annealed@pca`,
+    or the optimiser that settings name; footage with the prior `loose`. These and other trackers learn from the other
+    styles of a built-in motion, or else from the built-in walks.
     """
     known = isinstance(source, str) and source in built_in.names()
     prior, method = DEFAULT_FOOTAGE_PRIOR if kind_of(source) != "motion" else DEFAULT_PRIOR, options.method

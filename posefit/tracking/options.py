@@ -206,7 +206,9 @@ class TrackOptions:
         "SHARE",
         ", a share of the person's area",
     )
-    evaluations: int | None = _int(None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 2440.", 1, "POSES")
+    evaluations: int | None = _int(
+        None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 2440.", 1, "POSES"
+    )
     population_size: int | None = _int(None, "N, by default 40.", 1)
     iterations: int | None = _int(None, "C, by default 60.", 1, "C")
     ask_seconds: float | None = _float("How long a plugin may take to propose a population.", SECONDS, "SECONDS")
