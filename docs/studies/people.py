@@ -65,9 +65,9 @@ STEPS: dict[str, Mapping[str, Any]] = {
     "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")
-CHANGED_WALKS, COMPARED_WALKS, COMPARED_OTHERS = 4, 5, 2  # clips of which one thing is changed, that others follow
+CHANGED_WALKS, COMPARED_WALKS, COMPARED_OTHERS = 3, 3, 1  # clips of which one thing is changed, that others follow
 SEEDED = 2  # clips of a group that are followed with more seeds, from 45 and 90 degrees
-FEW_CLIPS = 3  # that are followed with few evaluations
+FEW_CLIPS = 2  # that are followed with few evaluations
 FEW = 2440  # evaluations of a frame, the default of other methods
 SEEDS = (1, 2)  # with which tracks of one camera are followed again: which hypothesis is chosen depends on a few draws
 
@@ -89,7 +89,7 @@ class Task(NamedTuple):
 def design(method: str, quick: bool) -> Iterator[Task]:
     """Yield all tracks, or a few of them."""
     for group, clips in GROUPS.items():
-        views = (*SIDES, *PAIRS) if group == WALKS else (*SIDES[:3], PAIRS[1])
+        views = (*SIDES[:3], *PAIRS) if group == WALKS else (*SIDES[:3], PAIRS[1])
         for clip, view in product(clips[: 2 if quick else None], views[1:2] if quick else views):
             line = f"{group}, {len(view)} camera{'s' * (len(view) > 1)}"
             yield Task("groups", line, clip, view)
@@ -98,8 +98,8 @@ def design(method: str, quick: bool) -> Iterator[Task]:
                     yield Task("groups", f"{line}, {FEW:,} evaluations", clip, view, {"evaluations": FEW})
                 if clip in clips[:SEEDED] and view in SIDES[1:3]:
                     yield from (Task("groups", line, clip, view, {"seed": seed}) for seed in SEEDS)
-    changed = [*product(GROUPS[WALKS][: 1 if quick else CHANGED_WALKS], SIDES[1:2] if quick else SIDES[:3])]
-    others = [] if quick else [*product(GROUPS["everyday"][:4], SIDES[:3])]
+    changed = [*product(GROUPS[WALKS][: 1 if quick else CHANGED_WALKS], SIDES[1:2] if quick else SIDES[1:3])]
+    others = [] if quick else [*product(GROUPS["everyday"][:CHANGED_WALKS], SIDES[1:3])]
     for table, changes, places in (
         ("changes", CHANGES, changed),
         ("steps", STEPS if method == METHOD else {}, [*changed, *others]),
