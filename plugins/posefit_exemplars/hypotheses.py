@@ -7,6 +7,9 @@ the contours by a few steps of Gauss and Newton, which may turn every joint. A h
 does, and its distance from the poses of clips; a step costs the distance of the trunk and of each limb from where they
 were going. The likeliest sequence is Viterbi's: what is wrong may fit one frame, but hardly ever twenty.
 
+Masks of a camera and a fitted body are less precise than clean ones. Where even the best frames cost more, contours
+count for less against the poses that a fit begins with and those of clips.
+
 After Sminchisescu and Triggs, Kinematic jump processes for monocular 3D human tracking, 2003.
 """
 
@@ -24,12 +27,14 @@ from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit_exemplars.beam import Steps, root_deviation_costs, squared_distances
 from posefit_exemplars.contours import SHARE, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
+from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.window import FrameStates, SampledPaths, Sampler, frame_states, viterbi_state
 
 FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)  # metres, of the steps of a fit: contours that
 REACHES = (0.15, 0.09, 0.065, 0.045, 0.033)  # are farther off count less; and of a hypothesis that goes on
-FRESH_EVALUATIONS, GOING_EVALUATIONS = (len(reaches) * SHARE + 1.0 for reaches in (FRESH_REACHES, REACHES))
+FRESH_EVALUATIONS = len(FRESH_REACHES) * SHARE + 1.0
+GOING_EVALUATIONS = len(REACHES) * SHARE + 3.0  # two of them are of places to begin at
 MIN_EVALUATIONS = 2 * FRESH_EVALUATIONS + GOING_EVALUATIONS  # of a frame
 FRESH = 0.45  # share of the evaluations that is for fresh hypotheses
 REFLECTED = 0.25  # share of the fresh hypotheses that are reflections of the others
@@ -42,6 +47,10 @@ LIBRARY_DISTANCE = 0.05  # metres: d times that off the clips costs LIBRARY_COST
 LIBRARY_COST = 4.0  # for a thirtieth of a second
 SHARPNESS = 2.0  # times what a silhouette costs on the path, as fitted poses are nearer
 SPREAD = 4.0 / 3.0  # times the spread of the path's steps
+CLEAN_COST = 3.0  # of a fitted pose; where even the best frames cost more, masks and the body are less precise
+BEST = 0.2  # share of the frames that are the best
+MEMORY = 10.0  # seconds of frames
+FITTED_COST = 0.4  # what a fit leaves of a cost, before any is made
 SAME = 0.03  # metres: hypotheses that are nearer to each other go on as one
 _LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.values()]
 _TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
@@ -112,6 +121,7 @@ class HypothesisFilter:
         self._temperature, self._spread = temperature / SHARPNESS, SPREAD * steps.spread
         self._samples, self._power = samples, power / SHARPNESS
         self._library_cost = LIBRARY_COST * 30.0 / task.fps
+        self._costs: deque[float] = deque(maxlen=max(round(MEMORY * task.fps), 1))  # of the best hypotheses
         evaluations = max(evaluations / len(task.cameras), MIN_EVALUATIONS)  # several cameras leave less open
         self.fresh = max(int(FRESH * evaluations / FRESH_EVALUATIONS), 2)
         self.going = int((evaluations - self.fresh * FRESH_EVALUATIONS) / GOING_EVALUATIONS)
@@ -155,8 +165,9 @@ class HypothesisFilter:
         """Return the hypotheses of a frame, and the evaluations that they took."""
         look, task, latest, used = frame.look, self._task, None if before is None else before.beam, 0.0
         contours = look.contours(frame.place) if look.usable else None
-        weights = precisions(TURN, ALIGNED_SHIFT if look.root is None else KNOWN_SHIFT)
         poses, places = self._fresh(frame)
+        noise = self._noise(look, poses, places)
+        weights = precisions(TURN / noise, ALIGNED_SHIFT if look.root is None else KNOWN_SHIFT)
         if contours is not None:
             poses, places = contours.fitted(task, poses, places, poses, weights, FRESH_REACHES)
             used += len(poses) * FRESH_EVALUATIONS
@@ -166,8 +177,8 @@ class HypothesisFilter:
             moved, shifted = latest.poses[going], latest.places[going]
             if contours is not None:
                 moved = moved + latest.turns[going]
-                shifted = look.at_root(shifted + latest.shifts[going])
-                means, pulls = self._pulled(moved, weights)
+                shifted = _cheaper(look, moved, shifted + latest.shifts[going])
+                means, pulls = self._pulled(moved, weights, noise)
                 moved, shifted = contours.fitted(task, moved, shifted, means, pulls, REACHES)
                 used += len(going) * GOING_EVALUATIONS
             poses, places = np.concatenate([poses, moved]), np.concatenate([places, shifted])
@@ -183,7 +194,9 @@ class HypothesisFilter:
         fits, steps = np.zeros(len(poses)), None
         if look.usable:
             _, squares = self._exemplars.similar(poses, 1, SIMILAR)
-            fits = look.full(poses, places) / self._temperature
+            costs = look.full(poses, places)
+            self._costs.append(float(costs.min()))
+            fits = costs / (noise * self._temperature)
             fits += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if latest is not None:
             steps = step_costs(self._spread, latest, hypotheses)
@@ -191,6 +204,15 @@ class HypothesisFilter:
                 expected = latest.places + latest.shifts
                 steps += root_deviation_costs(places, expected[:, None], look.eye, self._steps)
         return frame_states(hypotheses, fits, before, steps), used
+
+    def _noise(self, look: FrameCosts, poses: Array, places: Array) -> float:
+        """Return how many times less precise masks are than clean ones, 1 or more, by the best frames so far.
+
+        Before the first, what its hypotheses' poses (n, 66) at places (n, 3) cost tells.
+        """
+        if look.usable and not self._costs:
+            self._costs.append(FITTED_COST * float(look.full(poses, places).min()))
+        return max(float(np.quantile(self._costs or [0.0], BEST)) / CLEAN_COST, 1.0)
 
     def _fresh(self, frame: Estimate) -> tuple[Array, Array]:
         """Return the poses (n, 66) and places (n, 3) of the path, of unlike states, and of their reflections."""
@@ -204,9 +226,9 @@ class HypothesisFilter:
         beside = np.resize(places[: len(first)], (len(reflected), 3))
         return np.concatenate([poses, reflected]), np.concatenate([places, beside])
 
-    def _pulled(self, poses: Array, weights: Array) -> tuple[Array, Array]:
+    def _pulled(self, poses: Array, weights: Array, noise: float) -> tuple[Array, Array]:
         """Return what poses (n, 66) are pulled to, between themselves and similar poses of clips, and how (69,)."""
-        pulls = precisions(LIBRARY_TURN, np.inf)
+        pulls = precisions(LIBRARY_TURN / noise, np.inf)
         pulls[0] = 0.0  # the yaws of clips are free
         similar, _ = self._exemplars.similar(poses, SIMILAR_POSES, SIMILAR)
         both = weights + pulls
@@ -223,3 +245,11 @@ class HypothesisFilter:
                 if len(chosen) == self.going:
                     break
         return np.array(chosen)
+
+
+def _cheaper(look: FrameCosts, poses: Array, places: Array) -> Array:
+    """Return for each of some poses (n, 66) its place (n, 3) or, where that costs less, the one that aligns it."""
+    if look.root is not None:
+        return look.at_root(places)
+    aligned = look.placed(poses, places)
+    return np.where((look.full(poses, aligned) < look.full(poses, places))[:, None], aligned, places)
