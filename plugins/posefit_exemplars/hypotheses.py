@@ -29,7 +29,7 @@ from posefit_exemplars.contours import SHARE, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate
-from posefit_exemplars.window import FrameStates, SampledPaths, Sampler, frame_states, viterbi_state
+from posefit_exemplars.window import FrameStates, SampledPaths, Sampler, frame_states, state_weights, viterbi_state
 
 FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)  # metres, of the steps of a fit: contours that
 REACHES = (0.15, 0.09, 0.065, 0.045, 0.033)  # are farther off count less; and of a hypothesis that goes on
@@ -151,15 +151,22 @@ class HypothesisFilter:
             yield self._estimated(waiting, sampler)
 
     def _estimated(self, waiting: deque[tuple[Estimate, FrameStates[Hypotheses]]], sampler: Sampler) -> Estimate:
-        """Return the oldest waiting frame, with the pose of the likeliest sequence."""
+        """Return the oldest waiting frame, with the mean pose of the hypotheses near that of the likeliest sequence."""
         start, cpu_start = time.perf_counter(), time.process_time()
         window = [states for _, states in waiting]
-        row, rows, (frame, states) = viterbi_state(window), sampler.draw(window), waiting.popleft()
+        row, weights, rows = viterbi_state(window), state_weights(window), sampler.draw(window)
+        frame, states = waiting.popleft()
         own, paths = states.beam, None
+        apart = ((own.joints - own.joints[row]) ** 2).sum(axis=2).mean(axis=1)
+        shares = weights * np.exp(-0.5 * apart / SAME**2)
+        shares[row] += np.finfo(np.float64).tiny
+        shares /= shares.sum()
+        pose = own.poses[row] + shares @ wrapped(own.poses - own.poses[row])
+        place = own.places[row] + shares @ (own.places - own.places[row])
         if rows is not None:
-            paths = SampledPaths.of(self._task.body.skeleton, own.poses[rows], own.places[rows], own.poses[row])
+            paths = SampledPaths.of(self._task.body.skeleton, own.poses[rows], own.places[rows], pose)
         frame = frame.longer(0.0, time.perf_counter() - start, time.process_time() - cpu_start)
-        return replace(frame, pose=own.poses[row], place=own.places[row], paths=paths)
+        return replace(frame, pose=pose, place=place, paths=paths)
 
     def _fitted(self, frame: Estimate, before: FrameStates[Hypotheses] | None) -> tuple[FrameStates[Hypotheses], float]:
         """Return the hypotheses of a frame, and the evaluations that they took."""
