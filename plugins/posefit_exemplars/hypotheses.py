@@ -29,7 +29,15 @@ from posefit_exemplars.contours import SHARE, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate
-from posefit_exemplars.window import FrameStates, SampledPaths, Sampler, frame_states, state_weights, viterbi_state
+from posefit_exemplars.window import (
+    FrameStates,
+    SampledPaths,
+    Sampler,
+    frame_states,
+    mean_near,
+    state_weights,
+    viterbi_state,
+)
 
 FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)  # metres, of the steps of a fit: contours that
 REACHES = (0.15, 0.09, 0.065, 0.045, 0.033)  # are farther off count less; and of a hypothesis that goes on
@@ -51,7 +59,7 @@ CLEAN_COST = 3.0  # of a fitted pose; where even the best frames cost more, mask
 BEST = 0.2  # share of the frames that are the best
 MEMORY = 10.0  # seconds of frames
 FITTED_COST = 0.4  # what a fit leaves of a cost, before any is made
-SAME = 0.03  # metres: hypotheses that are nearer to each other go on as one
+SAME = 0.03  # metres: hypotheses that are nearer to each other go on as one; standard deviation of those averaged
 _LIMBS = [np.array([JOINTS.index(bone) for bone in bones]) for bones in LIMBS.values()]
 _TRUNK = np.setdiff1d(np.arange(len(JOINTS)), np.concatenate(_LIMBS))
 PARTS: Sequence[Rows] = [_TRUNK, *_LIMBS]  # joints
@@ -157,12 +165,8 @@ class HypothesisFilter:
         row, weights, rows = viterbi_state(window), state_weights(window), sampler.draw(window)
         frame, states = waiting.popleft()
         own, paths = states.beam, None
-        apart = ((own.joints - own.joints[row]) ** 2).sum(axis=2).mean(axis=1)
-        shares = weights * np.exp(-0.5 * apart / SAME**2)
-        shares[row] += np.finfo(np.float64).tiny
-        shares /= shares.sum()
-        pose = own.poses[row] + shares @ wrapped(own.poses - own.poses[row])
-        place = own.places[row] + shares @ (own.places - own.places[row])
+        squares = ((own.joints - own.joints[row]) ** 2).sum(axis=2).mean(axis=1) / SAME**2
+        pose, place = mean_near(row, weights, squares, own.poses, own.places)
         if rows is not None:
             paths = SampledPaths.of(self._task.body.skeleton, own.poses[rows], own.places[rows], pose)
         frame = frame.longer(0.0, time.perf_counter() - start, time.process_time() - cpu_start)

@@ -39,6 +39,7 @@ from posefit_exemplars.window import (
     Sampler,
     frame_states,
     mean_near,
+    squares_apart,
     state_weights,
     viterbi_state,
 )
@@ -265,8 +266,9 @@ class ExemplarTracker:
         if self.hypotheses is not None:
             unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, self.hypotheses.unlike))
             others = self._poses(unlike), unlike.places
-        codes = self.exemplars.codes[beam.states]
-        pose, place = mean_near(row, likely, codes, self._poses(beam), beam.places)
+        codes, turns = self.exemplars.codes[beam.states], beam.yaws - beam.yaws[row]
+        squares = squares_apart(codes, codes[row], turns)
+        pose, place = mean_near(row, likely, squares, self._poses(beam), beam.places)
         if look.usable:
             place = look.placed(pose[None], place[None])[0]
         if sampler is not None and (rows := sampler.draw(window)) is not None:

@@ -97,16 +97,16 @@ def squares_apart(codes: Codes, code: Codes, turns: Array) -> Array:
     return np.asarray(((codes - code) ** 2).sum(axis=1) / SIMILAR**2 + (wrapped(turns) / SIMILAR_YAW) ** 2)
 
 
-def mean_near(row: int, weights: Array, codes: Codes, poses: Array, places: Array) -> tuple[Array, Array]:
+def mean_near(row: int, weights: Array, squares: Array, poses: Array, places: Array) -> tuple[Array, Array]:
     """Return the mean pose (66,) and place (3,) of the states similar to one of them, by weights (n,).
 
-    The mean of all would be between a stride and its mirrored half-cycle where both are likely.
+    `squares` (n,) are their squared distances from it, in standard deviations. The mean of all would be between a
+    stride and its mirrored half-cycle where both are likely.
     """
-    share = weights * np.exp(-0.5 * squares_apart(codes, codes[row], poses[:, 0] - poses[row, 0]))
+    share = weights * np.exp(-0.5 * squares)
     share[row] += np.finfo(np.float64).tiny
     share /= share.sum()
-    pose = poses[row] + share @ wrapped(poses - poses[row])
-    return pose, places[row] + share @ (places - places[row])
+    return poses[row] + share @ wrapped(poses - poses[row]), places[row] + share @ (places - places[row])
 
 
 def backward_messages(window: Sequence[FrameStates[S]], power: float) -> Array:

@@ -8,7 +8,15 @@ import pytest
 from posefit.arrays import Array
 from posefit_exemplars.beam import Beam
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
-from posefit_exemplars.window import SIMILAR, FrameStates, SampledPaths, frame_states, mean_near, state_weights
+from posefit_exemplars.window import (
+    SIMILAR,
+    FrameStates,
+    SampledPaths,
+    frame_states,
+    mean_near,
+    squares_apart,
+    state_weights,
+)
 from tests.cases import each
 
 
@@ -35,12 +43,12 @@ def test_the_mean_is_of_states_similar_to_the_path() -> None:
     poses[:, 5] = [0.0, 0.1, 2.0]
     places = np.array([[0.0, 1.0, 0.0], [0.3, 1.0, 0.0], [9.0, 9.0, 9.0]])
     codes = np.array([[0.0], [SIMILAR], [100.0]], dtype=np.float32)
-    pose, place = mean_near(0, np.array([0.2, 0.4, 0.4]), codes, poses, places)
+    pose, place = mean_near(0, np.array([0.2, 0.4, 0.4]), squares_apart(codes, codes[0], np.zeros(3)), poses, places)
     share = 0.4 * np.exp(-0.5) / (0.2 + 0.4 * np.exp(-0.5))
     assert pose[5] == pytest.approx(0.1 * share)
     np.testing.assert_allclose(place, [0.3 * share, 1.0, 0.0])
     # a state on the path counts even where it has no weight
-    pose, place = mean_near(2, np.array([0.5, 0.5, 0.0]), codes, poses, places)
+    pose, place = mean_near(2, np.array([0.5, 0.5, 0.0]), squares_apart(codes, codes[2], np.zeros(3)), poses, places)
     np.testing.assert_allclose([*pose, *place], [*poses[2], *places[2]])
 
 
@@ -48,7 +56,8 @@ def test_a_mean_of_yaws_goes_the_short_way_round() -> None:
     poses = np.zeros((2, 66))
     poses[:, 0] = np.radians([179.0, -179.0])
     codes, places = np.zeros((2, 1), dtype=np.float32), np.zeros((2, 3))
-    pose, _ = mean_near(0, np.array([0.5, 0.5]), codes, poses, places)
+    squares = squares_apart(codes, codes[0], poses[:, 0] - poses[0, 0])
+    pose, _ = mean_near(0, np.array([0.5, 0.5]), squares, poses, places)
     other = np.exp(-0.5 * 0.1**2)  # two degrees away, a tenth of a standard deviation
     assert np.degrees(pose[0]) == pytest.approx(179.0 + 2.0 * other / (1.0 + other))
 
