@@ -21,7 +21,7 @@ from posefit.tracking.smoothing.contours import (
 )
 from posefit.tracking.smoothing.kernels import COVERED, TINY, cone_distance
 
-NUMBERS = ANGLES + 3  # of a pose and a place
+NUMBERS = 3 + ANGLES  # of a place and a pose
 
 CAP = 2  # points of a quarter, about, of the disc at a bone's end
 
@@ -38,42 +38,90 @@ def _add(block, slope, share, across, down, wide, off, weight):
 
 
 @jit
-def _nearest_bone(x, y, parents, centres, radii, discs):
-    least, bone, share, nx, ny = np.inf, 0, 0.0, 0.0, 0.0
+def _write_cones(parents, centres, radii, cones, discs):
+    """Write what distances from bones need (27, 8), and a disc about each (27, 3).
+
+    A cone is its first point, its axis, of length 1, its length, its first radius, by how much less the last is, and
+    how far along the axis a point's nearest is from where it would be on a cylinder, for each pixel across.
+    """
     for b in range(parents.size):
-        reach = least + discs[b, 2]
-        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= reach * reach:
-            continue
-        p = parents[b]
-        off, at, ox, oy = cone_distance(
-            x, y, centres[p, 0], centres[p, 1], radii[b, 0], centres[b + 1, 0], centres[b + 1, 1], radii[b, 1]
-        )
-        if off < least:
-            least, bone, share, nx, ny = off, b, at, ox, oy
-    return least, bone, share, nx, ny
+        x, y = centres[parents[b], 0], centres[parents[b], 1]
+        r0, r1 = radii[b, 0], radii[b, 1]
+        dx, dy, dr = centres[b + 1, 0] - x, centres[b + 1, 1] - y, r0 - r1
+        length = math.sqrt(dx * dx + dy * dy)
+        discs[b, 0], discs[b, 1], discs[b, 2] = x + 0.5 * dx, y + 0.5 * dy, 0.5 * length + max(r0, r1)
+        if length <= abs(dr) + TINY:  # one disc covers the other
+            if dr < 0.0:
+                x, y, r0 = x + dx, y + dy, r1
+            dx, dy, dr, length = 0.0, 0.0, 0.0, 0.0
+        inverse, slope = 1.0 / max(length, TINY), dr / math.sqrt(max(length * length - dr * dr, TINY))
+        cones[b, 0], cones[b, 1], cones[b, 2], cones[b, 3] = x, y, dx * inverse, dy * inverse
+        cones[b, 4], cones[b, 5], cones[b, 6], cones[b, 7] = length, r0, dr * inverse, slope
+
+
+@inlined
+def _from_cone(x, y, cone):
+    """Return how far a point is off the nearest of a cone's discs, in x and in y, and its radius."""
+    ox, oy = x - cone[0], y - cone[1]
+    along = ox * cone[2] + oy * cone[3]
+    across = abs(oy * cone[2] - ox * cone[3])
+    at = min(max(along - across * cone[7], 0.0), cone[4])
+    return ox - at * cone[2], oy - at * cone[3], cone[5] - at * cone[6]
 
 
 @jit
-def _covered(x, y, bone, parents, centres, radii, discs):
-    for b in range(parents.size):
-        if b == bone or (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= discs[b, 2] * discs[b, 2]:
+def _nearest_bone(x, y, first, cones, discs):
+    """Return the bone whose border is nearest to a point, and how far that is off; begin with `first`."""
+    least, bone = np.inf, first
+    for k in range(-1, discs.shape[0]):
+        b = first if k < 0 else k
+        reach = least + discs[b, 2]
+        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= reach * reach:
             continue
-        p = parents[b]
-        off = cone_distance(
-            x, y, centres[p, 0], centres[p, 1], radii[b, 0], centres[b + 1, 0], centres[b + 1, 1], radii[b, 1]
-        )[0]
-        if off < -COVERED:
-            return True
+        ox, oy, radius = _from_cone(x, y, cones[b])
+        off = math.sqrt(ox * ox + oy * oy) - radius
+        if off < least:
+            least, bone = off, b
+    return bone
+
+
+@jit
+def _write_beside(bone, discs, beside):
+    """Write the other bones whose discs meet that of a bone, and return how many there are."""
+    count = 0
+    for b in range(discs.shape[0]):
+        reach = discs[b, 2] + discs[bone, 2]
+        off = (discs[b, 0] - discs[bone, 0]) ** 2 + (discs[b, 1] - discs[bone, 1]) ** 2
+        if b != bone and off < reach * reach:
+            beside[count] = b
+            count += 1
+    return count
+
+
+@jit
+def _covered(x, y, beside, cones, discs):
+    for b in beside:
+        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[b, 2]:
+            ox, oy, radius = _from_cone(x, y, cones[b])
+            if radius > COVERED and ox * ox + oy * oy < (radius - COVERED) ** 2:
+                return True
     return False
 
 
 @jit
 def _pull(drawn, field, corner, size, points, step, scale, blocks, slopes):
     """Add the squares of what points (n, 2) of the mask's border are off the body's, and the body's off the mask's."""
-    parents, centres, radii, discs = drawn
+    parents, centres, radii = drawn
+    cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
+    _write_cones(parents, centres, radii, cones, discs)
+    bone, beside = 0, np.empty(parents.size, np.int64)
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
-        off, bone, share, nx, ny = _nearest_bone(x, y, parents, centres, radii, discs)
+        bone = _nearest_bone(x, y, bone, cones, discs)
+        p, n = parents[bone], bone + 1
+        off, share, nx, ny = cone_distance(
+            x, y, centres[p, 0], centres[p, 1], radii[bone, 0], centres[n, 0], centres[n, 1], radii[bone, 1]
+        )
         weight = step / (1.0 + (off / scale) ** 2)
         _add(blocks[bone], slopes[bone], share, -nx, -ny, -1.0, off, weight)
     spacing = 2.0 * step
@@ -85,21 +133,25 @@ def _pull(drawn, field, corner, size, points, step, scale, blocks, slopes):
         if length <= abs(r0 - r1) + TINY:
             continue
         dx, dy = dx / length, dy / length
-        tilt = math.acos((r0 - r1) / length)  # from the axis to the normal of the cone's side
+        others = beside[: _write_beside(b, discs, beside)]
+        cosine = (r0 - r1) / length
+        sine = math.sqrt(1.0 - cosine * cosine)
+        tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
         sides = max(int(length / spacing) + 1, 2)
         for k in range(2 * (sides + 1 + 2 * CAP)):
-            side, i = (1.0 if k % 2 == 0 else -1.0), k // 2
+            i, side = k // 2, 1.0 - 2.0 * (k % 2)
             if i <= sides:
-                share, angle = i / sides, tilt
-                stands = length * math.sin(tilt) / sides * (0.5 if i in (0, sides) else 1.0)
-            elif i <= sides + CAP:
-                share, angle = 1.0, tilt * (i - sides - 0.5) / CAP
-                stands = r1 * tilt / CAP
-            else:
-                share, angle = 0.0, tilt + (math.pi - tilt) * (i - sides - CAP - 0.5) / CAP
-                stands = r0 * (math.pi - tilt) / CAP
-            nx = math.cos(angle) * dx - side * math.sin(angle) * dy
-            ny = math.cos(angle) * dy + side * math.sin(angle) * dx
+                share, along, aside = i / sides, cosine, sine
+                stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
+            elif side > 0.0:
+                share = 1.0 if i <= sides + CAP else 0.0
+                if share > 0.0:
+                    angle, stands = tilt * (i - sides - 0.5) / CAP, r1 * tilt / CAP
+                else:
+                    rest = math.pi - tilt
+                    angle, stands = tilt + rest * (i - sides - CAP - 0.5) / CAP, r0 * rest / CAP
+                along, aside = math.cos(angle), math.sin(angle)
+            nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
             radius = r0 + share * (r1 - r0)
             x = centres[p, 0] + share * length * dx + radius * nx
             y = centres[p, 1] + share * length * dy + radius * ny
@@ -107,7 +159,7 @@ def _pull(drawn, field, corner, size, points, step, scale, blocks, slopes):
             left, top = math.floor(column), math.floor(row)
             if not (0 <= left < size[1] - 1 and 0 <= top < size[0] - 1):
                 continue
-            if _covered(x, y, b, parents, centres, radii, discs):
+            if _covered(x, y, others, cones, discs):
                 continue
             u, v = column - left, row - top
             upper, lower = field[top], field[top + 1]
@@ -140,15 +192,10 @@ def _add_view(chain, radii, camera, frames, contour, reach, curves, forces):
             ways[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
             ways[j, 2, i] = -depth[j] / c * rotation[2, i]
     metres = depth[0]  # pixels of one, where the root is
-    discs = np.empty((bones, 3))
     for b in range(bones):
-        p = parents[b]
-        wide[b, 0], wide[b, 1] = depth[p] * radii[b, 0], depth[b + 1] * radii[b, 1]
-        discs[b, 0], discs[b, 1] = 0.5 * (centres[p, 0] + centres[b + 1, 0]), 0.5 * (centres[p, 1] + centres[b + 1, 1])
-        half = 0.5 * math.sqrt((centres[p, 0] - centres[b + 1, 0]) ** 2 + (centres[p, 1] - centres[b + 1, 1]) ** 2)
-        discs[b, 2] = half + max(wide[b, 0], wide[b, 1])
+        wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
     blocks, slopes = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
-    drawn = parents, centres, wide, discs
+    drawn = parents, centres, wide
     _pull(drawn, field, corner, size, points, step, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes)
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
@@ -184,7 +231,7 @@ def _add_view(chain, radii, camera, frames, contour, reach, curves, forces):
 
 @jit
 def _write_screws(chain, frames, sines, cosines, screws):
-    """Write the twist (69, 6) of each angle, velocity then rotation, and of the place's axes."""
+    """Write the twist (69, 6) of the place's axes, velocity then rotation, and of each angle."""
     screws[:] = 0.0
     root = frames[0, 3]
     axes = np.empty((3, 3))
@@ -192,8 +239,8 @@ def _write_screws(chain, frames, sines, cosines, screws):
     axes[1, 0], axes[1, 1], axes[1, 2] = cosines[0], 0.0, -sines[0]
     axes[2, 0], axes[2, 1], axes[2, 2] = frames[0, 2, 0], frames[0, 2, 1], frames[0, 2, 2]
     for k in range(3):
-        _screw(screws[k], axes[k], root)
-        screws[66 + k, k] = 1.0
+        screws[k, k] = 1.0
+        _screw(screws[3 + k], axes[k], root)
     for b in range(chain.parents.size):
         a = chain.angles[b]
         if a < 0:
@@ -206,7 +253,7 @@ def _write_screws(chain, frames, sines, cosines, screws):
             before = w * cosines[a] + v * sines[a]
             axes[2, i] = before * cosines[a + 1] - u * sines[a + 1]
         for k in range(3):
-            _screw(screws[a + k], axes[k], pivot)
+            _screw(screws[3 + a + k], axes[k], pivot)
 
 
 @inlined
@@ -230,14 +277,8 @@ def _add_up(chain, screws, curves, forces, matrix, slopes):
     matrix[:] = 0.0
     force = np.empty(6)
     for joint in range(parents.size + 1):
-        if joint == 0:
-            first = 0
-        else:
-            first = chain.angles[joint - 1]
-            if first < 0:
-                continue
-        for number in range(6 if joint == 0 else 3):
-            a = first + number if number < 3 else 63 + number
+        first, count = _numbers(chain, joint)
+        for a in range(first, first + count):
             slope = 0.0
             for i in range(6):
                 total = 0.0
@@ -248,44 +289,52 @@ def _add_up(chain, screws, curves, forces, matrix, slopes):
             slopes[a] = slope
             other = joint
             while True:
-                start = 0 if other == 0 else chain.angles[other - 1]
-                if start >= 0:
-                    for k in range(6 if other == 0 else 3):
-                        c = start + k if k < 3 else 63 + k
-                        total = 0.0
-                        for i in range(6):
-                            total += screws[c, i] * force[i]
-                        matrix[a, c] = total
-                        matrix[c, a] = total
+                start, many = _numbers(chain, other)
+                for c in range(start, min(start + many, a + 1)):
+                    total = 0.0
+                    for i in range(6):
+                        total += screws[c, i] * force[i]
+                    matrix[a, c] = total
                 if other == 0:
                     break
                 other = parents[other - 1]
 
 
+@inlined
+def _numbers(chain, joint):
+    """Return the first of the numbers that turn or move a joint, and how many there are."""
+    if joint == 0:
+        return 0, 6
+    a = chain.angles[joint - 1]
+    return (3 + a, 3) if a >= 0 else (0, 0)
+
+
 @jit
 def _solve(matrix, vector):
-    """Solve a positive definite system in place, by Cholesky's decomposition."""
+    """Solve a positive definite system in place, of which the lower half is given.
+
+    The last number goes first: what turns a hand has to do with what turns its arm, and with no other limb.
+    """
     n = vector.size
-    for j in range(n):
+    for j in range(n - 1, -1, -1):
         row = matrix[j]
-        for k in range(j):
-            total = row[k]
-            other = matrix[k]
-            for i in range(k):
-                total -= row[i] * other[i]
-            row[k] = total / other[k]
-        total = row[j]
+        pivot = 1.0 / math.sqrt(max(row[j], 1e-12))
+        for k in range(j + 1):
+            row[k] *= pivot
+        vector[j] *= pivot
         for i in range(j):
-            total -= row[i] * row[i]
-        row[j] = math.sqrt(max(total, 1e-12))
+            factor = row[i]
+            if factor != 0.0:
+                vector[i] -= factor * vector[j]
+                other = matrix[i]
+                for k in range(i + 1):
+                    other[k] -= factor * row[k]
+    for j in range(n):
         total = vector[j]
+        row = matrix[j]
         for i in range(j):
             total -= row[i] * vector[i]
         vector[j] = total / row[j]
-    for j in range(n - 1, -1, -1):
-        vector[j] /= matrix[j, j]
-        for i in range(j):
-            vector[i] -= matrix[j, i] * vector[j]
 
 
 @jit
@@ -316,7 +365,7 @@ def fit_poses(
     """Move poses (n, 66) at `places` (n, 3) by a step for each of `reaches`, metres, towards the contours of all views.
 
     First come the fields of `Chain`, then radii, cameras, and the fields of `FrameContours`. Angles are pulled to
-    `means` (n, 66), and places to where they were, with `precisions` (69,); no angle turns by more than `most` a step.
+    `means` (n, 66), and places to where they were, with `precisions` (69,), of a place and a pose; no angle turns by more than `most` a step.
     """
     chain = Chain(parents, angles, turns, turned, offsets)
     frames = empty_frames(parents.size + 1)
@@ -337,11 +386,11 @@ def fit_poses(
             _write_screws(chain, frames, sines, cosines, screws)
             _add_up(chain, screws, curves, forces, matrix, slopes)
             for a in range(NUMBERS):
-                off = poses[n, a] - means[n, a] if a < ANGLES else places[n, a - ANGLES] - start[a - ANGLES]
+                off = places[n, a] - start[a] if a < 3 else poses[n, a - 3] - means[n, a - 3]
                 matrix[a, a] += precisions[a]
                 slopes[a] += precisions[a] * off
             _solve(matrix, slopes)
-            for a in range(ANGLES):
-                poses[n, a] -= min(max(slopes[a], -most), most)
             for a in range(3):
-                places[n, a] -= slopes[ANGLES + a]
+                places[n, a] -= slopes[a]
+            for a in range(ANGLES):
+                poses[n, a] -= min(max(slopes[3 + a], -most), most)

@@ -14,10 +14,10 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.tracking.smoothing.contours import Distances, MaskContours
 from posefit_exemplars import contour_kernels
 
-EVERY = 3  # points of a mask's border, of which one is looked at
+SPACING = 0.04  # metres, about, between two points of a mask's border
 MAX_TURN = np.radians(20.0)  # of an angle in a step
 RIGID = 1e9  # precision of an angle that the person has not
-SHARE = 40.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures
+SHARE = 27.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,8 @@ class FrameContours:
     def of(cls, cameras: Sequence[Camera], observation: Observation, place: Array) -> Self:
         """Return the borders in one frame, of a person whose root is about at `place` (3,)."""
         views = [MaskContours.of(camera, number, [observation], place[None]) for number, camera in enumerate(cameras)]
-        points = [view.points[::EVERY] for view in views]
+        every = [max(round(SPACING * view.metres[0] / view.step), 1) for view in views]
+        points = [view.points[::skipped] for view, skipped in zip(views, every, strict=True)]
         fields = np.zeros((len(views), *np.max([view.fields.shape[1:] for view in views], axis=0)), dtype=np.float32)
         for whole, view in zip(fields, views, strict=True):
             whole[: view.fields.shape[1], : view.fields.shape[2]] = view.fields[0]
@@ -49,7 +50,7 @@ class FrameContours:
             np.concatenate([view.sizes for view in views]).astype(np.int64),
             writeable(np.concatenate(points)),
             np.cumsum([0, *map(len, points)]),
-            np.array([EVERY * view.step for view in views]),
+            np.array([view.step * skipped for view, skipped in zip(views, every, strict=True)]),
         )
 
     def fitted(
@@ -58,10 +59,10 @@ class FrameContours:
         """Return poses (n, 66) and places (n, 3) after a step for each of `scales`.
 
         A distance of contours counts less beyond that many metres. An angle is pulled to its mean, of `means` (n, 66),
-        and the place to where it was, with `precisions` (69,): of the angles, then of the place.
+        and the place to where it was, with `precisions` (69,): of the place, then of the angles.
         """
         free = task.body.skeleton.free
-        precisions = np.where(np.append(free, [True] * 3), precisions, RIGID)
+        precisions = np.where(np.append([True] * 3, free), precisions, RIGID)
         moved, places = poses.copy(), places.copy()
         contour_kernels.fit_poses(
             *task.body.skeleton.chain,
@@ -84,5 +85,5 @@ class FrameContours:
 
 
 def precisions(turn: float, shift: float) -> Array:
-    """Return the precisions (69,) of angles with a standard deviation of `turn`, radians, and of a place, metres."""
-    return np.concatenate([np.full(ANGLES, turn**-2.0), np.full(3, shift**-2.0)])
+    """Return the precisions (69,) of a place and of angles with standard deviations, metres and radians."""
+    return np.concatenate([np.full(3, shift**-2.0), np.full(ANGLES, turn**-2.0)])

@@ -4,7 +4,7 @@ Poses are compared by codes: a few numbers a pose.
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -35,11 +35,11 @@ class Coding:
     axes: Array = field(repr=False)  # (81, D)
 
     @classmethod
-    def of(cls, skeleton: Skeleton, clips: Iterable[Array]) -> Self:
-        """Return the components of the poses (K, 66) of all clips, one after the other."""
+    def of(cls, skeleton: Skeleton, clips: Iterable[Codes]) -> Self:
+        """Return the components of the `facing_joints` (K, 81) of all clips, one after the other."""
         count, total, squares = 0, np.zeros(3 * len(JOINTS)), np.zeros((3 * len(JOINTS), 3 * len(JOINTS)))
-        for poses in clips:
-            joints = _facing(skeleton, poses)
+        for faced in clips:
+            joints = faced.astype(np.float64)
             count, total, squares = count + len(joints), total + joints.sum(axis=0), squares + joints.T @ joints
         mean = total / count
         _, axes = np.linalg.eigh(squares - count * np.outer(mean, mean))
@@ -47,13 +47,18 @@ class Coding:
 
     def coded(self, poses: Array) -> Codes:
         """Return the codes (K, D) of poses (K, 66)."""
-        return np.asarray((_facing(self.skeleton, poses) - self.mean) @ self.axes, dtype=np.float32)
+        return self.of_joints(facing_joints(self.skeleton, poses))
+
+    def of_joints(self, joints: Codes) -> Codes:
+        """Return the codes (K, D) of `facing_joints` (K, 81)."""
+        return np.asarray((joints - self.mean) @ self.axes, dtype=np.float32)
 
 
-def _facing(skeleton: Skeleton, poses: Array) -> Array:
+def facing_joints(skeleton: Skeleton, poses: Array) -> Codes:
+    """Return the joints (K, 81) of poses (K, 66) that are turned to yaw 0, metres."""
     facing = poses.copy()
     facing[:, 0] = 0.0
-    return np.asarray(skeleton.joints(facing).reshape(len(poses), -1))
+    return skeleton.joints(facing).reshape(len(poses), -1).astype(np.float32)
 
 
 def thinned_frames(codes: Codes) -> Rows:
@@ -117,21 +122,23 @@ class Exemplars:
             if len(motion) < 2:
                 raise InputError(f"{motion.name} must have at least 2 frames to be followed, got 1")
 
-        def sources() -> Iterator[Motion]:
-            yield from motions
-            if mirrored:
-                yield from map(mirror_image, motions)  # made when needed: all at once would be large
-
-        coding = Coding.of(skeleton, (motion.poses for motion in sources()))
+        faced = [facing_joints(skeleton, motion.poses) for motion in motions]
+        if mirrored:
+            faced += [facing_joints(skeleton, mirror_image(motion).poses) for motion in motions]
+        coding = Coding.of(skeleton, faced)
         thinned: list[tuple[Array, Codes, Array, Array]] = []
-        for motion in sources():
-            codes = coding.coded(motion.poses)
+        for number, joints in enumerate(faced):
+            motion, codes = motions[number % len(motions)], coding.of_joints(joints)
             rows = thinned_frames(codes)
-            thinned.append((motion.poses[rows], codes[rows], motion.translations[rows], rows / motion.fps))
+            times = rows / motion.fps
+            motion = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
+            if number >= len(motions):
+                motion = mirror_image(motion)
+            thinned.append((motion.poses, codes[rows], motion.translations, times))
         poses, codes, paths, times = (np.concatenate(parts) for parts in zip(*thinned, strict=True))
         clips = np.repeat(np.arange(len(thinned)), [len(frames) for frames, *_ in thinned])
         centres, owners = groups(codes, GROUPS)
-        kinds = np.argmin([((codes - codes[centre]) ** 2).sum(axis=1) for centre in centres[:KINDS]], axis=0)
+        _, kinds = groups(codes, KINDS)
         members = np.argsort(owners, kind="stable")
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(thinned)), "right") - 1

@@ -176,7 +176,7 @@ class HypothesisFilter:
         """Return the hypotheses of a frame, and the evaluations that they took."""
         look, task, latest, used = frame.look, self._task, None if before is None else before.beam, 0.0
         contours = look.contours(frame.place) if look.usable else None
-        poses, places = self._fresh(frame)
+        poses, places = self._fresh(frame, latest)
         noise = self._noise(look, poses, places)
         weights = precisions(TURN / noise, ALIGNED_SHIFT if look.root is None else KNOWN_SHIFT)
         if contours is not None:
@@ -225,25 +225,33 @@ class HypothesisFilter:
             self._costs.append(FITTED_COST * float(look.full(poses, places).min()))
         return max(float(np.quantile(self._costs or [0.0], BEST)) / CLEAN_COST, 1.0)
 
-    def _fresh(self, frame: Estimate) -> tuple[Array, Array]:
-        """Return the poses (n, 66) and places (n, 3) of the path, of unlike states, and of their reflections."""
+    def _fresh(self, frame: Estimate, latest: Hypotheses | None) -> tuple[Array, Array]:
+        """Return the poses (n, 66) and places (n, 3) of the path, of unlike states, and reflections of the likeliest.
+
+        Before any is known, the path and the states are reflected.
+        """
         poses, places = frame.pose[None], frame.place[None]
         if frame.others is not None:
             poses, places = np.concatenate([poses, frame.others[0]]), np.concatenate([places, frame.others[1]])
-        if not frame.look.usable or not self._reflected:
+        left = self.fresh - len(poses)
+        if not frame.look.usable or left <= 0:
             return poses, places
-        first = poses[: -(-self._reflected // frame.look.cameras)]
-        reflected = frame.look.reflected(first, frame.place)[: self._reflected]
-        beside = np.resize(places[: len(first)], (len(reflected), 3))
+        first, beside = poses, places
+        if latest is not None:
+            going = self._unlike(latest)
+            first, beside = latest.poses[going] + latest.turns[going], latest.places[going] + latest.shifts[going]
+        first = first[: -(-left // frame.look.cameras)]
+        reflected = frame.look.reflected(first, frame.place)[:left]
+        beside = np.resize(beside[: len(first)], (len(reflected), 3))
         return np.concatenate([poses, reflected]), np.concatenate([places, beside])
 
     def _pulled(self, poses: Array, weights: Array, noise: float) -> tuple[Array, Array]:
         """Return what poses (n, 66) are pulled to, between themselves and similar poses of clips, and how (69,)."""
         pulls = precisions(LIBRARY_TURN / noise, np.inf)
-        pulls[0] = 0.0  # the yaws of clips are free
+        pulls[3] = 0.0  # the yaws of clips are free
         similar, _ = self._exemplars.similar(poses, SIMILAR_POSES, SIMILAR)
         both = weights + pulls
-        return poses + (pulls / both)[: poses.shape[1]] * (similar - poses), both
+        return poses + (pulls / both)[3:] * (similar - poses), both
 
     def _unlike(self, latest: Hypotheses) -> Rows:
         """Return the hypotheses that go on: the likeliest so far, of those that are near each other one."""

@@ -16,6 +16,8 @@ from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
+from posefit.tracking.method import Method, prepare
+from posefit.tracking.options import TrackOptions
 from posefit_exemplars import hypotheses
 from posefit_exemplars.beam import (
     TURN,
@@ -83,6 +85,8 @@ class ExemplarTracker:
         pace: distance of a known root from where its clip goes on, metres; above 0.
         lag: later frames that are used before a pose is reported, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
+        path: who proposes the pose that a frame's hypotheses begin with: "clips", or a method such as "sapso@pca", which
+            has the beam's evaluations; it needs hypotheses.
         fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
@@ -103,6 +107,7 @@ class ExemplarTracker:
         pace: float = 0.008,
         lag: int = 20,
         mirrored: bool = True,
+        path: str = "clips",
         fitted: bool = True,
         smoothing: float = 1.0,
         transitions: str = "clips",
@@ -133,16 +138,24 @@ class ExemplarTracker:
         self.hypotheses: hypotheses.HypothesisFilter | None = None
         self.samples, self.power = samples, temperature / posterior_temperature  # of likelihoods in the posterior
         share = FITTED * task.evaluations
+        self.proposer: Method | None = None
         if fitted and share >= hypotheses.MIN_EVALUATIONS:
             self.evaluations -= share
-            delay = (lag - self.ahead) // 2
+            delay = lag - self.ahead
+            if path == "clips":
+                delay //= 2
+            else:
+                self.proposer = prepare(TrackOptions(method=path), self._proposing)
             self.hypotheses = hypotheses.HypothesisFilter(
                 task, self.exemplars, self.steps, self.temperature, share, delay, samples, self.power
             )
+        elif path != "clips":
+            least = math.ceil(hypotheses.MIN_EVALUATIONS / FITTED)
+            raise InputError(f"path {path} needs hypotheses: fitted, and evaluations of at least {least}")
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        estimates = self._path(observations, rng)
+        estimates = self._path(observations, rng) if self.proposer is None else self._proposed(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
         frames = smoothed(estimates, self.smoothing, self.ahead)
@@ -167,6 +180,24 @@ class ExemplarTracker:
                 yield self._estimated(waiting, sampler)
         while waiting:
             yield self._estimated(waiting, sampler)
+
+    @property
+    def _proposing(self) -> Task:
+        return replace(self.task, evaluations=int(self.evaluations))
+
+    def _proposed(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
+        """Yield the estimate of each frame by another method."""
+        assert self.proposer is not None
+        looks: deque[FrameCosts] = deque()
+
+        def seen() -> Iterator[Observation]:
+            for observation in observations:
+                looks.append(FrameCosts(self.task, observation))
+                yield observation
+
+        for frame in self.proposer.follow(self._proposing, seen(), rng):
+            effort = frame.evaluations, frame.seconds, frame.cpu_seconds or 0.0
+            yield Estimate(frame.pose, frame.translation, looks.popleft(), *effort)
 
     def _evaluated(
         self, look: FrameCosts, before: FrameStates[Beam] | None, rng: np.random.Generator

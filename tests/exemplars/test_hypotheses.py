@@ -101,3 +101,12 @@ def test_hypotheses_are_as_many_as_the_budget_allows(walker: Walk) -> None:
     assert few.hypotheses.going < many.hypotheses.going
     assert ExemplarTracker(replace(walker.task, evaluations=600)).hypotheses is None  # too few: the path alone
     assert ExemplarTracker(walker.task, fitted=False).hypotheses is None
+
+
+def test_hypotheses_may_begin_with_the_poses_of_another_method(walker: Walk) -> None:
+    tracker = ExemplarTracker(replace(walker.task, evaluations=BUDGET), path="cma@pca")
+    frames = list(tracker.track(walker.observations[:6], np.random.default_rng(0)))
+    assert len(frames) == 6
+    assert all(frame.evaluations <= BUDGET for frame in frames)
+    # from wherever that method is, fits and reflections come to the mask
+    assert np.mean([frame.cost for frame in frames]) < 3.0

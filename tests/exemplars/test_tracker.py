@@ -94,6 +94,7 @@ def test_an_interrupted_track_is_continued(walker: Walk, seed: int) -> None:
             "transitions=none.such:costs",
             "transitions must be clips or MODULE:FUNCTION that can be imported, got none.such:costs",
         ),
+        ("path=nothing@pca", "optimiser must be one of annealed"),
         ("transitions=math:tau", "transitions must name a function, got math:tau, which is a float"),
     ],
 )
@@ -224,7 +225,7 @@ def sampled_poses(frames: list[Frame]) -> Array:
 def test_a_greater_posterior_temperature_spreads_the_samples(walker: Walk) -> None:
     spreads = [
         sampled_poses(walker.track(0, 8, samples=40, posterior_temperature=temperature, **QUICK)).std(axis=1).mean()
-        for temperature in (0.5, 4.0, 32.0)
+        for temperature in (0.1, 0.5, 4.0)
     ]
     assert spreads == sorted(set(spreads))
 
