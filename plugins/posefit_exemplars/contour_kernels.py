@@ -365,7 +365,8 @@ def fit_poses(
     """Move poses (n, 66) at `places` (n, 3) by a step for each of `reaches`, metres, towards the contours of all views.
 
     First come the fields of `Chain`, then radii, cameras, and the fields of `FrameContours`. Angles are pulled to
-    `means` (n, 66), and places to where they were, with `precisions` (69,), of a place and a pose; no angle turns by more than `most` a step.
+    `means` (n, 66), and places to where they were, with `precisions` (69,), of a place and a pose; no angle turns by
+    more than `most` a step.
     """
     chain = Chain(parents, angles, turns, turned, offsets)
     frames = empty_frames(parents.size + 1)

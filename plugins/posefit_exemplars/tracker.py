@@ -85,8 +85,7 @@ class ExemplarTracker:
         pace: distance of a known root from where its clip goes on, metres; above 0.
         lag: later frames that are used before a pose is reported, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
-        path: who proposes the pose that a frame's hypotheses begin with: "clips", or a method such as "sapso@pca", which
-            has the beam's evaluations; it needs hypotheses.
+        path: whose pose the hypotheses of a frame begin with: "clips", or a method such as "sapso@pca" in their place.
         fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.

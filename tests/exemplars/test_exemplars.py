@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefit.arrays import Array
 from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
