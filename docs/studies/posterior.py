@@ -58,6 +58,14 @@ MORE = {
 MAX_CLIPS = 4  # of a person
 
 
+# masks and a body as cameras and their owners give them
+HARD: Mapping[str, Any] = {
+    "translation": "aligned",
+    "body_off_percent": 10.0,
+    "corruption": {"holes": 0.3, "blobs": 0.3, "jitter": 0.3, "dropped": 0.1},
+}
+
+
 class Case(NamedTuple):
     """One track: its clip, views and method."""
 
@@ -68,6 +76,7 @@ class Case(NamedTuple):
     frames: int
     method: str = METHOD
     temperature: float = TEMPERATURE
+    hard: bool = False
 
     @property
     def spec(self) -> dict[str, Any]:
@@ -75,6 +84,7 @@ class Case(NamedTuple):
         own = {"exemplars.posterior_temperature": self.temperature}
         settings = own if self.method == METHOD else dict(OTHERS[self.method])
         fields = {"method": self.method, "translation": self.translation, "settings": settings}
+        fields |= HARD if self.hard else {}
         return cell_fields(self.clip, self.views, self.frames, **fields)
 
 
@@ -102,6 +112,7 @@ def planned_tracks(quick: bool) -> tuple[list[Case], list[Case]]:
         if not quick:
             last = (PAIRS[k // 2 % len(PAIRS)], "known") if k % 2 else (sides[0], "aligned")
             tracks.append(Case(group, clip, *last, frames))
+            tracks.append(Case(group, clip, PAIRS[k // 2 % 2] if k % 2 else sides[1], "aligned", frames, hard=True))
         base += tracks
         few = min(frames, 20)
         others += [tracks[0]._replace(method=method, frames=few, temperature=0.0) for method in OTHERS]

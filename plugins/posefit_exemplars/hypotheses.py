@@ -7,8 +7,9 @@ the contours by a few steps of Gauss and Newton, which may turn every joint. A h
 does, and its distance from the poses of clips; a step costs the distance of the trunk and of each limb from where they
 were going. The likeliest sequence is Viterbi's: what is wrong may fit one frame, but hardly ever twenty.
 
-Masks of a camera and a fitted body are less precise than clean ones. Where even the best frames cost more, contours
-count for less against the poses that a fit begins with and those of clips.
+Masks of a camera and a fitted body are less precise than clean ones. Where even the best frames cost more, the contours
+of a single view count for less against the poses that a fit begins with and those of clips: nothing else keeps a body
+from leaning to where the mask is wrong.
 
 After Sminchisescu and Triggs, Kinematic jump processes for monocular 3D human tracking, 2003.
 """
@@ -219,8 +220,10 @@ class HypothesisFilter:
     def _noise(self, look: FrameCosts, poses: Array, places: Array) -> float:
         """Return how many times less precise masks are than clean ones, 1 or more, by the best frames so far.
 
-        Before the first, what its hypotheses' poses (n, 66) at places (n, 3) cost tells.
+        Before the first, what its hypotheses' poses (n, 66) at places (n, 3) cost tells. With several cameras it is 1.
         """
+        if look.cameras > 1:
+            return 1.0
         if look.usable and not self._costs:
             self._costs.append(FITTED_COST * float(look.full(poses, places).min()))
         return max(float(np.quantile(self._costs or [0.0], BEST)) / CLEAN_COST, 1.0)
