@@ -3,6 +3,7 @@
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
@@ -53,6 +54,12 @@ class FrameCosts:
     def full(self, poses: Array, places: Array) -> Array:
         """Return the costs (n,) of poses."""
         return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
+
+    def told(self, poses: Array, places: Array) -> Array:
+        """Return how unlikely poses make the frame's landmarks (n,): 0 where there are none."""
+        if self._observation.landmarks is None:
+            return np.zeros(len(poses))
+        return landmark_costs(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
 
     def contours(self, place: Array) -> FrameContours:
         """Return the contours of the masks, of a person whose root is about at `place` (3,)."""

@@ -226,7 +226,8 @@ class ExemplarTracker:
         used = (looked + len(beam)) * look.share
         best = diverse_best(self.exemplars, beam, totals, full)
         beam = beam.chosen(best)
-        fits = away[best] + look.full(self._poses(beam), beam.places) / self.temperature
+        poses = self._poses(beam)
+        fits = away[best] + look.full(poses, beam.places) / self.temperature + look.told(poses, beam.places)
         used += len(beam)
         best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used

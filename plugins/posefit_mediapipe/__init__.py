@@ -22,13 +22,18 @@ from typing import Any
 import numpy as np
 
 from posefit import hookimpl
+from posefit.arrays import Array
 from posefit.fitting.check import between
+from posefit.geometry.skeleton import JOINTS
 from posefit.hooks import RegisterSegmenter
 from posefit.silhouette.foreground import Footage, Image
 from posefit.silhouette.mask import Mask
 
 LEFT, RIGHT = (11, 23), (12, 24)  # shoulder and hip, in the model's numbers; x goes to the right, and z away
 SIDES = (1.0, 1.0, -1.0, -1.0)
+# bones at whose ends the model sees a joint, in its numbers: those of the left, then 1 more for the right
+_LEFT_SEEN = {"clavicle": 11, "humerus": 13, "radius": 15, "hipjoint": 23, "femur": 25, "tibia": 27, "toes": 31}
+SEEN = {f"{side}{bone}": number + k for k, side in enumerate("lr") for bone, number in _LEFT_SEEN.items()}
 
 
 class MediaPipe:
@@ -47,6 +52,7 @@ class MediaPipe:
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold
         self.facing = math.nan  # in the latest picture: by the model's shoulders and hips
+        self.landmarks = np.zeros((len(JOINTS), 3))  # in the latest picture
         self._model = _model(confidence)
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:
@@ -56,6 +62,7 @@ class MediaPipe:
             warnings.simplefilter("ignore")
             result = self._model.process(np.ascontiguousarray(image[..., ::-1]))
         soft, self.facing = result.segmentation_mask, _facing(result.pose_world_landmarks)
+        self.landmarks = _landmarks(result.pose_landmarks, image.shape[:2])
         return (empty if soft is None else np.asarray(soft > self._threshold)), empty.copy()
 
 
@@ -66,6 +73,16 @@ def _facing(landmarks: Any) -> float:
     points = [landmarks.landmark[k] for k in (*LEFT, *RIGHT)]
     across, away = (sum(getattr(p, axis) * sign for p, sign in zip(points, SIDES, strict=True)) for axis in "xz")
     return math.atan2(away, across)
+
+
+def _landmarks(landmarks: Any, shape: tuple[int, ...]) -> Array:
+    """Return where the model sees joints (27, 3), as `Segmenter.landmarks`, in a picture of a shape."""
+    told = np.zeros((len(JOINTS), 3))
+    if landmarks is not None:
+        for joint, k in SEEN.items():
+            point = landmarks.landmark[k]
+            told[JOINTS.index(joint)] = point.x * shape[1], point.y * shape[0], point.visibility
+    return told
 
 
 def _model(confidence: float) -> Any:

@@ -39,6 +39,8 @@ class Observation:
     translation: Array | None = None  # (3,) metres
     usable: bool = True  # False: it shows too little to learn from, and a tracker holds its pose
     yaw: float | None = None  # radians: about which way the person faces; None where it is unknown
+    # (V, 27, 3) where joints were seen: column and row, pixels, and confidence, 0 to 1; None where nobody says
+    landmarks: Array | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,9 @@ def extract(
 ) -> dict[str, Any]:
     """Return a summary of a video's masks, and write them, a preview and a report to a new folder.
 
-    masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`. The folder appears whole or not at
-    all. Raises InputError for every mistake in arguments or files, where no frame shows a person, and on a full disk.
+    masks.npz holds `masks` and `valid` (T, height, width), `usable` (T,) and `fps`, and `landmarks` (T, 27, 3) where a
+    segmenter gives any, see `Segmenter`. The folder appears whole or not at all. Raises InputError for every mistake
+    in arguments or files, where no frame shows a person, and on a full disk.
     """
     target = Path(out)
     check_new(target)
@@ -56,7 +57,10 @@ def _write_npz(path: Path, masks: PackedMasks) -> None:
                 np.lib.format.write_array_header_1_0(member, header)
                 for k in range(len(masks)):
                     member.write(getattr(masks.silhouette(k), attribute).astype(np.uint8).tobytes())
-        for name, value in (("usable", masks.usable), ("fps", np.array(masks.fps))):
+        rest = {"usable": masks.usable, "fps": np.array(masks.fps), "landmarks": masks.landmarks}
+        for name, value in rest.items():
+            if value is None:
+                continue
             with archive.open(f"{name}.npy", "w") as member:
                 np.lib.format.write_array(member, value)
 

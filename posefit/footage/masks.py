@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
+from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.silhouette.mask import Silhouette
 
@@ -31,6 +32,7 @@ class PackedMasks:
     valid: Planes | None = field(repr=False)  # which pixels are known; None where all are
     usable: NDArray[np.bool_] = field(repr=False)  # (T,) whether a frame shows enough of the person to be searched
     fps: float | None = None  # None where the source does not state it
+    landmarks: Array | None = field(default=None, repr=False)  # (T, 27, 3), see `Segmenter`; None where there are none
 
     def __len__(self) -> int:
         return len(self.masks)
@@ -85,7 +87,11 @@ class Views(Sequence[Observation]):
         silhouettes = [self._silhouette(masks, k) for masks in self.masks]
         usable = any(masks.usable[k] for masks in self.masks)
         known = k < len(self.yaws) and np.isfinite(self.yaws[k])
-        return Observation(silhouettes, usable=usable, yaw=float(self.yaws[k]) if known else None)
+        landmarks = None
+        if any(masks.landmarks is not None for masks in self.masks):
+            unseen = np.zeros((len(JOINTS), 3))
+            landmarks = np.array([unseen if one.landmarks is None else one.landmarks[k] for one in self.masks])
+        return Observation(silhouettes, None, usable, float(self.yaws[k]) if known else None, landmarks)
 
     @cached_property
     def first(self) -> int:

@@ -22,6 +22,7 @@ from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import FORMATS, PIXELS, is_colourful, read_values
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
+from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
 from posefit.reading import quoted
 from posefit.silhouette.mask import Mask
@@ -31,7 +32,7 @@ NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
 SPOOLED = 64_000_000  # bytes of compressed values that are kept in memory; more are on the disk
 PACKED = 2_000_000_000  # bytes of an .npz file
 MAX_FPS = 1000.0
-NAMES = ("masks", "valid", "usable", "fps")
+NAMES = ("masks", "valid", "usable", "fps", "landmarks")
 
 FEW_VALUES = 64  # masks with more values are soft
 COUNTED_VALUES = 4_096
@@ -129,7 +130,10 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     masks = _pack(stack, start, stop, _stack_classifier(name, stack, start, stop, label))
     valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
     names = [f"{name}[{k}]" for k in range(start, stop)]
-    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps)
+    landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
+    if landmarks is not None and not np.isfinite(landmarks).all():
+        raise InputError(f"{name}: landmarks must be finite, got nan or infinity")
+    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks)
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
@@ -154,6 +158,7 @@ def _checked_stack(name: str, arrays: Mapping[str, Stored | NDArray[Any]]) -> St
     others: dict[str, tuple[tuple[int, ...], str, str]] = {
         "valid": (shape, "bui", f"have the masks' shape {quoted(shape)}"),
         "usable": (shape[:1], "b", f"be {shape[0]} booleans"),
+        "landmarks": ((shape[0], len(JOINTS), 3), "f", f"be of shape {shape[0], len(JOINTS), 3}"),
         "fps": ((), "iuf", f"be a number up to {MAX_FPS:g}"),
     }
     for key, (wanted, kinds, expected) in others.items():

@@ -18,6 +18,7 @@ from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span
 from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
+from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
@@ -158,6 +159,7 @@ class Segmentation:
         self._segmenter = how.segmenter(self._film) if self._given else None  # a background is checked now
         self._shifts: list[float] = []
         self._facings: list[float] = []  # of each frame, as `Segmenter.facing`; NaN where unknown
+        self._landmarks: list[Array] = []  # of each frame, as `Segmenter.landmarks`, in scaled pixels
         self._middles: list[float] = []  # of the mask's pixels in each frame, from the left; NaN where it is empty
 
     def __len__(self) -> int:
@@ -181,6 +183,7 @@ class Segmentation:
                 self._shifts.append(motion.shift(image))
             result, row = self.person(segmenter, image, quality, self.start + k)
             self._facings.append(float(getattr(segmenter, "facing", math.nan)))
+            self._remember_landmarks(getattr(segmenter, "landmarks", None))
             self._middles.append(
                 float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
             )
@@ -195,7 +198,8 @@ class Segmentation:
             raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
         count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
-        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps)
+        landmarks = np.array(self._landmarks) if self._landmarks else None
+        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, landmarks)
 
     def learned(self) -> Segmenter:
         """Return the segmenter, which has learned the background."""
@@ -222,6 +226,19 @@ class Segmentation:
         whole = np.zeros((2, *image.shape[:2]), dtype=bool)
         whole[:, y : y + tall, x : x + wide] = planes
         return whole[0], whole[1]
+
+    def _remember_landmarks(self, landmarks: Any) -> None:
+        """Keep a segmenter's landmarks of the latest frame, at their place in the whole frame."""
+        if landmarks is None:
+            return
+        given = np.array(landmarks, dtype=np.float64)
+        if given.shape != (len(JOINTS), 3) or not np.isfinite(given).all() or given[:, 2].min() < 0.0:
+            raise BrokenRuleError(
+                f"segmenter {self.method!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
+                f"confidence 0 or more, got shape {given.shape}"
+            )
+        given[:, :2] += self._film.part[:2]
+        self._landmarks.append(given)
 
     @property
     def facings(self) -> Array:

@@ -88,6 +88,15 @@ class Calibration:
             )
         return cv2.initUndistortRectifyMap(matrix, self.distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
 
+    def straightened(self, points: Array, size: tuple[int, int]) -> Array:
+        """Return points (..., 3), columns and rows of pictures scaled to `size` and a third number, undistorted."""
+        camera = self.camera(size, np.eye(3))
+        matrix = _pinhole(camera.focal, camera.centre - HALF)
+        bent = points[..., :2].reshape(-1, 1, 2).astype(np.float64) - HALF
+        undistort = cv2.fisheye.undistortPoints if self.fisheye else cv2.undistortPoints
+        straight = undistort(bent, matrix, self.distortion[: 4 if self.fisheye else None], P=matrix) + HALF
+        return np.concatenate([straight.reshape(*points.shape[:-1], 2), points[..., 2:]], axis=-1)
+
 
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
