@@ -10,7 +10,6 @@ import math
 import numpy as np
 
 from posefit.arrays import inlined, jit
-from posefit.fitting.landmarks import DEVIATION, EXCHANGED
 from posefit.geometry.kernels import Chain, empty_frames, place_frames
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
@@ -173,44 +172,7 @@ def _pull(drawn, field, corner, size, points, step, scale, blocks, slopes):
 
 
 @jit
-def _add_landmarks(frames, centres, ways, scales, landmarks, reach, curves, forces):
-    """Add the squares of what joints are off landmarks, of their own or the other side's, by how likely each is.
-
-    A distance beyond `reach` counts less, as one beyond `DEVIATION` does in the end.
-    """
-    seen, groups, others = landmarks
-    off = np.zeros((groups.max() + 1, 2))
-    for j in range(groups.size):
-        if groups[j] >= 0:
-            for k in range(2):
-                t = others[j] if k == 1 else j
-                square = (centres[j, 0] - seen[t, 0]) ** 2 + (centres[j, 1] - seen[t, 1]) ** 2
-                off[groups[j], k] += seen[t, 2] * math.log1p(0.5 * square / (scales[j] * DEVIATION) ** 2)
-    row = np.empty(6)
-    for j in range(groups.size):
-        if groups[j] < 0:
-            continue
-        exchanged = EXCHANGED / (EXCHANGED + (1.0 - EXCHANGED) * math.exp(off[groups[j], 1] - off[groups[j], 0]))
-        x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
-        for k in range(2):
-            t = others[j] if k == 1 else j
-            if seen[t, 2] == 0.0:
-                continue
-            away = centres[j, 0] - seen[t, 0], centres[j, 1] - seen[t, 1]
-            weight = (exchanged if k == 1 else 1.0 - exchanged) * seen[t, 2] / (scales[j] * DEVIATION) ** 2
-            weight /= 1.0 + 0.5 * (away[0] ** 2 + away[1] ** 2) / (scales[j] * max(reach, DEVIATION)) ** 2
-            for i in range(2):
-                mx, my, mz = ways[j, i, 0], ways[j, i, 1], ways[j, i, 2]
-                row[0], row[1], row[2] = mx, my, mz
-                row[3], row[4], row[5] = y * mz - z * my, z * mx - x * mz, x * my - y * mx
-                for a in range(6):
-                    forces[j, a] += weight * away[i] * row[a]
-                    for b in range(6):
-                        curves[j, a, b] += weight * row[a] * row[b]
-
-
-@jit
-def _add_view(chain, radii, camera, frames, contour, landmarks, reach, curves, forces):
+def _add_view(chain, radii, camera, frames, contour, reach, curves, forces):
     """Add the squares of one view to those of the bones: curves (27, 6, 6) and forces (27, 6), over twists."""
     rotation, translation, focal, centre = camera
     field, corner, size, points, step = contour
@@ -229,7 +191,6 @@ def _add_view(chain, radii, camera, frames, contour, landmarks, reach, curves, f
             ways[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
             ways[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
             ways[j, 2, i] = -depth[j] / c * rotation[2, i]
-    _add_landmarks(frames, centres, ways, depth, landmarks, reach, curves, forces)
     metres = depth[0]  # pixels of one, where the root is
     for b in range(bones):
         wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
@@ -394,9 +355,6 @@ def fit_poses(
     points,
     starts,
     steps,
-    landmarks,
-    groups,
-    others,
     means,
     precisions,
     most,
@@ -425,8 +383,7 @@ def fit_poses(
                 if starts[v] < starts[v + 1]:
                     camera = rotations[v], translations[v], focals[v], centres[v]
                     contour = fields[v], corners[v], sizes[v], points[starts[v] : starts[v + 1]], steps[v]
-                    seen = landmarks[v], groups, others
-                    _add_view(chain, radii, camera, frames, contour, seen, reach, curves, forces)
+                    _add_view(chain, radii, camera, frames, contour, reach, curves, forces)
             _write_screws(chain, frames, sines, cosines, screws)
             _add_up(chain, screws, curves, forces, matrix, slopes)
             for a in range(NUMBERS):

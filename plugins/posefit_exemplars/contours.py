@@ -8,18 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.fitting.landmarks import GROUPS, OTHERS
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.geometry.skeleton import ANGLES
 from posefit.tracking.smoothing.contours import Distances, MaskContours
 from posefit_exemplars import contour_kernels
 
 SPACING = 0.04  # metres, about, between two points of a mask's border
 MAX_TURN = np.radians(20.0)  # of an angle in a step
 RIGID = 1e9  # precision of an angle that the person has not
-# (27,) the number of the group of landmarks that a joint is in, -1 for none
-_GROUP_OF = np.array([next((k for k, group in enumerate(GROUPS) if j in group), -1) for j in range(len(JOINTS))])
 SHARE = 27.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures
 
 
@@ -34,7 +31,6 @@ class FrameContours:
     points: Array = field(repr=False)  # (n, 2)
     starts: NDArray[np.int64] = field(repr=False)  # (V + 1,)
     steps: Array = field(repr=False)  # (V,) pixels that a point stands for
-    landmarks: Array = field(repr=False)  # (V, 27, 3): column and row, pixels, and confidence
 
     @classmethod
     def of(cls, cameras: Sequence[Camera], observation: Observation, place: Array) -> Self:
@@ -45,11 +41,6 @@ class FrameContours:
         fields = np.zeros((len(views), *np.max([view.fields.shape[1:] for view in views], axis=0)), dtype=np.float32)
         for whole, view in zip(fields, views, strict=True):
             whole[: view.fields.shape[1], : view.fields.shape[2]] = view.fields[0]
-        landmarks = np.zeros((len(views), len(JOINTS), 3))
-        if observation.landmarks is not None:
-            scales = [view.camera.focal[0] / camera.focal[0] for view, camera in zip(views, cameras, strict=True)]
-            landmarks[:] = observation.landmarks
-            landmarks[..., :2] *= np.reshape(scales, (-1, 1, 1))
         names = "rotation", "translation", "focal", "centre"
         arrays = [np.array([getattr(view.camera, name) for view in views], dtype=np.float64) for name in names]
         return cls(
@@ -60,7 +51,6 @@ class FrameContours:
             writeable(np.concatenate(points)),
             np.cumsum([0, *map(len, points)]),
             np.array([view.step * skipped for view, skipped in zip(views, every, strict=True)]),
-            landmarks,
         )
 
     def fitted(
@@ -84,9 +74,6 @@ class FrameContours:
             self.points,
             self.starts,
             self.steps,
-            self.landmarks,
-            _GROUP_OF,
-            OTHERS,
             writeable(means),
             precisions,
             MAX_TURN,

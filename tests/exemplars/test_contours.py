@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.fitting.landmarks import landmark_costs
-from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.tracking.smoothing import contours, kernels
 from posefit_exemplars.contours import SPACING, FrameContours, precisions
@@ -88,48 +87,3 @@ def test_without_a_contour_a_pose_goes_to_its_mean(walker: Walk) -> None:
     moved, shifted = frame.fitted(walker.task, poses, places, poses[::-1], LOOSE, (0.09,))
     np.testing.assert_allclose(moved, poses[::-1], atol=1e-9)
     np.testing.assert_allclose(shifted, places, atol=1e-12)
-
-
-def told_of(walk: Walk, k: int, confidence: float) -> Array:
-    """Return landmarks (V, 27, 3) where the joints of a frame are."""
-    joints = walk.motion.skeleton.joints(walk.motion.poses[k : k + 1], walk.motion.translations[k : k + 1])[0]
-    seen = [camera.project(joints)[0] for camera in walk.task.cameras]
-    return np.array([np.column_stack([pixels, np.full(len(JOINTS), confidence)]) for pixels in seen])
-
-
-def test_landmarks_pull_as_their_costs_fall() -> None:
-    walk = walk_of(built_in.motion("walk-a", frames=2), (20.0, 110.0))
-    poses, places = off(walk, 1, 0.05)
-    pose, place, told = poses[:1], places[:1], told_of(walk, 1, 0.7)
-    stiff = np.full(3 + ANGLES, 1e9)  # so that a step is the gradient over it
-    steps = []
-    for landmarks in (told, None):
-        frame = FrameContours.of(walk.task.cameras, replace(walk.observations[1], landmarks=landmarks), place[0])
-        moved, shifted = frame.fitted(walk.task, pose, place, pose, stiff, (0.05,))
-        steps.append(np.concatenate([place[0] - shifted[0], pose[0] - moved[0]]))
-    numbers = np.concatenate([place[0], pose[0]])
-
-    def cost(values: Array) -> float:
-        return float(
-            landmark_costs(walk.motion.skeleton, walk.task.cameras, told, values[None, 3:], values[None, :3])[0]
-        )
-
-    small = 1e-5 * np.eye(len(numbers))
-    expected = np.array([(cost(numbers + step) - cost(numbers - step)) / 2e-5 for step in small])
-    free = np.append([True] * 3, walk.motion.skeleton.free)
-    np.testing.assert_allclose(1e9 * (steps[0] - steps[1])[free], expected[free], atol=0.03 * np.abs(expected).max())
-
-
-def test_fits_follow_landmarks_where_masks_say_little() -> None:
-    # arms before the trunk leave no contour
-    walk = walk_of(built_in.motion("walk-a", frames=3), (0.0,))
-    told, left = told_of(walk, 2, 1.0), []
-    for landmarks in (told, None):
-        observation, costs = replace(walk.observations[2], landmarks=landmarks), []
-        for seed in range(3):
-            poses, places = off(walk, 2, 0.15, seed)
-            frame = FrameContours.of(walk.task.cameras, observation, places[0])
-            moved, shifted = frame.fitted(walk.task, poses, places, poses, LOOSE, REACHES)
-            costs.append(landmark_costs(walk.motion.skeleton, walk.task.cameras, told, moved, shifted).mean())
-        left.append(np.mean(costs))
-    assert left[0] < 0.95 * left[1]
