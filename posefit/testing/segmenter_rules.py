@@ -10,6 +10,7 @@ import numpy as np
 
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, Segmenter
@@ -140,6 +141,20 @@ def background(case: Case) -> str:
     return ""
 
 
+def landmarks(case: Case) -> str:
+    """Landmarks are a column, a row and a confidence, 0 or more, of each joint."""
+    segmenter = case.build()
+    segmenter.segment(painted()[0].images[20].copy())
+    told = getattr(segmenter, "landmarks", None)
+    if told is None:
+        raise SkippedError("it gives no landmarks")
+    shape = len(JOINTS), 3
+    expect(np.shape(told) == shape, f"landmarks must have shape {shape}, got {np.shape(told)}")
+    fine = np.isfinite(told).all() and np.min(np.asarray(told)[:, 2]) >= 0.0
+    expect(fine, "landmarks must be finite, with confidences of 0 or more")
+    return ""
+
+
 def global_randomness(case: Case) -> None:
     """The global random generators are left alone."""
     segmenter = case.build()
@@ -160,6 +175,7 @@ RULES = [
     same_again,
     inputs,
     background,
+    landmarks,
     global_randomness,
     common.nonsense_settings,
     speed,

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,12 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.extract import extract
 from posefit.footage.readers import read_masks
-from posefit.footage.segmentation import Extraction
+from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
+from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from tests.cases import each
 from tests.commands import error_of, run
@@ -269,3 +272,31 @@ def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]],
     middles = np.array([np.flatnonzero(mask.any(axis=0)).mean() for mask in stored["masks"]])
     true = np.array([np.flatnonzero(mask.any(axis=0)).mean() for mask in filmed[1][EMPTY + 6 : EMPTY + 40]])
     assert np.abs(middles - true)[stored["usable"]].max() < 3.0  # pixels: the frame at its own time
+
+
+class Joints:
+    """Gives landmarks beside a mask of the left half, as wide a table of them as `wide`."""
+
+    wide = 3
+
+    def __init__(self, film: Any) -> None:
+        self.landmarks = np.zeros((len(JOINTS), self.wide))
+
+    def segment(self, image: Any) -> tuple[Any, Any]:
+        self.landmarks[0] = [5.0, 7.0, 0.5][: self.wide]
+        mask = np.zeros(image.shape[:2], dtype=bool)
+        mask[10:90, :40] = True
+        return mask, np.zeros_like(mask)
+
+
+def test_landmarks_are_kept_at_their_place_in_the_whole_picture(
+    filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    segmenter("joints", Joints)
+    masks = Segmentation(Video.of(filmed[0]), Extraction("joints", roi=(20, 10, 120, 100)), (0, 3)).masks()
+    assert masks.landmarks is not None
+    assert masks.landmarks.shape == (3, len(JOINTS), 3)
+    np.testing.assert_array_equal(masks.landmarks[2, 0], [25.0, 17.0, 0.5])
+    monkeypatch.setattr(Joints, "wide", 2)
+    with pytest.raises(BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"):
+        Segmentation(Video.of(filmed[0]), Extraction("joints"), (0, 3)).masks()

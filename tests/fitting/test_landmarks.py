@@ -1,0 +1,95 @@
+"""What poses cost that are off where a network saw joints, by hand, and masks that carry landmarks."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.fitting.landmarks import DEVIATION, EXCHANGED, GROUPS, landmark_costs
+from posefit.footage.masks import Views
+from posefit.footage.readers import read_masks
+from posefit.geometry.calibration import Calibration
+from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import JOINTS, MIRROR
+from posefit.motion import built_in
+from tests.cases import each
+
+WALK = built_in.motion("walk-a", frames=8)
+CAMERA = Camera.around(WALK.translations[3], 1.2, 4.0, (160, 120))
+
+
+def seen(confidence: float, joints: tuple[str, ...] = JOINTS) -> Array:
+    """Return landmarks (1, 27, 3) where some joints of a frame are."""
+    pixels, _ = CAMERA.project(WALK.skeleton.joints(WALK.poses[3:4], WALK.translations[3:4])[0])
+    return np.column_stack([pixels, [confidence * (joint in joints) for joint in JOINTS]])[None]
+
+
+def costs(landmarks: Array, poses: Array) -> Array:
+    return landmark_costs(WALK.skeleton, [CAMERA], landmarks, poses, np.repeat(WALK.translations[3:4], len(poses), 0))
+
+
+def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_sure() -> None:
+    # the other side is far off in each group but for those joints that lie on each other
+    poses = WALK.poses[3] + np.random.default_rng(0).normal(0.0, 0.1, (20, 66)) * WALK.skeleton.free
+    poses[0] = WALK.poses[3]
+    found = costs(seen(1.0), poses)
+    assert found.argmin() == 0
+    assert -1e-9 <= found[0] <= -len(GROUPS) * np.log(1.0 - EXCHANGED) + 1e-9
+
+
+def test_one_joint_off_by_hand() -> None:
+    landmarks = seen(0.5, ("lradius",))
+    wrist = JOINTS.index("lradius")
+    joints = WALK.skeleton.joints(WALK.poses[3:4], WALK.translations[3:4])[0]
+    pixels, depths = CAMERA.project(joints)
+    metre = np.sqrt(CAMERA.focal.prod()) / depths
+    landmarks[0, wrist, 0] += 3.0 * DEVIATION * metre[wrist]  # three deviations to the side
+    other = np.linalg.norm(landmarks[0, wrist, :2] - pixels[MIRROR[wrist]]) / metre[MIRROR[wrist]] / DEVIATION
+    arms = (1.0 - EXCHANGED) * (1.0 + 4.5) ** -0.5 + EXCHANGED * (1.0 + 0.5 * other**2) ** -0.5
+    # the groups that nothing is seen of cost nothing
+    np.testing.assert_allclose(costs(landmarks, WALK.poses[3:4]), [-np.log(arms)], rtol=1e-9)
+
+
+def test_exchanged_sides_cost_what_their_share_says() -> None:
+    direct, exchanged = costs(seen(1.0), WALK.poses[3:4]), costs(seen(1.0)[:, list(MIRROR)], WALK.poses[3:4])
+    most = len(GROUPS) * np.log((1.0 - EXCHANGED) / EXCHANGED)
+    assert 0.3 * most < exchanged[0] - direct[0] <= most + 1e-9
+
+
+def test_landmarks_are_read_with_their_masks(tmp_path: Path) -> None:
+    masks = np.zeros((3, 120, 160), dtype=np.uint8)
+    masks[:, 20:90, 60:80] = 1
+    landmarks = np.repeat(seen(0.7), 3, axis=0)
+    landmarks[:, 0, 0] = [1.0, 2.0, 3.0]
+    np.savez(tmp_path / "a.npz", masks=masks, landmarks=landmarks)
+    np.savez(tmp_path / "b.npz", masks=masks)
+    told, silent = (read_masks(tmp_path / name, (1, 3)) for name in ("a.npz", "b.npz"))
+    observation = Views([told, silent])[0]
+    assert observation.landmarks is not None
+    np.testing.assert_allclose(observation.landmarks[0], landmarks[1])
+    assert not observation.landmarks[1].any()
+    assert Views([silent])[0].landmarks is None
+    for wrong, message in ((landmarks[:2], "landmarks must be of shape"), (np.full_like(landmarks, np.nan), "finite")):
+        np.savez(tmp_path / "c.npz", masks=masks, landmarks=wrong)
+        with pytest.raises(InputError, match=message):
+            read_masks(tmp_path / "c.npz", (None, None))
+
+
+@each("fisheye", [False, True])
+def test_landmarks_are_straightened_as_pictures_are(fisheye: bool) -> None:
+    matrix = np.array([[150.0, 0.0, 79.5], [0.0, 150.0, 59.5], [0.0, 0.0, 1.0]])
+    lens = np.array([0.1, 0.02, 0.0, 0.0])
+    calibration = Calibration("bent", (160, 120), matrix, lens, None, None, fisheye)
+    straight = np.array([[[40.5, 30.5]], [[120.5, 90.5]], [[80.0, 60.0]]])
+    rays = np.concatenate([(straight - 0.5 - matrix[:2, 2]) / 150.0, np.ones((3, 1, 1))], axis=2)
+    if fisheye:
+        bent = cv2.fisheye.distortPoints(rays[..., :2], matrix, lens)
+    else:
+        bent = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), matrix, lens)[0]
+    points = np.concatenate([bent[:, 0] + 0.5, [[0.1], [0.2], [0.3]]], axis=1)
+    found = calibration.straightened(points, (160, 120))
+    np.testing.assert_allclose(found[:, :2], straight[:, 0], atol=0.02)
+    np.testing.assert_array_equal(found[:, 2], points[:, 2])
