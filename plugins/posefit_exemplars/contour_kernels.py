@@ -19,156 +19,9 @@ from posefit.tracking.smoothing.contours import (
     MIN_ROBUST_SCALE,
     PIXEL_DEVIATION,
 )
-from posefit.tracking.smoothing.kernels import COVERED, TINY, cone_distance
+from posefit.tracking.smoothing.kernels import pull
 
 NUMBERS = 3 + ANGLES  # of a place and a pose
-
-CAP = 2  # points of a quarter, about, of the disc at a bone's end
-
-
-@inlined
-def _add(block, slope, share, across, down, wide, off, weight):
-    """Add the square of one distance, which moves by (across, down) with its bone's axis and by `wide` with radii."""
-    rest = 1.0 - share
-    values = (across * rest, down * rest, across * share, down * share, wide * rest, wide * share)
-    for i in range(6):
-        slope[i] += weight * off * values[i]
-        for j in range(6):
-            block[i, j] += weight * values[i] * values[j]
-
-
-@jit
-def _write_cones(parents, centres, radii, cones, discs):
-    """Write what distances from bones need (27, 8), and a disc about each (27, 3).
-
-    A cone is its first point, its axis, of length 1, its length, its first radius, by how much less the last is, and
-    how far along the axis a point's nearest is from where it would be on a cylinder, for each pixel across.
-    """
-    for b in range(parents.size):
-        x, y = centres[parents[b], 0], centres[parents[b], 1]
-        r0, r1 = radii[b, 0], radii[b, 1]
-        dx, dy, dr = centres[b + 1, 0] - x, centres[b + 1, 1] - y, r0 - r1
-        length = math.sqrt(dx * dx + dy * dy)
-        discs[b, 0], discs[b, 1], discs[b, 2] = x + 0.5 * dx, y + 0.5 * dy, 0.5 * length + max(r0, r1)
-        if length <= abs(dr) + TINY:  # one disc covers the other
-            if dr < 0.0:
-                x, y, r0 = x + dx, y + dy, r1
-            dx, dy, dr, length = 0.0, 0.0, 0.0, 0.0
-        inverse, slope = 1.0 / max(length, TINY), dr / math.sqrt(max(length * length - dr * dr, TINY))
-        cones[b, 0], cones[b, 1], cones[b, 2], cones[b, 3] = x, y, dx * inverse, dy * inverse
-        cones[b, 4], cones[b, 5], cones[b, 6], cones[b, 7] = length, r0, dr * inverse, slope
-
-
-@inlined
-def _from_cone(x, y, cone):
-    """Return how far a point is off the nearest of a cone's discs, in x and in y, and its radius."""
-    ox, oy = x - cone[0], y - cone[1]
-    along = ox * cone[2] + oy * cone[3]
-    across = abs(oy * cone[2] - ox * cone[3])
-    at = min(max(along - across * cone[7], 0.0), cone[4])
-    return ox - at * cone[2], oy - at * cone[3], cone[5] - at * cone[6]
-
-
-@jit
-def _nearest_bone(x, y, first, cones, discs):
-    """Return the bone whose border is nearest to a point, and how far that is off; begin with `first`."""
-    least, bone = np.inf, first
-    for k in range(-1, discs.shape[0]):
-        b = first if k < 0 else k
-        reach = least + discs[b, 2]
-        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= reach * reach:
-            continue
-        ox, oy, radius = _from_cone(x, y, cones[b])
-        off = math.sqrt(ox * ox + oy * oy) - radius
-        if off < least:
-            least, bone = off, b
-    return bone
-
-
-@jit
-def _write_beside(bone, discs, beside):
-    """Write the other bones whose discs meet that of a bone, and return how many there are."""
-    count = 0
-    for b in range(discs.shape[0]):
-        reach = discs[b, 2] + discs[bone, 2]
-        off = (discs[b, 0] - discs[bone, 0]) ** 2 + (discs[b, 1] - discs[bone, 1]) ** 2
-        if b != bone and off < reach * reach:
-            beside[count] = b
-            count += 1
-    return count
-
-
-@jit
-def _covered(x, y, beside, cones, discs):
-    for b in beside:
-        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[b, 2]:
-            ox, oy, radius = _from_cone(x, y, cones[b])
-            if radius > COVERED and ox * ox + oy * oy < (radius - COVERED) ** 2:
-                return True
-    return False
-
-
-@jit
-def _pull(drawn, field, corner, size, points, step, scale, blocks, slopes):
-    """Add the squares of what points (n, 2) of the mask's border are off the body's, and the body's off the mask's."""
-    parents, centres, radii = drawn
-    cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
-    _write_cones(parents, centres, radii, cones, discs)
-    bone, beside = 0, np.empty(parents.size, np.int64)
-    for i in range(points.shape[0]):
-        x, y = points[i, 0], points[i, 1]
-        bone = _nearest_bone(x, y, bone, cones, discs)
-        p, n = parents[bone], bone + 1
-        off, share, nx, ny = cone_distance(
-            x, y, centres[p, 0], centres[p, 1], radii[bone, 0], centres[n, 0], centres[n, 1], radii[bone, 1]
-        )
-        weight = step / (1.0 + (off / scale) ** 2)
-        _add(blocks[bone], slopes[bone], share, -nx, -ny, -1.0, off, weight)
-    spacing = 2.0 * step
-    for b in range(parents.size):
-        p = parents[b]
-        dx, dy = centres[b + 1, 0] - centres[p, 0], centres[b + 1, 1] - centres[p, 1]
-        r0, r1 = radii[b, 0], radii[b, 1]
-        length = math.sqrt(dx * dx + dy * dy)
-        if length <= abs(r0 - r1) + TINY:
-            continue
-        dx, dy = dx / length, dy / length
-        others = beside[: _write_beside(b, discs, beside)]
-        cosine = (r0 - r1) / length
-        sine = math.sqrt(1.0 - cosine * cosine)
-        tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
-        sides = max(int(length / spacing) + 1, 2)
-        for k in range(2 * (sides + 1 + 2 * CAP)):
-            i, side = k // 2, 1.0 - 2.0 * (k % 2)
-            if i <= sides:
-                share, along, aside = i / sides, cosine, sine
-                stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-            elif side > 0.0:
-                share = 1.0 if i <= sides + CAP else 0.0
-                if share > 0.0:
-                    angle, stands = tilt * (i - sides - 0.5) / CAP, r1 * tilt / CAP
-                else:
-                    rest = math.pi - tilt
-                    angle, stands = tilt + rest * (i - sides - CAP - 0.5) / CAP, r0 * rest / CAP
-                along, aside = math.cos(angle), math.sin(angle)
-            nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
-            radius = r0 + share * (r1 - r0)
-            x = centres[p, 0] + share * length * dx + radius * nx
-            y = centres[p, 1] + share * length * dy + radius * ny
-            column, row = x - corner[0] - 0.5, y - corner[1] - 0.5
-            left, top = math.floor(column), math.floor(row)
-            if not (0 <= left < size[1] - 1 and 0 <= top < size[0] - 1):
-                continue
-            if _covered(x, y, others, cones, discs):
-                continue
-            u, v = column - left, row - top
-            upper, lower = field[top], field[top + 1]
-            one, two, three, four = upper[left], upper[left + 1], lower[left], lower[left + 1]
-            off = (one * (1.0 - u) + two * u) * (1.0 - v) + (three * (1.0 - u) + four * u) * v
-            across = (two - one) * (1.0 - v) + (four - three) * v
-            down = (three - one) * (1.0 - u) + (four - two) * u
-            weight = stands / (1.0 + (off / scale) ** 2)
-            _add(blocks[b], slopes[b], share, across, down, across * nx + down * ny, off, weight)
 
 
 @jit
@@ -195,8 +48,9 @@ def _add_view(chain, radii, camera, frames, contour, reach, curves, forces):
     for b in range(bones):
         wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
     blocks, slopes = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
-    drawn = parents, centres, wide
-    _pull(drawn, field, corner, size, points, step, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes)
+    pull(
+        parents, centres, wide, field, corner, size, points, step, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes
+    )
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
     rows, mixed = np.empty((6, 6)), np.empty((6, 6))

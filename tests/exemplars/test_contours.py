@@ -26,20 +26,21 @@ def off(walk: Walk, k: int, radians: float, seed: int = 0) -> tuple[Array, Array
 
 
 def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, reach: float) -> Array:
-    """Return the step of Gauss and Newton (69,) by the smoothing's loops and difference quotients."""
+    """Return the step of Gauss and Newton (69,) by the smoothing's derivatives of a drawn body, joint by joint."""
     curve, slope = np.diag(LOOSE), LOOSE * np.append(np.zeros(3), pose - mean)
     for number, camera in enumerate(walk.task.cameras):
         view = contours.MaskContours.of(camera, number, [walk.observations[k]], place[None])
         body = contours.projected_body(walk.task.body, view.camera, pose[None], place[None])[0]
         joints = 1 + len(contours.BONE_STARTS)
-        drawn = contours.BONE_STARTS, body[: 2 * joints].reshape(-1, 2), body[2 * joints :].reshape(-1, 2)
-        curves, slopes = np.zeros((contours.BODY_NUMBERS, contours.BODY_NUMBERS)), np.zeros(contours.BODY_NUMBERS)
-        scale = max(reach * view.metres[0], contours.MIN_ROBUST_SCALE)
+        drawn = body[: 2 * joints].reshape(1, -1, 2), body[2 * joints :].reshape(1, -1, 2)
+        count = contours.BODY_NUMBERS
+        out = np.zeros((1, count, count)), np.zeros((1, count))
+        scale = np.array([max(reach * view.metres[0], contours.MIN_ROBUST_SCALE)])
         every = round(SPACING * view.metres[0] / view.step)
-        step = every * view.step
-        kernels._pull_points.py_func(view.points[::every], *drawn, step, scale, curves, slopes)
-        field = view.fields[0], view.corners[0], view.sizes[0]
-        kernels._pull_bones.py_func(*field, *drawn, 2.0 * step, scale, curves, slopes)
+        points = view.points[::every]
+        mask = view.fields, view.corners, view.sizes, points, np.array([0, len(points)]), every * view.step, scale
+        kernels.pull_to_borders(contours.BONE_STARTS, *drawn, *mask, out)
+        curves, slopes = out[0][0], out[1][0]
         deviation = contours.BORDER_DEVIATION**2 + (contours.PIXEL_DEVIATION / view.metres[0]) ** 2
         worth = 1.0 / (view.metres[0] ** 3 * contours.CORRELATION_LENGTH * deviation)
         ways = contours.pose_jacobian(walk.task.body, view.camera, pose[None], place[None], range(ANGLES))[0]
@@ -53,10 +54,7 @@ def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, rea
 
 @pytest.mark.pure
 @each("views", [(45.0,), (20.0, 110.0)])
-def test_a_step_is_that_of_a_slow_twin(views: tuple[float, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    from posefit_exemplars import contour_kernels
-
-    monkeypatch.setattr(kernels, "CAP", contour_kernels.CAP)
+def test_a_step_is_that_of_a_slow_twin(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), views)
     poses, places = off(walk, 1, 0.05)
     frame = FrameContours.of(walk.task.cameras, walk.observations[1], places[0])

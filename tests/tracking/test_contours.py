@@ -177,11 +177,10 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
     field = (slope[0] * (columns - 20.0) + slope[1] * (rows - 30.0)).astype(np.float32)
 
     def pulled(joints: np.ndarray, parents: list[int], radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        count = 2 * len(joints) + 2 * len(parents)
-        out = np.zeros((count, count)), np.zeros(count)
-        about = np.zeros(2, int), np.array(field.shape), np.array(parents), joints, radii
-        kernels._pull_bones(field, *about, 0.5, scale, *out)
-        return out
+        blocks, forces = np.zeros((len(parents), 6, 6)), np.zeros((len(parents), 6))
+        mask = field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25, scale
+        kernels.pull(np.array(parents), joints, radii, *mask, blocks, forces)
+        return blocks[0], forces[0]
 
     for mine, expected in zip(pulled(joints, [0], radii), (curves, slopes), strict=True):
         np.testing.assert_allclose(mine, expected, atol=0.02 * np.abs(expected).max())
