@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from clips import GROUPS as CLIPS
 from clips import METHOD, PAIRS, SIDES, Clip, Views, cell_fields, track_of
+from people import CHANGES
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import new_file
@@ -58,12 +59,8 @@ MORE = {
 MAX_CLIPS = 4  # of a person
 
 
-# masks and a body as cameras and their owners give them
-HARD: Mapping[str, Any] = {
-    "translation": "aligned",
-    "body_off_percent": 10.0,
-    "corruption": {"holes": 0.3, "blobs": 0.3, "jitter": 0.3, "dropped": 0.1},
-}
+# masks and a body as those of footage
+HARD = {name: value for name, value in CHANGES["all of these"].items() if name != "yaw_off_degrees"}
 
 
 class Case(NamedTuple):

@@ -55,8 +55,8 @@ class FrameCosts:
         """Return the costs (n,) of poses."""
         return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
 
-    def told(self, poses: Array, places: Array) -> Array:
-        """Return how unlikely poses make the frame's landmarks (n,): 0 where there are none."""
+    def of_landmarks(self, poses: Array, places: Array) -> Array:
+        """Return the `landmark_costs` (n,) of poses: 0 where the frame has no landmarks."""
         if self._observation.landmarks is None:
             return np.zeros(len(poses))
         return landmark_costs(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)

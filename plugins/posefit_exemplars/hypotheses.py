@@ -208,7 +208,7 @@ class HypothesisFilter:
             _, squares = self._exemplars.similar(poses, 1, SIMILAR)
             costs = look.full(poses, places)
             self._costs.append(float(costs.min()))
-            fits = costs / (noise * self._temperature) + look.told(poses, places)
+            fits = costs / (noise * self._temperature) + look.of_landmarks(poses, places)
             fits += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if latest is not None:
             steps = step_costs(self._spread, latest, hypotheses)

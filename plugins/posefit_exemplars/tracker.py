@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import tee
 from typing import cast
 
 import numpy as np
@@ -187,16 +188,10 @@ class ExemplarTracker:
     def _proposed(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame by another method."""
         assert self.proposer is not None
-        looks: deque[FrameCosts] = deque()
-
-        def seen() -> Iterator[Observation]:
-            for observation in observations:
-                looks.append(FrameCosts(self.task, observation))
-                yield observation
-
-        for frame in self.proposer.follow(self._proposing, seen(), rng):
+        coming, again = tee(observations)
+        for frame, observation in zip(self.proposer.follow(self._proposing, coming, rng), again, strict=False):
             effort = frame.evaluations, frame.seconds, frame.cpu_seconds or 0.0
-            yield Estimate(frame.pose, frame.translation, looks.popleft(), *effort)
+            yield Estimate(frame.pose, frame.translation, FrameCosts(self.task, observation), *effort)
 
     def _evaluated(
         self, look: FrameCosts, before: FrameStates[Beam] | None, rng: np.random.Generator
@@ -227,7 +222,7 @@ class ExemplarTracker:
         best = diverse_best(self.exemplars, beam, totals, full)
         beam = beam.chosen(best)
         poses = self._poses(beam)
-        fits = away[best] + look.full(poses, beam.places) / self.temperature + look.told(poses, beam.places)
+        fits = away[best] + look.full(poses, beam.places) / self.temperature + look.of_landmarks(poses, beam.places)
         used += len(beam)
         best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used

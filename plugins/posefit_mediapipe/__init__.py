@@ -31,9 +31,9 @@ from posefit.silhouette.mask import Mask
 
 LEFT, RIGHT = (11, 23), (12, 24)  # shoulder and hip, in the model's numbers; x goes to the right, and z away
 SIDES = (1.0, 1.0, -1.0, -1.0)
-# bones at whose ends the model sees a joint, in its numbers: those of the left, then 1 more for the right
-_LEFT_SEEN = {"clavicle": 11, "humerus": 13, "radius": 15, "hipjoint": 23, "femur": 25, "tibia": 27, "toes": 31}
-SEEN = {f"{side}{bone}": number + k for k, side in enumerate("lr") for bone, number in _LEFT_SEEN.items()}
+# bones whose ends are joints of the model, in its numbers: those of the left, then 1 more for the right
+_LEFT_POINTS = {"clavicle": 11, "humerus": 13, "radius": 15, "hipjoint": 23, "femur": 25, "tibia": 27, "toes": 31}
+POINTS = {f"{side}{bone}": number + k for k, side in enumerate("lr") for bone, number in _LEFT_POINTS.items()}
 
 
 class MediaPipe:
@@ -76,13 +76,13 @@ def _facing(landmarks: Any) -> float:
 
 
 def _landmarks(landmarks: Any, shape: tuple[int, ...]) -> Array:
-    """Return where the model sees joints (27, 3), as `Segmenter.landmarks`, in a picture of a shape."""
-    told = np.zeros((len(JOINTS), 3))
+    """Return the model's joints (27, 3), as `Segmenter.landmarks`, in a picture of a shape."""
+    result = np.zeros((len(JOINTS), 3))
     if landmarks is not None:
-        for joint, k in SEEN.items():
+        for joint, k in POINTS.items():
             point = landmarks.landmark[k]
-            told[JOINTS.index(joint)] = point.x * shape[1], point.y * shape[0], point.visibility
-    return told
+            result[JOINTS.index(joint)] = point.x * shape[1], point.y * shape[0], point.visibility
+    return result
 
 
 def _model(confidence: float) -> Any:

@@ -1,4 +1,4 @@
-"""How far joints are off where a network saw them, with left and right as it says or exchanged."""
+"""How far joints are from a detector's landmarks, whose left and right may be exchanged."""
 
 from collections.abc import Sequence
 
@@ -9,11 +9,11 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR, Skeleton
 from posefit.silhouette.rasteriser import NEAR
 
-# joints of which a network sees left and right together as they are, or together exchanged
+# joints whose left and right a detector exchanges together or not at all
 _TOGETHER = (("femur", "tibia", "toes"), ("humerus", "radius"), ("clavicle", "hipjoint"))
 GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones]) for bones in _TOGETHER]
-OTHERS = np.array(MIRROR)  # (27,) the joint that each is exchanged with
-DEVIATION = 0.05  # metres of a joint that is seen; one that is much farther off counts little more
+MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
+DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
 EXCHANGED = 0.25  # share of the frames in which left and right of a group are exchanged
 
 
@@ -25,18 +25,18 @@ def landmark_costs(
     Landmarks are those of an `Observation`. A joint counts by its confidence; distances have a Cauchy distribution.
     """
     joints, total = skeleton.joints(poses, places), np.zeros(len(poses))
-    for camera, seen in zip(cameras, landmarks, strict=True):
+    for camera, view in zip(cameras, landmarks, strict=True):
         pixels, depths = camera.project(joints)
         metres = np.maximum(depths, NEAR) / np.sqrt(camera.focal.prod())  # of a pixel
         for group in GROUPS:
             direct, exchanged = (
-                np.log1p(0.5 * (_distances(pixels[:, group], seen[told]) * metres[:, group] / DEVIATION) ** 2)
-                @ seen[told, 2]
-                for told in (group, OTHERS[group])
+                np.log1p(0.5 * (_distances(pixels[:, group], view[same]) * metres[:, group] / DEVIATION) ** 2)
+                @ view[same, 2]
+                for same in (group, MIRRORED[group])
             )
             total -= np.logaddexp(np.log(1.0 - EXCHANGED) - direct, np.log(EXCHANGED) - exchanged)
     return total
 
 
-def _distances(pixels: Array, seen: Array) -> Array:
-    return np.asarray(np.linalg.norm(pixels - seen[:, :2], axis=-1))
+def _distances(pixels: Array, landmarks: Array) -> Array:
+    return np.asarray(np.linalg.norm(pixels - landmarks[:, :2], axis=-1))

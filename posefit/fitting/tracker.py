@@ -39,7 +39,7 @@ class Observation:
     translation: Array | None = None  # (3,) metres
     usable: bool = True  # False: it shows too little to learn from, and a tracker holds its pose
     yaw: float | None = None  # radians: about which way the person faces; None where it is unknown
-    # (V, 27, 3) where joints were seen: column and row, pixels, and confidence, 0 to 1; None where nobody says
+    # (V, 27, 3) of joints: column and row, pixels, and confidence, 0 to 1, 0 for an unknown joint; None for none at all
     landmarks: Array | None = field(default=None, repr=False)
 
 

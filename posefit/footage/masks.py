@@ -89,9 +89,10 @@ class Views(Sequence[Observation]):
         known = k < len(self.yaws) and np.isfinite(self.yaws[k])
         landmarks = None
         if any(masks.landmarks is not None for masks in self.masks):
-            unseen = np.zeros((len(JOINTS), 3))
-            landmarks = np.array([unseen if one.landmarks is None else one.landmarks[k] for one in self.masks])
-        return Observation(silhouettes, None, usable, float(self.yaws[k]) if known else None, landmarks)
+            unknown = np.zeros((len(JOINTS), 3))
+            landmarks = np.array([unknown if one.landmarks is None else one.landmarks[k] for one in self.masks])
+        yaw = float(self.yaws[k]) if known else None
+        return Observation(silhouettes, usable=usable, yaw=yaw, landmarks=landmarks)
 
     @cached_property
     def first(self) -> int:

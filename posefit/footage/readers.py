@@ -131,8 +131,8 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
     names = [f"{name}[{k}]" for k in range(start, stop)]
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
-    if landmarks is not None and not np.isfinite(landmarks).all():
-        raise InputError(f"{name}: landmarks must be finite, got nan or infinity")
+    if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
+        raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
     return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks)
 
 

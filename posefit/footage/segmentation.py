@@ -183,7 +183,7 @@ class Segmentation:
                 self._shifts.append(motion.shift(image))
             result, row = self.person(segmenter, image, quality, self.start + k)
             self._facings.append(float(getattr(segmenter, "facing", math.nan)))
-            self._remember_landmarks(getattr(segmenter, "landmarks", None))
+            self._landmarks.append(self._landmarks_of(segmenter))
             self._middles.append(
                 float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
             )
@@ -198,8 +198,9 @@ class Segmentation:
             raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
         count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
-        landmarks = np.array(self._landmarks) if self._landmarks else None
-        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, landmarks)
+        landmarks = np.array(self._landmarks)
+        known = landmarks if landmarks[..., 2].any() else None
+        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, known)
 
     def learned(self) -> Segmenter:
         """Return the segmenter, which has learned the background."""
@@ -227,18 +228,17 @@ class Segmentation:
         whole[:, y : y + tall, x : x + wide] = planes
         return whole[0], whole[1]
 
-    def _remember_landmarks(self, landmarks: Any) -> None:
-        """Keep a segmenter's landmarks of the latest frame, at their place in the whole frame."""
-        if landmarks is None:
-            return
-        given = np.array(landmarks, dtype=np.float64)
+    def _landmarks_of(self, segmenter: Segmenter) -> Array:
+        """Return a segmenter's landmarks (27, 3) of the latest frame, at their place in the whole frame; 0 for none."""
+        landmarks = getattr(segmenter, "landmarks", None)
+        given = np.array(np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks, dtype=np.float64)
         if given.shape != (len(JOINTS), 3) or not np.isfinite(given).all() or given[:, 2].min() < 0.0:
             raise BrokenRuleError(
                 f"segmenter {self.method!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
                 f"confidence 0 or more, got shape {given.shape}"
             )
         given[:, :2] += self._film.part[:2]
-        self._landmarks.append(given)
+        return given
 
     @property
     def facings(self) -> Array:

@@ -80,18 +80,20 @@ class Calibration:
 
     def maps(self, size: tuple[int, int]) -> tuple[Any, Any]:
         """Return the two maps with which cv2.remap undoes the distortion of pictures scaled to `size`."""
-        camera = self.camera(size, np.eye(3))
-        matrix = _pinhole(camera.focal, camera.centre - HALF)
+        matrix = self._matrix(size)
         if self.fisheye:
             return cv2.fisheye.initUndistortRectifyMap(
                 matrix, self.distortion[:4], np.eye(3), matrix, size, cv2.CV_32FC1
             )
         return cv2.initUndistortRectifyMap(matrix, self.distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
 
+    def _matrix(self, size: tuple[int, int]) -> Array:
+        camera = self.camera(size, np.eye(3))
+        return _pinhole(camera.focal, camera.centre - HALF)
+
     def straightened(self, points: Array, size: tuple[int, int]) -> Array:
         """Return points (..., 3), columns and rows of pictures scaled to `size` and a third number, undistorted."""
-        camera = self.camera(size, np.eye(3))
-        matrix = _pinhole(camera.focal, camera.centre - HALF)
+        matrix = self._matrix(size)
         bent = points[..., :2].reshape(-1, 1, 2).astype(np.float64) - HALF
         undistort = cv2.fisheye.undistortPoints if self.fisheye else cv2.undistortPoints
         straight = undistort(bent, matrix, self.distortion[: 4 if self.fisheye else None], P=matrix) + HALF

@@ -54,7 +54,7 @@ class Segmenter(Protocol):
     One that compares each frame with a still background may have that picture as `background` (height, width, 3), and
     is then checked for a person who was learned into it. One with a model of people may have, as `facing`, which way
     the person in the latest picture faces: radians, 0 towards the camera, growing to the picture's right, NaN for none;
-    and, as `landmarks` (27, 3), where it sees their joints: column, row and confidence, 0 to 1, 0 for none.
+    and, as `landmarks` (27, 3), the column, row and confidence, 0 to 1, of their joints, 0 for an unknown joint.
     """
 
     def segment(self, image: Image) -> tuple[Mask, Mask]:

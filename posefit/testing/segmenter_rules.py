@@ -145,12 +145,12 @@ def landmarks(case: Case) -> str:
     """Landmarks are a column, a row and a confidence, 0 or more, of each joint."""
     segmenter = case.build()
     segmenter.segment(painted()[0].images[20].copy())
-    told = getattr(segmenter, "landmarks", None)
-    if told is None:
+    given = getattr(segmenter, "landmarks", None)
+    if given is None:
         raise SkippedError("it gives no landmarks")
     shape = len(JOINTS), 3
-    expect(np.shape(told) == shape, f"landmarks must have shape {shape}, got {np.shape(told)}")
-    fine = np.isfinite(told).all() and np.min(np.asarray(told)[:, 2]) >= 0.0
+    expect(np.shape(given) == shape, f"landmarks must have shape {shape}, got {np.shape(given)}")
+    fine = np.isfinite(given).all() and np.min(np.asarray(given)[:, 2]) >= 0.0
     expect(fine, "landmarks must be finite, with confidences of 0 or more")
     return ""
 

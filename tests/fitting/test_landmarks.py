@@ -1,4 +1,4 @@
-"""What poses cost that are off where a network saw joints, by hand, and masks that carry landmarks."""
+"""What poses cost that are from landmarks, by hand, and masks that carry landmarks."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ WALK = built_in.motion("walk-a", frames=8)
 CAMERA = Camera.around(WALK.translations[3], 1.2, 4.0, (160, 120))
 
 
-def seen(confidence: float, joints: tuple[str, ...] = JOINTS) -> Array:
+def landmarks_of(confidence: float, joints: tuple[str, ...] = JOINTS) -> Array:
     """Return landmarks (1, 27, 3) where some joints of a frame are."""
     pixels, _ = CAMERA.project(WALK.skeleton.joints(WALK.poses[3:4], WALK.translations[3:4])[0])
     return np.column_stack([pixels, [confidence * (joint in joints) for joint in JOINTS]])[None]
@@ -35,13 +35,13 @@ def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_sur
     # the other side is far off in each group but for those joints that lie on each other
     poses = WALK.poses[3] + np.random.default_rng(0).normal(0.0, 0.1, (20, 66)) * WALK.skeleton.free
     poses[0] = WALK.poses[3]
-    found = costs(seen(1.0), poses)
+    found = costs(landmarks_of(1.0), poses)
     assert found.argmin() == 0
     assert -1e-9 <= found[0] <= -len(GROUPS) * np.log(1.0 - EXCHANGED) + 1e-9
 
 
 def test_one_joint_off_by_hand() -> None:
-    landmarks = seen(0.5, ("lradius",))
+    landmarks = landmarks_of(0.5, ("lradius",))
     wrist = JOINTS.index("lradius")
     joints = WALK.skeleton.joints(WALK.poses[3:4], WALK.translations[3:4])[0]
     pixels, depths = CAMERA.project(joints)
@@ -54,7 +54,10 @@ def test_one_joint_off_by_hand() -> None:
 
 
 def test_exchanged_sides_cost_what_their_share_says() -> None:
-    direct, exchanged = costs(seen(1.0), WALK.poses[3:4]), costs(seen(1.0)[:, list(MIRROR)], WALK.poses[3:4])
+    direct, exchanged = (
+        costs(landmarks_of(1.0), WALK.poses[3:4]),
+        costs(landmarks_of(1.0)[:, list(MIRROR)], WALK.poses[3:4]),
+    )
     most = len(GROUPS) * np.log((1.0 - EXCHANGED) / EXCHANGED)
     assert 0.3 * most < exchanged[0] - direct[0] <= most + 1e-9
 
@@ -62,12 +65,12 @@ def test_exchanged_sides_cost_what_their_share_says() -> None:
 def test_landmarks_are_read_with_their_masks(tmp_path: Path) -> None:
     masks = np.zeros((3, 120, 160), dtype=np.uint8)
     masks[:, 20:90, 60:80] = 1
-    landmarks = np.repeat(seen(0.7), 3, axis=0)
+    landmarks = np.repeat(landmarks_of(0.7), 3, axis=0)
     landmarks[:, 0, 0] = [1.0, 2.0, 3.0]
     np.savez(tmp_path / "a.npz", masks=masks, landmarks=landmarks)
     np.savez(tmp_path / "b.npz", masks=masks)
-    told, silent = (read_masks(tmp_path / name, (1, 3)) for name in ("a.npz", "b.npz"))
-    observation = Views([told, silent])[0]
+    given, silent = (read_masks(tmp_path / name, (1, 3)) for name in ("a.npz", "b.npz"))
+    observation = Views([given, silent])[0]
     assert observation.landmarks is not None
     np.testing.assert_allclose(observation.landmarks[0], landmarks[1])
     assert not observation.landmarks[1].any()
