@@ -30,8 +30,9 @@ from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting import metrics
+from posefit.fitting.landmarks import GROUPS, MIRRORED
 from posefit.fitting.metrics import LOST_MM
-from posefit.footage.extract import extract
+from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.geometry.skeleton import BONES
@@ -56,22 +57,24 @@ def uncut(masks: Masks) -> NDArray[np.bool_]:
     return np.asarray(masks.any(axis=(2, 3)) & ~np.any([edge.any(axis=2) for edge in edges], axis=0))
 
 
-def extraction_figures(masks: Masks, usable: NDArray[np.bool_], truth: Masks) -> dict[str, Any]:
-    """Return how well masks (views, T) that were taken out agree with the true ones, where somebody is whole."""
+def extraction_figures(scene: Scene, truth: Masks) -> dict[str, Any]:
+    """Return how well the masks of a tracked scene agree with the true ones, where somebody is whole."""
     seen = uncut(truth)
-    overlaps = _overlaps(masks, truth)
+    views = zip(*(observation.silhouettes for observation in scene.observations), strict=True)
+    overlaps = _overlaps(np.array([[silhouette.mask for silhouette in view] for view in views]), truth)
+    usable = np.array([observation.usable for observation in scene.observations])
     return {
         "mask_iou": float(overlaps[seen].mean()),
         "mask_iou_worst_view": float(min(one[ok].mean() for one, ok in zip(overlaps, seen, strict=True) if ok.any())),
         "mask_half": float((overlaps[seen] < 0.5).mean()),
-        "usable": float(usable[seen].mean()),
+        "usable": float(usable[seen.any(axis=0)].mean()),
     }
 
 
 def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks) -> dict[str, Any]:
     """Return what a track is worth in the frames in which a camera sees all of the person."""
     actor = situation.actors[0]
-    seen = np.asarray(uncut(truth).any(axis=0))
+    seen, everywhere = np.asarray(uncut(truth).any(axis=0)), np.asarray(uncut(truth).all(axis=0))
     estimate, body = track.motion, Body(track.motion.skeleton, radii)
     true_joints = actor.motion.skeleton.joints(actor.motion.poses, actor.motion.translations)
     joints = estimate.skeleton.joints(estimate.poses, estimate.translations)
@@ -88,6 +91,7 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
         "body_iou": _body_iou(estimate, body, situation, truth),
         "claimed_iou": track.measures.iou,
         "mpjpe_mm": float(mpjpe[seen].mean()),
+        "mpjpe_everywhere_mm": float(mpjpe[everywhere].mean()) if everywhere.any() else None,
         "place_mm": float(np.median(away[seen])),
         "facing_right": float(facing[seen].mean()),
         "lost": float((mpjpe[seen] > LOST_MM).mean()),
@@ -100,6 +104,30 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
         **{name: float(off[[k for k, bone in enumerate(BONES) if bone[1:] in bones]].mean()) for name, bones in PARTS},
         **angle_errors(actor.motion, clinical_angles(estimate.skeleton, estimate.poses), seen),
     }
+
+
+def landmark_figures(scene: Scene, actor: Motion, seen: NDArray[np.bool_]) -> dict[str, float]:
+    """Return how far a segmenter's landmarks are off, and the shares of pictures with sides exchanged, by limbs.
+
+    Of the pictures (views, T) that are `seen`; empty where no segmenter gives landmarks.
+    """
+    joints, off, exchanged = actor.joints, list[float](), dict[str, list[bool]]()
+    for camera, view, rows in zip(scene.cameras, range(len(scene.cameras)), seen, strict=True):
+        for k in np.flatnonzero(rows):
+            landmarks = scene.observations[k].landmarks
+            if landmarks is None or not landmarks[view, :, 2].any():
+                continue
+            pixels, depths = camera.project(joints[k])
+            metres = depths / np.sqrt(camera.focal.prod())
+            for name, group in zip(("legs", "arms", "trunk"), GROUPS, strict=True):
+                sides = [
+                    np.linalg.norm(pixels[group] - landmarks[view, same, :2], axis=1) * metres[group]
+                    for same in (group, MIRRORED[group])
+                ]
+                off += np.min(sides, axis=0).tolist()
+                exchanged.setdefault(f"{name}_exchanged", []).append(bool(sides[1].sum() < sides[0].sum()))
+    median = {"landmarks_off_mm": 1e3 * float(np.median(off))} if off else {}
+    return median | {name: float(np.mean(flags)) for name, flags in exchanged.items()}
 
 
 def inside(track: Track, radii: Array, situation: Situation, truth: Masks) -> float:
@@ -141,6 +169,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "body_iou": ("body IoU", 2, 1.0),
     "claimed_iou": ("own IoU", 2, 1.0),
     "mpjpe_mm": ("MPJPE mm", 0, 1.0),
+    "mpjpe_everywhere_mm": ("where all see mm", 0, 1.0),
     "place_mm": ("place mm", 0, 1.0),
     "facing_right": ("facing %", 0, 100.0),
     "lost": ("lost %", 0, 100.0),
@@ -154,6 +183,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
 }
 
 
+DEFAULT = "default"  # as `posefit track` takes people out by itself
 GIVEN = "mean"  # the extraction that is given pictures without anybody
 QUICK = (("through", 1), ("stands", 1))  # situations and numbers of cameras of a quick look
 
@@ -219,14 +249,9 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         scene = situation(shot.situation, shot.views, shot.seed)
         plates = [plate(video, number, SIZE) for number in range(shot.views)]
         how = extraction_named(shot.extraction)
-        made = film(scene, plates, shot.seed, how.name == GIVEN, folder)
+        made = film(scene, plates, shot.seed, shot.extraction.startswith(GIVEN), folder)
         frames = (made.first, None)
         row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
-        try:
-            masks, usable = _taken_out(made.videos, how, frames, folder)
-            row |= extraction_figures(masks, usable, made.masks)
-        except ValueError as error:
-            return row | {"refused": str(error).replace(f"{folder}/", "")}
         began, said = time.perf_counter(), list[str]()
         try:
             result = track(
@@ -245,7 +270,8 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         row["minutes"] = (time.perf_counter() - began) / 60.0
         with np.load(folder / "track" / "poses.npz") as stored:
             radii, joint_radii = stored["radii"], stored["joint_radii"][:, list(stored["levels"]).index(0.8)]
-        row |= track_figures(result, radii, scene, made.masks)
+        row |= extraction_figures(result.scene, made.masks) | track_figures(result, radii, scene, made.masks)
+        row |= landmark_figures(result.scene, scene.actors[0].motion, uncut(made.masks))
         row["inside"] = inside(result, joint_radii, scene, made.masks)
         if importlib.util.find_spec("mediapipe"):
             angles = landmark_angles(made.videos[0], made.first, SIZE)
@@ -255,12 +281,14 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         return row
 
 
-def extraction_named(text: str) -> Extraction:
+def extraction_named(text: str) -> Extraction | None:
     """Return how people are taken out: a segmenter's name, and settings behind such as `mixture history=90`.
 
-    Raises ValueError where there is no segmenter of that name, or a setting does not fit it.
+    None for `default`. Raises ValueError where there is no segmenter of that name, or a setting does not fit it.
     """
     name, *given = text.split() or [""]
+    if text == DEFAULT:
+        return None
     if not name:
         raise InputError(f"extraction must name a segmenter such as mixture, got {text!r}")
     offer = registry().offer("segmenter", name)
@@ -268,17 +296,6 @@ def extraction_named(text: str) -> Extraction:
     if name == GIVEN:
         settings = {"background": f"0:{BEFORE}", **settings}
     return Extraction(name, settings=settings)
-
-
-def _taken_out(videos: Sequence[Path], how: Extraction, frames: Any, folder: Path) -> tuple[Any, Any]:
-    """Return masks (views, T, height, width) that are taken out of videos, and whether they are usable (views, T)."""
-    masks, usable = [], []
-    for number, video in enumerate(videos):
-        extract(video, folder / f"masks-{number}", how, frames=frames)
-        with np.load(folder / f"masks-{number}" / "masks.npz") as stored:
-            masks.append(stored["masks"] > 0)
-            usable.append(stored["usable"])
-    return np.stack(masks), np.stack(usable)
 
 
 def composites_lines(found: Sequence[Row]) -> Iterator[str]:
@@ -307,7 +324,7 @@ def composites_lines(found: Sequence[Row]) -> Iterator[str]:
     "--extraction",
     "extractions",
     multiple=True,
-    default=("mixture", "median", "mean"),
+    default=(DEFAULT, "mixture", "mean"),
     show_default=True,
     help="A segmenter and settings, 'mixture history=90'.",
 )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.landmarks import DEVIATION, GROUPS, MIRRORED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import empty_frames, place_joints
@@ -20,7 +21,7 @@ from posefit_vsmm.joints import OWN, Lines, detected, rule_errors
 from posefit_vsmm.kernels import bend, points_and_jacobian
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.settings import Settings
-from posefit_vsmm.state import ERROR, FIRST_BONE, POINTS, Reliance
+from posefit_vsmm.state import ENDS, ERROR, FIRST_BONE, POINTS, Reliance
 
 NEAREST = 0.05  # metres: a smaller distance to the camera counts as this one
 NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
@@ -28,6 +29,7 @@ FAR = 1e3  # legs: a gate that is none
 DEVIATIONS = 3.0  # between these, so many standard deviations
 SURPRISE = 16.0  # the Mahalanobis gate, squared standard deviations in the image: a detection farther off is rejected
 LEAST = 0.05  # the lowest confidence that counts
+TINY = 1e-12
 KNOWN = 0.002  # metres: the deviation of a translation that is known
 
 
@@ -87,6 +89,23 @@ class JointMeasurement:
         return replace(self, points=np.where(shown[:, None], self.points, points), confidence=np.ones(len(shown)))
 
 
+def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
+    """Return where landmarks (27, 3) have the points (17, 2), and their confidence (17,), 0 where they have none.
+
+    Sides that a detector exchanged are those that are nearer to where the points are expected (17, 2).
+    """
+    joints = ENDS[:, 0]
+    alone = joints == ENDS[:, 1]
+    found = landmarks[joints]
+    for group in GROUPS:
+        rows = np.flatnonzero(alone & np.isin(joints, group) & (found[:, 2] > 0.0))
+        exchanged = landmarks[MIRRORED[joints[rows]]]
+        off, other = (np.linalg.norm(those[:, :2] - expected[rows], axis=1).sum() for those in (found[rows], exchanged))
+        if other < off:
+            found[rows] = exchanged
+    return found[:, :2], np.where(alone, np.minimum(found[:, 2], 1.0), 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class JointCameras:
     """A body before cameras."""
@@ -96,15 +115,21 @@ class JointCameras:
     figure: Figure
     how: Settings
 
-    def detect(self, views: Sequence[Lines | None], expected: Array, spread: Array) -> list[JointMeasurement]:
+    def detect(
+        self, views: Sequence[Lines | None], expected: Array, spread: Array, landmarks: Array | None = None
+    ) -> list[JointMeasurement]:
         """Return the joints that each camera shows, where a state (43,) is expected with a covariance (33, 33).
 
         Detections outside the Mahalanobis gate are rejected. Where a camera shows nobody, no joint is detected.
+        `landmarks` (V, 27, 3) are those of an `Observation`; a joint is where they and the rules have it on average.
         """
-        each = zip(self.cameras, views, strict=True)
-        return [self._detected(camera, lines, expected, spread) for camera, lines in each]
+        given = np.zeros((len(views), len(JOINTS), 3)) if landmarks is None else landmarks
+        each = zip(self.cameras, views, given, strict=True)
+        return [self._detected(camera, lines, expected, spread, view) for camera, lines, view in each]
 
-    def _detected(self, camera: Camera, lines: Lines | None, expected: Array, spread: Array) -> JointMeasurement:
+    def _detected(
+        self, camera: Camera, lines: Lines | None, expected: Array, spread: Array, landmarks: Array
+    ) -> JointMeasurement:
         pixels, jacobian = self.figure.project(camera, expected)
         if lines is None:
             return JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, None)
@@ -119,6 +144,13 @@ class JointCameras:
         variances = self.how.joint_noise * (deviation * leg) ** 2
         if self.how.joint_errors == "measured":
             variances = variances / np.maximum(sure, LEAST)[:, None]
+        if landmarks.any():
+            placed, trusted = with_sides(landmarks, pixels)
+            rules = (sure > 0.0)[:, None] / variances
+            total = rules + np.maximum(trusted, TINY)[:, None] / (DEVIATION * metre) ** 2
+            placed = np.where(trusted[:, None] > 0.0, placed, points)
+            points, variances = placed + rules / total * (points - placed), 1.0 / total
+            sure = np.maximum(sure, trusted)
         off = points - pixels
         distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
         accepted = (distance < SURPRISE) | (not self.how.gates)

@@ -94,10 +94,10 @@ class TrackFilter:
         state, spread = models.fused(belief)
         likely = models.known[models.active[int(belief.probabilities.argmax())]]
         expected, spread = likely.predict(state, spread)
-        measured = self._cameras.detect(lines, expected, spread)
+        measured = self._cameras.detect(lines, expected, spread, observation.landmarks)
         if self._how.recovery and (extra := self._missing_spread(measured)).any():
             belief = models.widened(belief, extra)
-            measured = self._cameras.detect(lines, expected, spread + np.diag(extra))
+            measured = self._cameras.detect(lines, expected, spread + np.diag(extra), observation.landmarks)
         details = {**self._joints(measured), "detection_seconds": time.perf_counter() - began}
         if self._how.hidden == "imputed":
             measured = [joints.imputed(points) for joints, points in zip(measured, details["joints"], strict=True)]

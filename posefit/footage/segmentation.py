@@ -55,8 +55,8 @@ class Extraction:
     """How the person is separated from the rest of a video.
 
     `method` is a segmenter's name: by default a "mixture" of Gaussians learned from the whole video, or the "mean" of
-    `background` where that is given: frames without a person, as A:B, or an image. Where the default's masks are
-    doubted, a track tries "mediapipe", if that is installed. `settings` are the segmenter's own.
+    `background` where that is given: frames without a person, as A:B, or an image. Where "mediapipe" is installed, a
+    track by default takes the better of both, see `ways`. `settings` are the segmenter's own.
     `roi` x, y, width, height in the video's own pixels is where the person is searched; `ignore` is an image whose
     bright pixels are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
     """
@@ -90,13 +90,17 @@ class Extraction:
         """The segmenter's name."""
         return segmenter_name(self.method, self.background)
 
-    @property
-    def fallback(self) -> "Extraction | None":
-        """What to try where the masks are doubted; None where a segmenter was chosen, or no other is installed."""
+    def ways(self, cameras: int) -> "list[Extraction]":
+        """Return this extraction, and for the default of a track, where "mediapipe" is installed, that beside it.
+
+        A track takes the first whose masks are not doubted. With one camera that is first "mediapipe", whose landmarks
+        show which leg is the left one.
+        """
         other = registry().offers["segmenter"].get(PEOPLE_SEGMENTER)
         if self.method or self.background or self.settings or other is None or other.missing:
-            return None
-        return replace(self, method=PEOPLE_SEGMENTER)
+            return [self]
+        both = [self, replace(self, method=PEOPLE_SEGMENTER)]
+        return both[::-1] if cameras == 1 else both
 
     def segmenter(self, film: Footage) -> Segmenter:
         """Return the segmenter, trained on a film. Raises InputError where a setting does not fit it."""

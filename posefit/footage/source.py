@@ -123,19 +123,28 @@ def body_of(asf: str | Path | None, height: float | None) -> Body:
 def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress) -> list[CameraView]:
     """Return what videos show. Raises InputError where their masks cannot be those of a person.
 
-    Where the default's masks are doubted and another segmenter is installed, the one is used that is doubted less.
+    Of several ways to take the person out, the first is used whose masks are not doubted, or else are doubted least.
     """
-    views, doubt = _taken_out(videos, how, frames, progress)
-    if doubt and (other := how.fallback):
-        others, left = _taken_out(videos, other, frames, progress)
-        if left is None or (doubt.refused and not left.refused):
-            reason = doubt.text.partition(";")[0]
-            said = f"{other.name} took the person out, instead of {how.name}: {reason}"
-            others[0] = replace(others[0], warnings=[*others[0].warnings, said])
-            views, doubt = others, left
+    ways, best, reason = how.ways(len(videos)), None, ""
+    for way in ways:
+        views, doubt = _taken_out(videos, way, frames, progress)
+        if best is None or _badness(doubt) < _badness(best[1]):
+            best = views, doubt
+            if reason:
+                said = f"{way.name} took the person out, instead of {ways[0].name}: {reason}"
+                views[0] = replace(views[0], warnings=[*views[0].warnings, said])
+        if doubt is None:
+            break
+        reason = doubt.text.partition(";")[0]
+    assert best is not None
+    views, doubt = best
     if doubt and doubt.refused:
         raise InputError(doubt.text)
     return views
+
+
+def _badness(doubt: Verdict | None) -> int:
+    return 0 if doubt is None else 1 + doubt.refused
 
 
 def _taken_out(
@@ -145,7 +154,7 @@ def _taken_out(
     views, doubts = [], []
     segmentations = [Segmentation(video, how, frames) for video in videos]  # all are checked before any is read
     for part in segmentations:
-        progress.log(f"taking the person out of {part.video.path}{f' by {how.method}' if how.method else ''}")
+        progress.log(f"taking the person out of {part.video.path} by {how.name}")
         try:
             masks = part.masks(progress.steps)
         except InputError as error:

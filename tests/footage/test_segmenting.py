@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.cameras import yaws_of
 from posefit.footage.masks import Views
@@ -63,15 +64,29 @@ def test_a_person_who_is_always_there_is_refused_before_any_tracking(
     assert list(tmp_path.iterdir()) == []
 
 
-@each("kind", ["jumping", "passing"])
-def test_where_the_defaults_masks_are_doubted_an_installed_network_takes_the_person_out(
-    films: dict[str, Any], kind: Kind, monkeypatch: pytest.MonkeyPatch
+@each(
+    ("kind", "cameras", "network", "used"),
+    [
+        ("passing", 1, "right", "mediapipe"),
+        ("passing", 2, "right", "mixture"),
+        ("jumping", 2, "right", "mediapipe"),
+        ("passing", 1, "empty", "mixture"),
+        ("jumping", 2, "empty", None),
+    ],
+)
+def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_the_person_out(
+    films: dict[str, Any],
+    kind: Kind,
+    cameras: int,
+    network: str,
+    used: str | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path, true = films[kind]
 
     class Network:
         def __init__(self, film: object) -> None:
-            self.masks = iter(true)
+            self.masks = iter(true if network == "right" else np.zeros_like(true))
 
         def segment(self, image: Image) -> tuple[Any, Any]:
             mask = next(self.masks)
@@ -81,11 +96,19 @@ def test_where_the_defaults_masks_are_doubted_an_installed_network_takes_the_per
     offer = replace(registry().offers["segmenter"]["mediapipe"], factory=Network, needs=None)
     installed = Registry((*plugins, plugins[0]._replace(offers=(offer,))))
     monkeypatch.setattr("posefit.footage.segmentation.registry", lambda: installed)
-    scene = scene_of([path], height=1.7)
-    doubted = kind == "jumping"
+    target = np.array([0.0, 0.9, 0.0])
+    around = [Camera.around(target, 0.5 * k, 4.0, Video.of(path).size) for k in range(cameras)]
+    view: dict[str, Any] = {"camera": around if cameras > 1 else (), "height": 1.7}
+    if used is None:
+        with pytest.raises(InputError, match="the person seems to stand in the background"):
+            scene_of([path] * cameras, **view)
+        return
+    scene = scene_of([path] * cameras, **view)
     masks = [observation.silhouettes[0].mask for observation in scene.observations]
-    assert not doubted or overlap(masks, true) > 0.95
-    assert any("mediapipe took the person out, instead of mixture: " in text for text in scene.warnings) == doubted
+    assert (overlap(masks, true) > 0.95) == (used == "mediapipe")
+    first, second = ("mediapipe", "mixture") if cameras == 1 else ("mixture", "mediapipe")
+    exchanged = any(f"{second} took the person out, instead of {first}: " in text for text in scene.warnings)
+    assert exchanged == (used == second)
 
 
 @each("kind", ["passing", "leaving", *ALWAYS])

@@ -10,10 +10,12 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.fitting import metrics
+from posefit.fitting.landmarks import GROUPS, MIRRORED
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import joint_distances
 from posefit.motion import built_in
 from posefit.registry import registry
 from posefit.silhouette.cost import project
@@ -93,6 +95,24 @@ def test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it
     # 3.5 deviations to either side, of the filter's and 4 degrees more
     yaw, pitch, roll = 3.5 * np.hypot([0.5, 0.3, 0.7], np.radians(4.0))
     assert spaces[0].half[:3] == pytest.approx([yaw, pitch, roll])
+
+
+@each("exchanged", [False, True])
+def test_landmarks_bring_the_pose_nearer_though_a_detector_exchanges_legs(exchanged: bool) -> None:
+    task, observations = seen("walk-b", azimuth=1.4)
+    motion, given = built_in.motion("walk-b", frames=len(observations)), []
+    for k, (one, joints) in enumerate(zip(observations, motion.joints, strict=True)):
+        found = np.column_stack([task.cameras[0].project(joints)[0], np.ones(len(joints))])
+        if exchanged and k % 4 == 0:
+            found[GROUPS[0]] = found[MIRRORED[GROUPS[0]]]
+        given.append(replace(one, landmarks=found[None]))
+
+    def error(observations: list[Observation]) -> float:
+        poses = np.array([frame.pose for frame in follow(task, observations)])
+        return float(joint_distances(motion.skeleton.joints(motion.poses), motion.skeleton.joints(poses)).mean())
+
+    print(error(given), error(observations))
+    assert error(given) < 0.9 * error(observations)
 
 
 @each("gap", [1, 10])
