@@ -37,6 +37,7 @@ from posefit.uncertainty.calibration import LEVELS
 from posefit.uncertainty.modes import Mode, other_mode
 
 PANEL = 480  # pixels high
+OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)  # of neither, the mask, the body, and both
 SUMMARY_STILLS = 6  # frames on the summary
 SUMMARY_SCALE = 0.65  # of its words, which a page shows at three quarters of their size
 LABEL_HEIGHT = 38  # pixels that the label stands on
@@ -132,13 +133,12 @@ class Painter:
         height = PANEL // -(-len(self._scene.cameras) // columns)
         for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
             mask, fitted = silhouette.mask, project(body, camera, frame.pose, frame.translation)
-            view = blank(*mask.shape)
-            view[mask & ~fitted], view[fitted & ~mask], view[mask & fitted] = MISSED, SPILLED, BOTH
+            panel = OVERLAP[_panel(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
+            camera = _zoomed(camera, panel)
             if solid is not None:
                 share = solid_map(body, camera, frame.pose, frame.translation, solid)[..., None]
-                view = np.asarray(share * view + (1.0 - share) * np.array(BACKGROUND), np.uint8)
-            panel = _panel(view, height, sharp=True)
-            draw_other(panel, body, _zoomed(camera, panel), other)
+                panel = np.asarray(share * panel + (1.0 - share) * np.array(BACKGROUND), np.uint8)
+            draw_other(panel, body, camera, other)
             panels.append(panel)
         wide = max(panel.shape[1] for panel in panels)
         panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]

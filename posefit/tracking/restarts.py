@@ -229,9 +229,11 @@ def retrack_spins(
 
     That frame is the surest of those that face as most do, see `facing_consensus`. From there the person is
     followed onward, and backwards by training motions in reverse. The old track is kept where the new one spins as
-    often, or costs half as much again. The frames have the effort of both tracks.
+    often, or costs half as much again. The frames have the effort of both tracks. Where fewer cameras see the person
+    than half of the most that do, a spin is no sign: they are coming in or leaving.
     """
-    usable = np.array([observation.usable for observation in observations])
+    seeing = np.array([sum(one.known for one in observation.silhouettes) for observation in observations])
+    usable = np.array([observation.usable for observation in observations]) & (2 * seeing >= seeing.max())
 
     def spins(track: Sequence[Frame]) -> int:
         return int(spin_mask(np.array([frame.pose[0] for frame in track]), usable, task.fps).sum())

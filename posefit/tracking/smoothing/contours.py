@@ -22,7 +22,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
-from posefit.silhouette.mask import PIECE, Mask, coarser_camera, coarser_silhouette
+from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
 from posefit.silhouette.rasteriser import NEAR
 from posefit.tracking.smoothing import kernels
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
@@ -72,12 +72,15 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
     nothing = np.empty((0, 2)), (0, 0), np.zeros((1, 1), dtype=np.float32)
     if not observation.usable:
         return nothing
-    silhouette = coarser_silhouette(observation.silhouettes[view], factor)
-    mask = _without_small_pieces(silhouette.mask)
+    silhouette, first = observation.silhouettes[view], factor // 2
+    mask, valid = (
+        np.ascontiguousarray(one[first::factor, first::factor]) for one in (silhouette.mask, silhouette.valid)
+    )
+    mask = without_small_pieces(mask)
     left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
     right, bottom = left + width + FIELD_MARGIN, top + height + FIELD_MARGIN
     left, top = max(left - FIELD_MARGIN, 0), max(top - FIELD_MARGIN, 0)
-    mask, valid = mask[top:bottom, left:right], silhouette.valid[top:bottom, left:right]
+    mask, valid = mask[top:bottom, left:right], valid[top:bottom, left:right]
     around = valid & ~mask  # the background there is known
     if not width or not around.any():
         return nothing
@@ -96,15 +99,6 @@ def _between(mask: Mask, around: Mask) -> Array:
     meet = (mask[:, 1:] & around[:, :-1]) | (mask[:, :-1] & around[:, 1:])
     rows, columns = np.nonzero(meet)
     return np.column_stack([columns + 1.0, rows + 0.5])
-
-
-def _without_small_pieces(mask: Mask) -> Mask:
-    """Return a mask without its small pieces, which are not the person."""
-    count, numbers, pieces, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    if count <= 2:
-        return mask
-    sizes = pieces[1:, cv2.CC_STAT_AREA]
-    return np.asarray(np.append(False, sizes >= PIECE * sizes.max())[numbers])
 
 
 BONE_STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
