@@ -7,7 +7,7 @@ from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
-from posefit.silhouette.cost import Areas, only_camera, pose_costs
+from posefit.silhouette.cost import Areas, known_views, pose_costs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit_exemplars.contours import FrameContours
 
@@ -29,13 +29,13 @@ class FrameCosts:
             [coarser_silhouette(silhouette, factor) for silhouette in silhouettes],
         )
         self.share = 1.0 / factor**2  # effort of a cost in the small picture, as a share of one at full size
-        self.skeleton, self.cameras = task.body.skeleton, len(task.cameras)
+        self._seeing = known_views(task.cameras, silhouettes)
+        self.skeleton, self.cameras = task.body.skeleton, len(self._seeing)  # how many cameras see something
         self.yaw, self.usable = observation.yaw, observation.usable
         known = observation.translation if task.translation == "known" else None
         self.root = None if known is None else np.asarray(known, dtype=np.float64)  # (3,) metres, where it is known
         # (3,) where the only camera stands that shows the person; None with several, which also show the depth
-        only = only_camera(task.cameras, silhouettes)
-        self.eye: Array | None = None if only is None else only.position
+        self.eye: Array | None = self._seeing[0].position if self.cameras == 1 else None
 
     def placed(self, poses: Array, places: Array) -> Array:
         """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
@@ -71,8 +71,8 @@ class FrameCosts:
         return float(costs[0]), counts[:, 0]
 
     def reflected(self, poses: Array, place: Array) -> Array:
-        """Return poses (n, 66) at about `place` (3,) reflected along each camera's line of sight (cameras n, 66)."""
-        each = (reflected_poses(self.skeleton, poses, facing(camera, place)) for camera in self._task.cameras)
+        """Return poses (n, 66) at about `place` (3,) reflected along each line of sight (cameras n, 66)."""
+        each = (reflected_poses(self.skeleton, poses, facing(camera, place)) for camera in self._seeing)
         return np.concatenate([*each])
 
     def twins(self, pose: Array, place: Array) -> Array:

@@ -131,18 +131,18 @@ class HypothesisFilter:
         self._samples, self._power = samples, power / SHARPNESS
         self._library_cost = LIBRARY_COST * 30.0 / task.fps
         self._costs: deque[float] = deque(maxlen=max(round(MEMORY * task.fps), 1))  # of the best hypotheses
-        evaluations = max(evaluations / len(task.cameras), MIN_EVALUATIONS)  # several cameras leave less open
-        self.fresh = max(int(FRESH * evaluations / FRESH_EVALUATIONS), 2)
-        self.going = int((evaluations - self.fresh * FRESH_EVALUATIONS) / GOING_EVALUATIONS)
+        self._evaluations = evaluations
 
-    @property
-    def unlike(self) -> int:
-        """The number of the beam's states, unlike each other, that hypotheses of a frame begin with."""
-        return self.fresh - 1 - self._reflected
+    def unlike(self, cameras: int) -> int:
+        """Return how many of the beam's states, unlike each other, begin hypotheses where so many cameras see."""
+        fresh, _ = self._counts(cameras)
+        return fresh - 1 - int(REFLECTED * fresh)
 
-    @property
-    def _reflected(self) -> int:
-        return int(REFLECTED * self.fresh)
+    def _counts(self, cameras: int) -> tuple[int, int]:
+        """Return how many hypotheses are fresh, and how many go on; several cameras leave less open."""
+        evaluations = max(self._evaluations / cameras, MIN_EVALUATIONS)
+        fresh = max(int(FRESH * evaluations / FRESH_EVALUATIONS), 2)
+        return fresh, int((evaluations - fresh * FRESH_EVALUATIONS) / GOING_EVALUATIONS)
 
     def follow(self, frames: Iterable[Estimate], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield each frame with the pose of the likeliest sequence, up to `delay` frames later."""
@@ -185,7 +185,7 @@ class HypothesisFilter:
             used += len(poses) * FRESH_EVALUATIONS
         origins = np.full(len(poses), -1)
         if latest is not None:
-            going = self._unlike(latest)
+            going = self._unlike(latest, look)
             moved, shifted = latest.poses[going], latest.places[going]
             if contours is not None:
                 moved = moved + latest.turns[going]
@@ -236,12 +236,12 @@ class HypothesisFilter:
         poses, places = frame.pose[None], frame.place[None]
         if frame.others is not None:
             poses, places = np.concatenate([poses, frame.others[0]]), np.concatenate([places, frame.others[1]])
-        left = self.fresh - len(poses)
+        left = self._counts(frame.look.cameras)[0] - len(poses)
         if not frame.look.usable or left <= 0:
             return poses, places
         first, beside = poses, places
         if latest is not None:
-            going = self._unlike(latest)
+            going = self._unlike(latest, frame.look)
             first, beside = latest.poses[going] + latest.turns[going], latest.places[going] + latest.shifts[going]
         first = first[: -(-left // frame.look.cameras)]
         reflected = frame.look.reflected(first, frame.place)[:left]
@@ -256,15 +256,16 @@ class HypothesisFilter:
         both = weights + pulls
         return poses + (pulls / both)[3:] * (similar - poses), both
 
-    def _unlike(self, latest: Hypotheses) -> Rows:
+    def _unlike(self, latest: Hypotheses, look: FrameCosts) -> Rows:
         """Return the hypotheses that go on: the likeliest so far, of those that are near each other one."""
+        _, most = self._counts(look.cameras)
         flat = latest.joints.reshape(len(latest), -1).astype(np.float32)
         near = squared_distances(flat, flat) < SAME**2 * len(JOINTS)
         chosen: list[int] = []
         for row in np.argsort(latest.totals, kind="stable"):
             if not near[row, chosen].any():
                 chosen.append(int(row))
-                if len(chosen) == self.going:
+                if len(chosen) == most:
                     break
         return np.array(chosen)
 

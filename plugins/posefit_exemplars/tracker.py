@@ -290,7 +290,7 @@ class ExemplarTracker:
         row, likely, oldest = viterbi_state(window), state_weights(window), waiting.popleft()
         beam, look, others, paths = oldest.states.beam, oldest.look, None, None
         if self.hypotheses is not None:
-            unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, self.hypotheses.unlike))
+            unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, self.hypotheses.unlike(look.cameras)))
             others = self._poses(unlike), unlike.places
         codes, turns = self.exemplars.codes[beam.states], beam.yaws - beam.yaws[row]
         squares = squares_apart(codes, codes[row], turns)

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evolution.strategy import Strategy, default_population_size
@@ -74,7 +72,7 @@ class Shape:
 
     body: Body
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
-    spread: Array = field(repr=False)  # (17,) standard deviation of the factors over resampled frames
+    spread: Array = field(repr=False)  # (17,) standard deviation of each factor's logarithm
     cost: float  # mean over the frames
     height: float | None = None  # metres that it was made to stand; None where it was fitted
 
@@ -88,38 +86,30 @@ def fit_shape(
     *,
     height: float | None = None,
     aligned: bool = True,
-    resamples: int = 4,
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with their poses.
 
     `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
-    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. `spread`
-    is bootstrapped: it comes from `resamples` fits to frames drawn with replacement.
+    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. How sure the
+    factors are is not known yet: their `spread` is people's.
     """
-    everything = np.arange(len(observations))
 
-    def cost(factors: Array, chosen: NDArray[np.int64]) -> float:
-        """Return the mean mismatch over the chosen frames, whose poses are held."""
+    def cost(factors: Array) -> float:
+        """Return the mean mismatch over the frames, whose poses are held."""
         tried, total = shaped(body, factors, height), 0.0
-        for k in chosen.tolist():
-            pose, translation = frames[k].pose[None], frames[k].translation[None]
-            silhouettes = observations[k].silhouettes
+        for frame, observation in zip(frames, observations, strict=True):
+            pose, translation, silhouettes = frame.pose[None], frame.translation[None], observation.silhouettes
             if aligned:
                 translation = align(tried, cameras, silhouettes, pose, translation)
             for camera, silhouette in zip(cameras, silhouettes, strict=True):
                 total += float(mismatch(areas(tried, camera, silhouette, pose, translation))[0])
-        return total / (len(chosen) * len(cameras))
+        return total / (len(observations) * len(cameras))
 
     factors = np.ones(len(NAMES))
     for k in range(ROUNDS):
         frames = follow(shaped(body, factors, height))
-        factors = _search(partial(cost, chosen=everything), factors, rng, first=k == 0)
-    samples = []
-    for _ in range(resamples):
-        chosen = rng.integers(len(observations), size=len(observations))
-        samples.append(_search(partial(cost, chosen=chosen), factors, rng))
-    spread = np.std(samples, axis=0)
-    return Shape(shaped(body, factors, height), factors, spread, cost(factors, everything), height)
+        factors = _search(cost, factors, rng, first=k == 0)
+    return Shape(shaped(body, factors, height), factors, SPREAD, cost(factors), height)
 
 
 def _search(cost: Callable[[Array], float], start: Array, rng: np.random.Generator, *, first: bool = False) -> Array:

@@ -15,7 +15,14 @@ from posefit.progress import Progress
 from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import RESTARTS, TRIAL_STRIDE, Follow, best_restart, usable_observations
+from posefit.tracking.restarts import (
+    RESTARTS,
+    TRIAL_STRIDE,
+    Follow,
+    best_restart,
+    first_shown_whole,
+    usable_observations,
+)
 
 BODY_FRAMES = 12  # to which a build is fitted
 MIN_BODY_FRAMES = 5
@@ -71,10 +78,10 @@ def fitted_build(
 ) -> Shape:
     """Return the person's build, from the first usable frames: every third, where there are so many.
 
-    With several cameras it begins with the first frame that most of them see: a person who comes in is visible to one.
+    It begins with the first frame that shows most: a person who comes in is cut, and visible to few cameras.
     """
     stride = TRIAL_STRIDE
-    chosen = usable_observations(observations, frames, stride, first_seen_by_most(observations))
+    chosen = usable_observations(observations, frames, stride, first_shown_whole(observations))
     if len(chosen) < frames:
         chosen, stride = usable_observations(observations, frames), 1
     task = replace(task, fps=task.fps / stride)
@@ -84,16 +91,6 @@ def fitted_build(
 
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
     return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned)
-
-
-def first_seen_by_most(observations: Sequence[Observation]) -> int:
-    """Return the first frame in which no fewer cameras see the person than in any other; 0 for one camera."""
-    counts: list[int] = []
-    for observation in observations:
-        counts.append(sum(silhouette.known for silhouette in observation.silhouettes))
-        if len(observation.silhouettes) in (1, counts[-1]):
-            break
-    return int(np.argmax(counts))
 
 
 def _warm_up(method: Method, task: Task, scene: Scene) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from posefit.errors import InputError
-from posefit.fitting.tracker import Task
+from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene, on_device
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
@@ -25,7 +25,17 @@ from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import Method, prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
-from posefit.tracking.restarts import MAX_TURN_RATE, SEARCHED, initial_guess, retrack_spins, stream
+from posefit.tracking.restarts import (
+    MAX_TURN_RATE,
+    SEARCHED,
+    after,
+    backwards,
+    first_shown_whole,
+    initial_guess,
+    joined,
+    retrack_spins,
+    stream,
+)
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import Pass, smooth
 from posefit.tracking.summary import evaluate
@@ -84,8 +94,13 @@ def track_scene(
 def follow(
     scene: Scene, first: Task, method: Method, options: TrackOptions, output: Output, progress: Progress
 ) -> list[Hypothesis]:
-    """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again."""
+    """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again.
+
+    In footage, a tracker that looks ahead begins with the first frame that shows the whole person; from there it goes
+    back first.
+    """
     earlier, state = output.earlier()
+    start = first_shown_whole(scene.observations) if scene.truth is None and method.looks_ahead(first) else 0
     count, total = scene.count, options.hypotheses
     hypotheses: list[Hypothesis] = []
     for number in range(total):
@@ -109,10 +124,21 @@ def follow(
         elif which and not frames:
             progress.log(f"track {number + 1} of {total}: {name}")
         hypotheses.append((name, frames))
+        behind: list[Frame] = []
+        if start and not frames:
+            back = method.tracker(backwards(task))
+            seen = (scene.observations[k] for k in range(start, -1, -1))
+            behind = list(progress.steps(back.track(seen, stream(options.seed, "back", number)), start + 1))
+            for frame in behind[:0:-1]:
+                output.record(frame, dict(rng.bit_generator.state))
+                frames.append(frame)
+            task = after(task, behind[0])
         if len(frames) < count:
             rest = (scene.observations[k] for k in range(len(frames), count))
             tracker = method.relocalising(task, scene.truth is None)
             for frame in progress.steps(tracker.track(rest, rng), count - len(frames)):
                 output.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
+        if behind:
+            frames[:start] = joined(scene.body.skeleton, behind, frames[start])[:0:-1]
     return hypotheses

@@ -29,7 +29,7 @@ from posefit.motion.steadiness import runs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.trajectory import effort_of, mean_cost, with_total_effort
 
-RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026}  # part of the seed of what is tracked again
+RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026, "back": 1902}  # part of the seed of what is tracked again
 RESTARTS = 8  # searches of the first frame
 TRIAL_FRAMES = 10  # by which a restart is judged
 TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
@@ -52,7 +52,7 @@ SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
-def stream(seed: int, kind: Literal["hypothesis", "spin", "pass"], number: int) -> np.random.Generator:
+def stream(seed: int, kind: Literal["hypothesis", "spin", "pass", "back"], number: int) -> np.random.Generator:
     """Return the random generator of something that is tracked again; that of the first track is of the seed alone."""
     return np.random.default_rng([seed, RNG_STREAMS[kind], number])
 
@@ -71,6 +71,22 @@ def usable_observations(
     """Return the first `count` observations from `start` on, of every `stride`th, that show enough of the person."""
     each = (observations[k] for k in range(start, len(observations), stride))
     return list(islice((observation for observation in each if observation.usable), count))
+
+
+def first_shown_whole(observations: Sequence[Observation]) -> int:
+    """Return the first frame of those in which most cameras show all of the person, nothing cut by the picture's edge.
+
+    Where none does, it is the first that is usable.
+    """
+    best, most = 0, 0.0
+    for k, observation in enumerate(observations):
+        whole = sum(np.isfinite(silhouette.extent).all() for silhouette in observation.silhouettes if silhouette.known)
+        count = float(whole) if observation.usable else 0.0
+        if count > most or (not most and observation.usable):
+            best, most = k, max(count, 0.5)
+        if count == len(observation.silhouettes):
+            break
+    return best
 
 
 def best_restart(
@@ -105,10 +121,10 @@ def best_restart(
         frames = list(follow(trial, shown, np.random.default_rng([*prefix, k])))
         tried += frames
         if (cost := _trial_cost(frames)) < least:
-            best, least = _after(task, frames[0]), cost
+            best, least = after(task, frames[0]), cost
     if factor > 1 and best is not (going_on or task):
         tried.append(next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts]))))
-        best = _after(task, tried[-1])
+        best = after(task, tried[-1])
     return best, tried
 
 
@@ -122,7 +138,7 @@ def _trial_cost(frames: Sequence[Frame]) -> float:
     return float(np.mean([frame.cost for frame in frames])) * (BACKWARDS_PENALTY if backwards else 1.0)
 
 
-def _after(task: Task, frame: Frame) -> Task:
+def after(task: Task, frame: Frame) -> Task:
     """Return the task that goes on from a frame."""
     return replace(task, yaw=float(frame.pose[0]), anchor=frame.translation, first_pose=frame.pose[3:], before=(frame,))
 
@@ -172,7 +188,7 @@ class RelocalisingTracker:
                 window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]
                 seeds = independent(rng).integers(0, 2**32, 2).tolist()
                 around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
-                on = _after(around, latest)
+                on = after(around, latest)
                 task, tried = best_restart(around, window, self.follow, RESTARTS, seeds, on)
                 if task is not on:
                     going = self.follow(task, chain([observation], copy(coming)), rng)
@@ -215,7 +231,7 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
     name = order[(number - 1) % len(order)]
     if name == SEARCHED_AGAIN:
         return name, task
-    return name, replace(_after(task, replace(first, pose=poses[name])), before=())
+    return name, replace(after(task, replace(first, pose=poses[name])), before=())
 
 
 # After the last frame. A silhouette hardly distinguishes a body that faces the camera from its reflection, which faces
@@ -229,11 +245,9 @@ def retrack_spins(
 
     That frame is the surest of those that face as most do, see `facing_consensus`. From there the person is
     followed onward, and backwards by training motions in reverse. The old track is kept where the new one spins as
-    often, or costs half as much again. The frames have the effort of both tracks. Where fewer cameras see the person
-    than half of the most that do, a spin is no sign: they are coming in or leaving.
+    often, or costs half as much again. The frames have the effort of both tracks.
     """
-    seeing = np.array([sum(one.known for one in observation.silhouettes) for observation in observations])
-    usable = np.array([observation.usable for observation in observations]) & (2 * seeing >= seeing.max())
+    usable = np.array([observation.usable for observation in observations])
 
     def spins(track: Sequence[Frame]) -> int:
         return int(spin_mask(np.array([frame.pose[0] for frame in track]), usable, task.fps).sum())
@@ -242,18 +256,23 @@ def retrack_spins(
     start = anchor_frame(frames, facing_consensus(frames, task.cameras, usable, task.fps)) if before else None
     if start is None:
         return list(frames), None
-    sure = replace(_after(task, frames[start]), before=(), fastest_turn=MAX_TURN_RATE)
-    reverse = [replace(one, poses=one.poses[::-1], translations=one.translations[::-1]) for one in task.training]
-    back = replace(sure, training=reverse, backwards=True)
+    sure = replace(after(task, frames[start]), before=(), fastest_turn=MAX_TURN_RATE)
+    back = backwards(sure)
     ahead = list(follow(sure, (observations[k] for k in range(start, len(frames))), stream(seed, "spin", 0)))
     behind = list(follow(back, (observations[k] for k in range(start, -1, -1)), stream(seed, "spin", 1)))
-    again = [*_joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
+    again = [*joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
     cheap = mean_cost(again, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(again) < before
     return with_total_effort([frames, again], int(better)), start if better else None
 
 
-def _joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
+def backwards(task: Task) -> Task:
+    """Return a task whose observations go back in time."""
+    reverse = [replace(one, poses=one.poses[::-1], translations=one.translations[::-1]) for one in task.training]
+    return replace(task, training=reverse, backwards=True)
+
+
+def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
     """Return frames whose posterior trajectories go on as those of the frame from which both ways were followed.
 
     Each of its trajectories goes on as the nearest one there.

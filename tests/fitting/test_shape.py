@@ -70,13 +70,11 @@ def test_a_build_is_estimated_where_the_poses_are_known() -> None:
     cameras = [Camera.around(middle, azimuth, 3.5, (320, 240)) for azimuth in (0.0, np.pi / 2)]
     frames, observations = frames_at(PLACES), observed(true, cameras)
     rng = np.random.default_rng(0)
-    shape = fit_shape(AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False, resamples=2)
+    shape = fit_shape(AVERAGE, cameras, observations, lambda _: frames, rng, aligned=False)
     assert shape.body.stature == pytest.approx(true.stature, rel=0.03)
     for bone in ("lfemur", "ltibia", "lhumerus"):
         k = BONES.index(bone)
         assert shape.body.skeleton.lengths[k] == pytest.approx(true.skeleton.lengths[k], rel=0.06)
-    assert (shape.spread >= 0.0).all()
-    assert shape.spread.max() > 0.0
 
 
 def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
@@ -87,5 +85,5 @@ def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
         for observation, pose, place in zip(observations, POSES, PLACES, strict=True)
     ]
     frames, rng = frames_at(places), np.random.default_rng(0)
-    shape = fit_shape(AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55, resamples=1)
+    shape = fit_shape(AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55)
     assert shape.body.stature == pytest.approx(1.55)

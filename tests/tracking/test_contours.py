@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from posefit.fitting.shape import NAMES, Shape, shaped
+from posefit.fitting.shape import NAMES, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
@@ -207,6 +207,8 @@ def test_limbs_become_as_thick_as_the_persons_and_the_height_stays() -> None:
     expected = {"thighs girth": 1.25, "torso girth": 1.25, "shanks girth": 1.0}
     assert {name: factors[name] for name in expected} == pytest.approx(expected, abs=0.1)
     np.testing.assert_allclose(shape.body.radii, shaped(scene.body, shape.factors).radii)
+    spread = dict(zip(NAMES, shape.spread / SPREAD, strict=True))  # as a share of people's
+    assert 0.0 < spread["thighs girth"] < 0.5 < spread["neck length"] < 1.0
     _, shape = fitted(scene, truth, replace(average, height=scene.body.stature))
     assert shape is not None
     assert shape.body.stature == pytest.approx(scene.body.stature)

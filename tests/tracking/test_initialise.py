@@ -18,9 +18,9 @@ from posefit.motion import built_in
 from posefit.progress import Progress
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.initialise import first_seen_by_most, fitted_build, task_of
+from posefit.tracking.initialise import fitted_build, task_of
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import best_restart
+from posefit.tracking.restarts import best_restart, first_shown_whole
 from tests.cases import each
 from tests.testing import planted
 from tests.tracking.scenes import frame_of, truth_of, walk
@@ -117,7 +117,7 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
     return [call for k, call in enumerate(calls) if call not in calls[:k]]
 
 
-def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_most_cameras_see_the_person() -> None:
+def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_the_person_is_shown_whole() -> None:
     scene = walk(40, [0.0, 90.0], (120, 90))
     observations = [scene.observations[k] for k in range(30)]
     thirds, all_of_them = frames_of_builds(scene, observations, 10, 11)
@@ -129,5 +129,10 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
     few, many = frames_of_builds(scene, observations, 5, 11)  # too many for those that come after
     assert few[0] == [10, 13, 16, 19, 22]
     assert many[0] == list(range(11))
-    assert first_seen_by_most(observations) == 10
-    assert first_seen_by_most([replace(seen, silhouettes=seen.silhouettes[:1]) for seen in observations]) == 0
+    assert first_shown_whole(observations) == 10
+    assert first_shown_whole([replace(seen, silhouettes=seen.silhouettes[:1]) for seen in observations]) == 0
+    whole = observations[0].silhouettes[0]
+    cut = Silhouette.of(np.roll(whole.mask, -int(whole.extent[0]) - 5, axis=1))  # a part of it at the other edge
+    seen = [replace(observations[0], silhouettes=[one]) for one in (unknown, cut, cut, whole)]
+    assert first_shown_whole(seen) == 3
+    assert first_shown_whole([replace(seen[1], usable=False), seen[2]]) == 1

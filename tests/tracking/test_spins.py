@@ -1,6 +1,8 @@
 """Bodies that turn faster than a person can, and tracks that are tracked again because of them."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,10 +12,15 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
+from posefit.progress import Progress
 from posefit.silhouette.mask import Silhouette
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.outputs import Output
+from posefit.tracking.pipeline import follow
 from posefit.tracking.restarts import MAX_TURN_RATE, anchor_frame, facing_consensus, retrack_spins, spin_mask
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
+from tests.tracking.scenes import walk
 
 FPS = 30.0
 # at z = 6 on the z axis: a person of yaw 0 faces it, and yaw t and 180 - t are reflections of each other
@@ -147,3 +154,33 @@ def test_a_track_that_gets_no_better_is_kept(
     assert start is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
     assert {f.evaluations for f in kept} == {evaluations}
+
+
+def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_first_back_and_then_on() -> None:
+    calls = list[tuple[Task, list[int]]]()
+    whole = np.zeros((12, 16), dtype=bool)
+    whole[3:9, 6:9] = True
+    shown = [*OBSERVATIONS[:5], *(Observation([Silhouette.of(whole)]) for _ in range(5))]  # a full picture is cut
+    scene = replace(walk(10), truth=None, observations=shown, count=10)
+
+    class Tracker:
+        lag = 3
+
+        def __init__(self, task: Task) -> None:
+            self.task = task
+
+        def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+            rows = [next(k for k, other in enumerate(shown) if other is one) for one in observations]
+            calls.append((self.task, rows))
+            yield from (frame(float(row), posterior=posterior(0.1)) for row in rows)
+
+    method: Any = SimpleNamespace(
+        tracker=Tracker, looks_ahead=lambda _: True, relocalising=lambda task, _: Tracker(task)
+    )
+    [(_, frames)] = follow(scene, TASK, method, TrackOptions(), Output(), Progress())
+    (back, behind), (onward, ahead) = calls
+    assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])
+    assert back.backwards
+    np.testing.assert_array_equal(back.training[0].poses, WALK.poses[::-1])
+    assert np.degrees(onward.yaw or 0.0) == pytest.approx(5.0)  # it goes on from where the track back began
+    assert [np.degrees(f.pose[0]) for f in frames] == pytest.approx(range(10))

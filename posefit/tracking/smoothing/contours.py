@@ -163,6 +163,7 @@ class _Part:
     factors: Array  # (17,) logarithms of what the body was fitted by before; (0,) where the build is known
     height: float | None
     visibility: Visibility
+    spread: Array  # (17,) standard deviations of these logarithms
 
 
 def fit_contours(
@@ -182,7 +183,7 @@ def fit_contours(
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
         part = _fitted(scene, motion, visibility, parts[best][0], scene.body, shape, beta)
         if part.body is not scene.body:  # else no build fits better, and only poses are fitted
-            shape = replace(shape, body=part.body, factors=np.exp(part.factors))
+            shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=part.spread)
             fitted[best] = part
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
@@ -207,7 +208,7 @@ def _fitted(
     places = estimate.translations
     borders = [MaskContours.of(camera, view, observations, places) for view, camera in enumerate(scene.cameras)]
     factors, height = (np.empty(0), None) if shape is None else (np.log(shape.factors), shape.height)
-    part = _Part(estimate, estimate, body, factors, height, visibility.at(rows))
+    part = _Part(estimate, estimate, body, factors, height, visibility.at(rows), np.zeros(len(factors)))
     best, least = part, _mean_cost(scene, part, observations, beta)
     for scale in ROBUST_SCALES:
         part = _stepped(part, borders, scale)
@@ -253,7 +254,7 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
             mixed += across @ (curvature @ grown)
             curve += np.einsum("tqi,tqj->ij", grown, curvature @ grown)
             slope += np.einsum("tqi,tq->i", grown, gradient)
-    fitted, estimate, turns = part.fitted, part.estimate, np.zeros(factors)
+    fitted, estimate, turns, spread = part.fitted, part.estimate, np.zeros(factors), part.spread
     squares, turned = Squares(count, numbers), slice(3, numbers)
     squares.add(slice(None), curves, slopes)
     add_root(squares, estimate, part.visibility, ROOT_DEVIATION, places - estimate.translations)
@@ -266,14 +267,16 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     else:
         solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
         way, answers = solved[..., 0], solved[..., 1:]
-        known = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0) / SPREAD**2
+        held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
+        known = held / SPREAD**2
         curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, answers)
         slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, way)
         turns = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
         turns = part.factors - np.clip(part.factors - turns, -REACH * SPREAD, REACH * SPREAD)
         way = way - answers @ turns
+        spread = np.sqrt(held * np.diag(np.linalg.inv(curve)))
     poses = poses.copy()
     poses[:, angles] -= np.clip(way[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
     body = shaped(part.body, np.exp(-turns), part.height) if factors else part.body
     fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - way[:, :3])
-    return replace(part, fitted=fitted, body=body, factors=part.factors - turns)
+    return replace(part, fitted=fitted, body=body, factors=part.factors - turns, spread=spread)
