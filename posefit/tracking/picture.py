@@ -136,8 +136,9 @@ class Painter:
             panel = OVERLAP[_panel(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
             camera = _zoomed(camera, panel)
             if solid is not None:
-                share = solid_map(body, camera, frame.pose, frame.translation, solid)[..., None]
-                panel = np.asarray(share * panel + (1.0 - share) * np.array(BACKGROUND), np.uint8)
+                share = solid_map(body, camera, frame.pose, frame.translation, solid)
+                faint, share = share < 1.0, share[share < 1.0, None]
+                panel[faint] = share * panel[faint] + (1.0 - share) * np.array(BACKGROUND)
             draw_other(panel, body, camera, other)
             panels.append(panel)
         wide = max(panel.shape[1] for panel in panels)

@@ -11,6 +11,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
@@ -27,6 +28,7 @@ from posefit.tracking.smoothing.contours import (
 )
 from posefit.tracking.smoothing.path import Visibility
 from posefit.tracking.smoothing.smooth import smoothed
+from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 
@@ -264,7 +266,8 @@ def test_footage_of_any_length_is_fitted(frames: int) -> None:
 def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_move_along() -> None:
     scene, truth = footage(girth=1.25)
     estimate = estimate_of(truth, 3.0)
-    posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2))
+    sure = Recalibration(joint_spreads=np.append(0.0, np.full(len(JOINTS) - 1, 0.006)))
+    posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2), recalibration=sure)
     nothing = np.zeros((1, 3), np.int64)
     frames = [
         Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0), posterior=posterior)
@@ -276,8 +279,14 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     costs = [np.mean([frame.cost for frame in each.frames]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
     assert both.shape.cost == pytest.approx(costs[0])
-    moved, pose = both.frames[0].posterior, both.frames[0].pose
+    moved, pose, known = both.frames[0].posterior, both.frames[0].pose, alone.frames[0].posterior
     assert moved is not None
+    assert known is not None
+    assert known.recalibration is sure
+    wider = moved.recalibration
+    assert wider is not None
+    assert wider.joint_spreads[0] == 0.0
+    np.testing.assert_allclose(wider.joint_spreads[1:], 0.010)  # 8 mm more, by squares
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]
     np.testing.assert_allclose(moved.translations[1] - both.frames[0].translation, apart)

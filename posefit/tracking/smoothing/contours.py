@@ -149,7 +149,7 @@ ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
 MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
-BUILD_FRAMES = 3.0  # for each of which the build is held once more: errors of contours are correlated, and add up
+BUILD_FRAMES = 2.0  # for each of which the build is held once more: errors of contours are correlated, and add up
 WINDOW_FRAMES, OVERLAP_FRAMES = 300, 30  # frames that are solved for at once, and those that two windows share
 
 

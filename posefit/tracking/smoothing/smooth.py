@@ -23,6 +23,8 @@ from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost, motion_of, with_total_effort
 
+# metres, on each axis, that a joint may be off the root because a fitted build is: seeds 3 to 5 of composites.py
+BUILD_DEVIATION = 0.008
 PASS_TOLERANCE = 1.125  # times what the pass before costs: a pass that costs more is not kept
 
 
@@ -69,19 +71,24 @@ def smoothed(scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: f
     motion, shape = fit_contours(scene, motion, visibility, shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
     scene = scene if shape is None else replace(scene, body=shape.body)
-    smooth = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
+    smooth = [_moved(scene, k, frame, motion, beta, shape is not None) for k, frame in enumerate(frames)]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smooth, visibility.usable))
     return Pass(scene, smooth, shape, number)
 
 
-def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
-    """Return a frame at the pose that a motion has in frame k."""
+def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float, fitted: bool) -> Frame:
+    """Return a frame at the pose that a motion has in frame k, less sure where the build was `fitted`."""
     pose, place, silhouettes = motion.poses[k], motion.translations[k], scene.observations[k].silhouettes
     costs, counts = pose_costs(scene.body, scene.cameras, silhouettes, pose[None], place[None], beta)
     posterior = frame.posterior
     if posterior is not None:
         poses = posterior.poses + wrapped(pose - frame.pose)
-        posterior = replace(posterior, poses=poses, translations=posterior.translations + (place - frame.translation))
+        model = posterior.recalibration
+        if fitted and model is not None:
+            spreads = np.hypot(model.joint_spreads, BUILD_DEVIATION)
+            model = replace(model, joint_spreads=np.append(0.0, spreads[1:]))
+        places = posterior.translations + (place - frame.translation)
+        posterior = replace(posterior, poses=poses, translations=places, recalibration=model)
     moved = replace(frame, pose=pose, translation=place, cost=float(costs[0]), areas=counts[:, 0])
     return replace(moved, coordinates=None, posterior=posterior)
