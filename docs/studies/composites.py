@@ -42,6 +42,7 @@ from posefit.progress import Progress
 from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
+from posefit.sweep.engines.engine import Limits
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
 from posefit.tracking.result import Track
@@ -183,6 +184,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
 }
 
 
+LIMITS = Limits(gigabytes=8.0)  # four cameras, and MediaPipe's libraries
 DEFAULT = "default"  # as `posefit track` takes people out by itself
 GIVEN = "mean"  # the extraction that is given pictures without anybody
 QUICK = (("through", 1), ("stands", 1))  # situations and numbers of cameras of a quick look
@@ -218,7 +220,7 @@ def composites(
     check_video(video)
     done = earlier(rows, shot_of)
     jobs = {shot: partial(measured, video, shot) for shot in shots if shot not in done}
-    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
+    done |= each(jobs, workers, partial(kept, rows), LIMITS) if jobs else {}
     found = [done[shot] for shot in shots]
     return found
 

@@ -439,7 +439,9 @@ STAYING: Mapping[str, Sequence[tuple[str, int, int]]] = {
     "stands": (("49_15", 0, 150), ("14_04", 0, 150), ("29_02", 100, 250)),
     "waves": (("29_05", 60, 240), ("14_05", 40, 212), ("02_06", 0, 180)),
     "to and fro": (("29_01", 0, LONGEST), ("09_12", 0, LONGEST), ("09_12", 200, 200 + LONGEST)),
+    "squats": (("02_06", 180, 400), ("14_06", 0, 130), ("14_20", 0, 120)),
 }
+TREADMILL = 4.0  # metres to either side, that are walked on the spot
 
 
 @dataclass(frozen=True, eq=False)
@@ -468,6 +470,8 @@ SHOWS = {
     "to and fro": "somebody who is always there and walks to and fro",
     "stands": "somebody who is always there and stands",
     "waves": "somebody who is always there and moves on the spot",
+    "squats": "somebody who is always there and bends their knees",
+    "treadmill": "somebody who is always there and walks on the spot",
 }
 
 
@@ -493,6 +497,8 @@ def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
     walk = WALKS[seed % len(WALKS)]
     if name in STAYING:
         return [_staying(STAYING[name][seed % len(STAYING[name])], seed, along=name == "to and fro")]
+    if name == "treadmill":
+        return [_on_treadmill(walk, seed)]
     if name == "through":
         return [_walker(walk, views, seed)]
     if name == "two":
@@ -533,6 +539,14 @@ def _staying(frames: tuple[str, int, int], seed: int, *, along: bool) -> Actor:
         turn = np.random.default_rng([seed, 2]).uniform(-0.8, 0.8) - motion.poses[0, 0]
     there = on_ground(facing_elsewhere(motion, turn), body)
     there = moved(there, -middle_of(there))
+    return Actor(body, there, np.ones(len(there), dtype=bool), seed)
+
+
+def _on_treadmill(name: str, seed: int) -> Actor:
+    motion, body = _dressed(frames_of(name), seed)
+    walk = through(motion, body, TREADMILL)
+    gone = np.linspace(walk.translations[0], walk.translations[-1], len(walk)) * [1.0, 0.0, 1.0]
+    there = replace(walk, translations=walk.translations - gone)
     return Actor(body, there, np.ones(len(there), dtype=bool), seed)
 
 

@@ -19,13 +19,18 @@ K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
 
 
-def each(jobs: Mapping[K, Callable[[], T]], workers: int | None, progress: Progress | None = None) -> dict[K, T]:
+def each(
+    jobs: Mapping[K, Callable[[], T]],
+    workers: int | None,
+    progress: Progress | None = None,
+    limits: Limits | None = None,
+) -> dict[K, T]:
     """Return what every job gives, under its key, from so many processes; by default one a core.
 
     Jobs and results travel between processes. Raises ValueError where a job fails, and ends the others.
     """
     wanted = cores() if workers is None else workers
-    engine: Processes[tuple[K, Callable[[], T]], T] = Processes(min(wanted, len(jobs)), Limits(), _called)
+    engine: Processes[tuple[K, Callable[[], T]], T] = Processes(min(wanted, len(jobs)), limits or Limits(), _called)
 
     def ended() -> Iterator[tuple[K, T]]:
         waiting, running = deque(jobs.items()), 0
