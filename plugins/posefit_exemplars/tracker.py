@@ -204,12 +204,9 @@ class ExemplarTracker:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         last = 3 + look.cameras  # the reported pose, its twins, and what is left of a small picture's share
-        evaluations = self.evaluations
-        if self.hypotheses is not None:  # the path only begins them, and several cameras leave less open
-            evaluations = max(evaluations / look.cameras, MIN_EVALUATIONS)
         # no more states than have a cost in a small picture
-        full = int(min(FULL * evaluations, (evaluations - last) / (1.0 + look.share)))
-        small = int((evaluations - full - last) / look.share)
+        full = int(min(FULL * self.evaluations, (self.evaluations - last) / (1.0 + look.share)))
+        small = int((self.evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
         beams = [elsewhere]
