@@ -53,13 +53,13 @@ Masks = NDArray[np.bool_]  # (views, T, height, width)
 
 
 def uncut(masks: Masks) -> NDArray[np.bool_]:
-    """Return in which frames of each view (views, T) somebody is seen and nowhere cut by the picture's border."""
+    """Return in which frames of each view (views, T) a person is seen and nowhere cut by the picture's border."""
     edges = (masks[:, :, 0], masks[:, :, -1], masks[..., 0], masks[..., -1])
     return np.asarray(masks.any(axis=(2, 3)) & ~np.any([edge.any(axis=2) for edge in edges], axis=0))
 
 
 def extraction_figures(scene: Scene, truth: Masks) -> dict[str, Any]:
-    """Return how well the masks of a tracked scene agree with the true ones, where somebody is whole."""
+    """Return how well the masks of a tracked scene agree with the true ones, where a person is whole."""
     seen = uncut(truth)
     views = zip(*(observation.silhouettes for observation in scene.observations), strict=True)
     overlaps = _overlaps(np.array([[silhouette.mask for silhouette in view] for view in views]), truth)

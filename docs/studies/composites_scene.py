@@ -463,15 +463,15 @@ class Situation:
 
 
 SHOWS = {
-    "through": "somebody walks through",
+    "through": "a person walks through",
     "again": "the same, who comes again the same way",
     "back": "the same, who comes back the other way",
     "two": "two people who pass each other",
-    "to and fro": "somebody who is always there and walks to and fro",
-    "stands": "somebody who is always there and stands",
-    "waves": "somebody who is always there and moves on the spot",
-    "squats": "somebody who is always there and bends their knees",
-    "treadmill": "somebody who is always there and walks on the spot",
+    "to and fro": "a person who is always there and walks to and fro",
+    "stands": "a person who is always there and stands",
+    "waves": "a person who is always there and moves on the spot",
+    "squats": "a person who is always there and bends their knees",
+    "treadmill": "a person who is always there and walks on the spot",
 }
 
 

@@ -96,14 +96,14 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
     """
     joints = ENDS[:, 0]
     alone = joints == ENDS[:, 1]
-    found = landmarks[joints]
+    given = landmarks[joints]
     for group in GROUPS:
-        rows = np.flatnonzero(alone & np.isin(joints, group) & (found[:, 2] > 0.0))
+        rows = np.flatnonzero(alone & np.isin(joints, group) & (given[:, 2] > 0.0))
         exchanged = landmarks[MIRRORED[joints[rows]]]
-        off, other = (np.linalg.norm(those[:, :2] - expected[rows], axis=1).sum() for those in (found[rows], exchanged))
+        off, other = (np.linalg.norm(those[:, :2] - expected[rows], axis=1).sum() for those in (given[rows], exchanged))
         if other < off:
-            found[rows] = exchanged
-    return found[:, :2], np.where(alone, np.minimum(found[:, 2], 1.0), 0.0)
+            given[rows] = exchanged
+    return given[:, :2], np.where(alone, np.minimum(given[:, 2], 1.0), 0.0)
 
 
 @dataclass(frozen=True, eq=False)

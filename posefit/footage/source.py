@@ -125,26 +125,19 @@ def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: P
 
     Of several ways to take the person out, the first is used whose masks are not doubted, or else are doubted least.
     """
-    ways, best, reason = how.ways(len(videos)), None, ""
-    for way in ways:
-        views, doubt = _taken_out(videos, way, frames, progress)
-        if best is None or _badness(doubt) < _badness(best[1]):
-            best = views, doubt
-            if reason:
-                said = f"{way.name} took the person out, instead of {ways[0].name}: {reason}"
-                views[0] = replace(views[0], warnings=[*views[0].warnings, said])
-        if doubt is None:
+    tried = []
+    for way in how.ways(len(videos)):
+        tried.append((way.name, *_taken_out(videos, way, frames, progress)))
+        if tried[-1][2] is None:
             break
-        reason = doubt.text.partition(";")[0]
-    assert best is not None
-    views, doubt = best
+    name, views, doubt = min(tried, key=lambda one: 0 if one[2] is None else 1 + one[2].refused)
     if doubt and doubt.refused:
         raise InputError(doubt.text)
+    first, _, before = tried[0]
+    if name != first and before is not None:
+        said = f"{name} took the person out, instead of {first}: {before.text.partition(';')[0]}"
+        views[0] = replace(views[0], warnings=[*views[0].warnings, said])
     return views
-
-
-def _badness(doubt: Verdict | None) -> int:
-    return 0 if doubt is None else 1 + doubt.refused
 
 
 def _taken_out(

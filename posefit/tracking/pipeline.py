@@ -96,18 +96,19 @@ def follow(
 ) -> list[Hypothesis]:
     """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again.
 
-    In footage, a tracker that looks ahead begins with the first frame that shows the whole person; from there it goes
-    back first.
+    In footage, where nothing is known of the first frame, a tracker that looks ahead begins with the first one that
+    shows the whole person; from there it goes back first.
     """
     earlier, state = output.earlier()
-    start = first_shown_whole(scene.observations) if scene.truth is None and method.looks_ahead(first) else 0
+    outward = scene.truth is None and first.yaw is None and method.looks_ahead(first)
+    start = first_shown_whole(scene.observations) if outward else 0
     count, total = scene.count, options.hypotheses
     hypotheses: list[Hypothesis] = []
     for number in range(total):
         name, task = SEARCHED, first
         if number:
-            each = zip(hypotheses[0][1], scene.observations, strict=True)
-            sure = next((frame for frame, seen in each if seen.usable), hypotheses[0][1][0])
+            usable = (k for k in range(start, count) if scene.observations[k].usable)
+            sure = hypotheses[0][1][next(usable, 0)]
             name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", sure)
         frames = list(earlier[number * count : (number + 1) * count])
         rng = stream(options.seed, "hypothesis", number) if number else np.random.default_rng(options.seed)

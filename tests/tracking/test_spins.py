@@ -17,7 +17,14 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.outputs import Output
 from posefit.tracking.pipeline import follow
-from posefit.tracking.restarts import MAX_TURN_RATE, anchor_frame, facing_consensus, retrack_spins, spin_mask
+from posefit.tracking.restarts import (
+    MAX_TURN_RATE,
+    anchor_frame,
+    facing_consensus,
+    initial_guess,
+    retrack_spins,
+    spin_mask,
+)
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 from tests.tracking.scenes import walk
@@ -177,10 +184,14 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
     method: Any = SimpleNamespace(
         tracker=Tracker, looks_ahead=lambda _: True, relocalising=lambda task, _: Tracker(task)
     )
-    [(_, frames)] = follow(scene, TASK, method, TrackOptions(), Output(), Progress())
-    (back, behind), (onward, ahead) = calls
+    (_, frames), _ = follow(scene, TASK, method, TrackOptions(hypotheses=2), Output(), Progress())
+    (back, behind), (onward, ahead), (again, _), _ = calls
     assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])
     assert back.backwards
     np.testing.assert_array_equal(back.training[0].poses, WALK.poses[::-1])
     assert np.degrees(onward.yaw or 0.0) == pytest.approx(5.0)  # it goes on from where the track back began
     assert [np.degrees(f.pose[0]) for f in frames] == pytest.approx(range(10))
+    assert again.yaw == initial_guess(1, TASK, None, False, frames[5])[1].yaw  # a guess is of the frame it is for
+    calls.clear()
+    follow(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Output(), Progress())
+    assert [rows for _, rows in calls] == [list(range(10))]  # what is known of the first frame is kept
