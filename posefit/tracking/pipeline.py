@@ -96,12 +96,13 @@ def follow(
 ) -> list[Hypothesis]:
     """Return the frames of each hypothesis. Each is recorded as it comes; recorded ones are not tracked again.
 
-    In footage, where nothing is known of the first frame, a tracker that looks ahead begins with the first one that
-    shows the whole person; from there it goes back first.
+    In footage, a tracker that looks ahead begins with the first frame that shows the whole person, and goes back first;
+    unless more is known of the very first one than its masks show.
     """
     earlier, state = output.earlier()
-    outward = scene.truth is None and first.yaw is None and method.looks_ahead(first)
-    start = first_shown_whole(scene.observations) if outward else 0
+    start, shown = 0, next((one.yaw for one in scene.observations if one.usable), None)
+    if scene.truth is None and first.yaw == shown and method.looks_ahead(first):
+        start = first_shown_whole(scene.observations)
     count, total = scene.count, options.hypotheses
     hypotheses: list[Hypothesis] = []
     for number in range(total):
