@@ -29,11 +29,14 @@ MIN_SMOOTH_FRAMES = 5  # of such a fit
 SCATTER_QUANTILE = 0.9  # of frames that lie nearer to that path
 
 
+def is_cut(mask: Mask) -> bool:
+    """Return whether a mask touches the picture's border."""
+    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
+
+
 def longer_side(mask: Mask) -> int:
     """Return the longer side in pixels of a mask's bounding box, 0 where it is empty or cut by the picture's edge."""
-    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-    cut = left == 0 or top == 0 or top + height == len(mask) or left + width == len(mask[0])
-    return 0 if cut else max(width, height)
+    return 0 if is_cut(mask) else max(cv2.boundingRect(mask.astype(np.uint8))[2:])
 
 
 def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
@@ -51,13 +54,22 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
     return float(np.quantile(away, SCATTER_QUANTILE)) if away else None
 
 
-def held_share(usable: NDArray[np.bool_]) -> float:
+def held_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
     """Return the share of frames that are not usable (T,) between the first and the last that are; 1 where none is.
 
-    Frames before the person comes and after they have gone say nothing against a track.
+    Frames before the person comes and after they have gone say nothing against a track; nor do those between a mask
+    that is `cut` (T,) by the picture's border and the next that is: there the person was out of the picture.
     """
     known = np.flatnonzero(usable)
-    return 1.0 - len(known) / float(known[-1] + 1 - known[0]) if len(known) else 1.0
+    if not len(known):
+        return 1.0
+    gaps = [(start, stop) for start, stop in runs(~usable) if known[0] < start < known[-1]]
+    left = [
+        stop - start
+        for start, stop in gaps
+        if not (cut[start - 1 : start + 1].any() and cut[stop - 1 : stop + 1].any())
+    ]
+    return sum(left) / float(known[-1] + 1 - known[0])
 
 
 def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
@@ -200,6 +212,8 @@ SIZED_FRAMES = 60  # frames whose sizes are compared, spread over the footage
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 NOT_REPORTED = "the method does not say"
 TOO_FEW = "too few frames show the person"
+IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
+STAYS = 1.0  # metres along the ground's axes: who stays within walks nowhere
 
 
 def trust_of(
@@ -215,9 +229,11 @@ def trust_of(
     the masks. Shares are of the frames that show enough of the person.
     """
     usable = np.array([row["usable"] == 1.0 for row in rows])
+    cut = np.array([any(is_cut(view.mask) for view in each.silhouettes) for each in scene.observations])
     many = usable.sum() >= MIN_FRAMES
     joints, camera, stature = motion_of(scene, frames).joints, scene.cameras[0], scene.body.stature
     stands = standing(joints, scene.fps) & usable[:, None]
+    walks = many and np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() > STAYS
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     ratio = _size(scene, frames, usable) if len(scene.cameras) > 1 else None
     lost, unknown = (np.array([row[name] for row in rows])[usable] for name in ("lost", "unknown_sides"))
@@ -227,12 +243,12 @@ def trust_of(
         "size_m": None if ratio is None else ratio * stature,
         "height_m": stature,
         "depth_scatter": depth_scatter(depths, usable, scene.fps) if many else None,
-        "foot_share": float(stands.any(axis=1)[usable].mean()) if many else None,
+        "foot_share": float(stands.any(axis=1)[usable].mean()) if walks else None,
         "stance_spread_m": stance_spread(joints, stands) if many else None,
         "explained": explained_share(scene, frames, usable),
         "lost": mean_known(np.where(np.isnan(lost), lost, lost >= LOST)),
         "unknown": mean_known(unknown),
-        "held": held_share(usable),
+        "held": held_share(usable, cut),
         "iou": iou,
         "acceleration": mean_known(acceleration(joints, scene.fps)[usable]) if many else None,
     }
@@ -240,7 +256,7 @@ def trust_of(
     reasons = {
         "size_ratio": ONE_CAMERA if len(scene.cameras) == 1 else TOO_FEW,
         "depth_scatter": TOO_FEW,
-        "foot_share": TOO_FEW,
+        "foot_share": IN_PLACE if many else TOO_FEW,
         "stance_spread_m": "no foot stands twice" if many else TOO_FEW,
         "explained": "there are masks alone" if scene.pictures is None else "nothing moves enough",
         "lost": NOT_REPORTED,

@@ -78,8 +78,18 @@ def test_stances_at_two_heights_are_half_of_that_apart() -> None:
 
 
 def test_frames_before_the_person_comes_and_after_they_have_gone_are_not_held() -> None:
-    assert held_share(np.array([0, 0, 1, 0, 1, 1, 0, 0], dtype=bool)) == 0.25
-    assert held_share(~ALL) == 1.0
+    usable = np.array([0, 0, 1, 0, 1, 1, 0, 0], dtype=bool)
+    assert held_share(usable, ~ALL[:8]) == 0.25
+    assert held_share(~ALL, ~ALL) == 1.0
+
+
+def test_frames_in_which_the_person_is_out_of_the_picture_are_not_held() -> None:
+    usable = np.array([1, 1, 0, 0, 0, 1, 1, 0, 1, 1], dtype=bool)
+    cut = np.zeros(10, dtype=bool)
+    cut[2] = True  # over the border, but seen whole when seen again: the mask was lost
+    assert held_share(usable, cut) == 0.4
+    cut[5] = True  # comes back over it
+    assert held_share(usable, cut) == 0.1
 
 
 def test_a_body_covers_half_of_what_moves() -> None:
