@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace
 from posefit.arrays import Array
+from posefit.arrays.exchange import exchanged
 from posefit.fitting.check import whole
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
@@ -56,7 +57,7 @@ class ActionValidator:
         Raises gymnasium.error.InvalidAction where they have another shape, or are not finite numbers.
         """
         try:
-            values = np.array(actions, dtype=np.float64)
+            values = np.array(exchanged("actions", actions)[0], dtype=np.float64)
         except (TypeError, ValueError) as mistake:
             raise error.InvalidAction(f"an action must be {self._dimensions} numbers, got {actions!r}") from mistake
         if values.shape != shape:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array, writeable
+from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, between
 from posefit.fitting.kernels import move_to_borders
@@ -79,9 +80,15 @@ class PoseProblem:
         between("beta", self.beta, 0.0, 1.0)
         at_least("threads", self.threads, 1)
 
-    def evaluate(self, proposals: Array) -> Array:
-        """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4)."""
-        proposals = writeable(proposals)
+    def evaluate(self, proposals: Any) -> Any:
+        """Return the cost (n,), 0 to 100, of proposals (n, d): the mean over the views. SAPSO (4).
+
+        Arrays may be of any library that has DLPack; the costs come as an array of the same one.
+        """
+        values, back = exchanged("proposals", proposals)
+        return back(self._evaluated(writeable(values)))
+
+    def _evaluated(self, proposals: Array) -> Array:
         if proposals.shape[1:] != (self.space.dimensions,):
             self.space.decode(proposals)  # raises
         if self.on_device:

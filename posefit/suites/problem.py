@@ -17,6 +17,7 @@ from typing import Any, Literal, final
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import one_of, positive, whole
@@ -101,18 +102,21 @@ class Problem:
         self._steps: list[tuple[int, float]] = []
         self._began: float | None = None
 
-    def __call__(self, proposals: object) -> "float | Array":
+    def __call__(self, proposals: object) -> Any:
         """Return the cost of a proposal (d,), or the costs (n,) of proposals (n, d).
 
-        Raises ValueError where the shape is another or a number is not finite, and BudgetSpentError.
+        Arrays may be of any library that has DLPack; the costs come as an array of the same one. Raises ValueError
+        where the shape is another or a number is not finite, and BudgetSpentError.
         """
-        checked = self._checked(proposals)
+        values, back = exchanged("proposals", proposals)
+        checked = self._checked(values)
         costs = self._counted(checked.reshape(-1, self.dimension))
-        return float(costs[0]) if checked.ndim == 1 else costs
+        return float(costs[0]) if checked.ndim == 1 else back(costs)
 
-    def evaluate(self, proposals: Array) -> Array:
+    def evaluate(self, proposals: Any) -> Any:
         """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
-        return self._counted(self._checked(proposals).reshape(-1, self.dimension))
+        values, back = exchanged("proposals", proposals)
+        return back(self._counted(self._checked(values).reshape(-1, self.dimension)))
 
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""

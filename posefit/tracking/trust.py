@@ -57,19 +57,15 @@ def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float
 def held_share(usable: NDArray[np.bool_], cut: NDArray[np.bool_]) -> float:
     """Return the share of frames that are not usable (T,) between the first and the last that are; 1 where none is.
 
-    Frames before the person comes and after they have gone say nothing against a track; nor do those between a mask
-    that is `cut` (T,) by the picture's border and the next that is: there the person was out of the picture.
+    Frames before the person comes and after they have gone say nothing against a track; nor does a gap that begins or
+    ends with a mask `cut` (T,) by the picture's border: there the person was out of the picture.
     """
     known = np.flatnonzero(usable)
     if not len(known):
         return 1.0
     gaps = [(start, stop) for start, stop in runs(~usable) if known[0] < start < known[-1]]
-    left = [
-        stop - start
-        for start, stop in gaps
-        if not (cut[start - 1 : start + 1].any() and cut[stop - 1 : stop + 1].any())
-    ]
-    return sum(left) / float(known[-1] + 1 - known[0])
+    lost = [stop - start for start, stop in gaps if not cut[[start - 1, start, stop - 1, stop]].any()]
+    return sum(lost) / float(known[-1] + 1 - known[0])
 
 
 def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
@@ -147,7 +143,7 @@ class Sign:
 SIGNS = (
     Sign("lost", 0.0, 0.15, 0.5, "the person is lost in {lost:.0%} of the frames"),
     Sign("held", 0.0, 0.25, 0.6, "the person is gone, or nearly, in {held:.0%} of the frames in between"),
-    Sign("unknown", 0.0, 0.1, 1.0, "left and right are unknown in {unknown:.0%} of the frames"),
+    Sign("unknown", 0.0, 0.2, 1.0, "left and right are unknown in {unknown:.0%} of the frames"),
     Sign("iou", 1.0, 0.35, 0.55, "the body and the mask overlap by {iou:.0%} only"),
     Sign("size_ratio", 1.0, 0.08, 0.3, "the person seems to be {size_m:.2f} m tall, not {height_m:.2f} m"),
     Sign("depth_scatter", 0.0, 0.04, 0.2, "the distance jumps by {depth_scatter:.0%}"),

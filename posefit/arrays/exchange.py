@@ -1,0 +1,41 @@
+"""Arrays of other libraries, such as PyTorch and JAX, taken and given back through DLPack."""
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.reading import quoted
+
+CPU = 1  # DLPack's number of it
+
+
+def exchanged(name: str, values: Any) -> tuple[Any, Callable[[Array], Any]]:
+    """Return values as NumPy has them, and what turns results (n,) into an array of the library they came from.
+
+    An array on the CPU is not copied. One on another device is copied from it, and results to it. Results have the
+    values' type where that is a floating one: float32 of JAX or PyTorch gives float32. What has no `__dlpack__`, and
+    NumPy's own, stays as it is, and so do its results. Raises InputError, beginning with the name, for an array without
+    numbers to read: one that is traced (`jit`, `vmap`) or needs a gradient.
+    """
+    if isinstance(values, np.ndarray | np.generic) or not hasattr(values, "__dlpack__"):
+        return values, lambda results: results
+    try:
+        here = values.__dlpack_device__()[0] == CPU
+        array = np.from_dlpack(values) if here else np.from_dlpack(values, device="cpu")
+    except (AttributeError, BufferError, RuntimeError, TypeError) as error:
+        raise InputError(
+            f"{name} must be an array that DLPack can read: neither traced by jit or vmap nor with a gradient, "
+            f"got {type(values).__module__}.{type(values).__name__}: {quoted(str(error).splitlines()[0])}"
+        ) from None
+    if hasattr(values, "__array_namespace__"):
+        library = values.__array_namespace__()
+    else:  # PyTorch
+        library = sys.modules[type(values).__module__.partition(".")[0]]
+    kind = array.dtype if array.dtype.kind == "f" else np.dtype(np.float64)
+    # CuPy takes its current device
+    place = {} if here or library.__name__ == "cupy" else {"device": values.device}
+    return array, lambda results: library.asarray(results.astype(kind, copy=False), **place)
