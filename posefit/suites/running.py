@@ -1,4 +1,4 @@
-"""Runs on problems of a suite, of a plugin's optimiser or any loop; scores of runs: shares of targets and running times.
+"""Runs on problems of a suite, of a plugin's optimiser or any loop; scores of runs: targets reached, running times.
 
 Only runs with the same method, function, dimension, budget and way with infeasible proposals are taken together.
 

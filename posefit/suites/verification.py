@@ -24,6 +24,7 @@ class Bundle:
     """Runs whose claims were found to hold."""
 
     path: Path
+    suite: str
     digest: str
     runs: tuple[SuiteRun, ...] = field(repr=False)
     evaluated: int  # points
@@ -50,7 +51,8 @@ def verified(path: str | Path, repeat: int = 0, progress: Callable[[str], None] 
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(f"{path}: ") else f"{path}: {text}") from None
-    return Bundle(Path(path), manifest["digest"], tuple(runs), len(arrays["costs"]), repeated, unrepeatable)
+    evaluated = len(arrays["costs"])
+    return Bundle(Path(path), manifest["suite"], manifest["digest"], tuple(runs), evaluated, repeated, unrepeatable)
 
 
 def _problem(run: SuiteRun) -> tuple[int, ...]:
