@@ -170,15 +170,14 @@ def suite_verify(context: click.Context, bundles: tuple[str, ...], repeat: int) 
 @click.argument("bundles", nargs=-1, metavar="[DIR|FILE]...")
 @click.option("--out", required=True, metavar="FILE", help="The page; an earlier one is replaced.")
 @click.option("--repeat", default=0, metavar="K", help="Of each bundle given, run K searches again.")
-@click.option("--name", default=NAME, show_default=True, help="Of the suite.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def suite_board(bundles: tuple[str, ...], out: str, repeat: int, name: str, as_json: bool) -> None:
-    """Write a leaderboard of verified bundles beside posefit's own methods; refused ones are listed with the reason."""
+def suite_board(bundles: tuple[str, ...], out: str, repeat: int, as_json: bool) -> None:
+    """Write a leaderboard of verified bundles beside posefit's own methods; what is refused is listed."""
     from posefit.report.board import write_board
     from posefit.report.write import leaderboard_lines
 
     with results_alone():
-        board = write_board(bundles, out, name, repeat, say)
+        board = write_board(bundles, out, repeat, say)
     for line in [json.dumps(board)] if as_json else leaderboard_lines(board):
         click.echo(line)
 

@@ -128,19 +128,12 @@ def _track_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
-    """Return searches as `runs_of` does, each with the name of the bundle it is of, which makes another method.
-
-    Seeds of several bundles have nothing in common: the first of each method on a problem are compared, the second, ...
-    """
-    seeds: dict[tuple[str, str], list[int]] = {}
-    specs = [_bundled_spec(bundle, run) for bundle, run in named]
-    texts = [(_text(_place(spec)), _text(_variant(spec))) for spec in specs]
-    for spec, key in zip(specs, texts, strict=True):
-        seeds.setdefault(key, []).append(spec["seed"])
+    """Return searches as `runs_of` does, each with the name of the bundle it is of, which makes another method."""
     rows = []
-    for (_, run), key in zip(named, texts, strict=True):
+    for bundle, run in named:
+        spec = _bundled_spec(bundle, run)
         figures, *data = _search_data(run)
-        rows.append(_Row(*key, "", sorted(seeds[key]).index(run.seed), "", (), figures, tuple(data)))
+        rows.append(_Row(_text(_place(spec)), _text(_variant(spec)), "", run.seed, "", (), figures, tuple(data)))
     return _sorted_runs(posefit_build().removeprefix("posefit "), True, rows, (), ())
 
 

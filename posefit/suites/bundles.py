@@ -46,20 +46,20 @@ def write_bundle(runs: Sequence[SuiteRun], path: str | Path) -> str:
     """
     if len(suites := {run.suite for run in runs}) != 1:
         raise InputError(f"runs must be of one suite, got {', '.join(sorted(suites)) or 'none'}")
-    methods = {_method_text(run): None for run in runs}
+    methods = {method_text(run): None for run in runs}
     numbers = {text: k for k, text in enumerate(sorted(methods))}
-    order = sorted(runs, key=lambda run: (numbers[_method_text(run)], *_place(run)))
+    order = sorted(runs, key=lambda run: (numbers[method_text(run)], *_place(run)))
     listed = []
     for k, run in enumerate(order):
         if run.points is None or not len(run.points):
             raise InputError(f"{label(run)}: expected the points of its improvements, got none: search again")
         if run.instance not in HELD_OUT:
             raise InputError(f"{label(run)}: expected instances that are held out, from {HELD_OUT[0]} on")
-        if k and _place(order[k - 1]) == _place(run) and _method_text(order[k - 1]) == _method_text(run):
+        if k and _place(order[k - 1]) == _place(run) and method_text(order[k - 1]) == method_text(run):
             raise InputError(f"{label(run)}: expected each run once, got it twice")
         listed.append(
             {
-                "method": numbers[_method_text(run)],
+                "method": numbers[method_text(run)],
                 "function": run.function,
                 "dimension": run.dimension,
                 "instance": run.instance,
@@ -186,7 +186,8 @@ def _place(run: SuiteRun) -> tuple[int, ...]:
     return run.function, run.dimension, run.instance, run.seed, run.budget
 
 
-def _method_text(run: SuiteRun) -> str:
+def method_text(run: SuiteRun) -> str:
+    """Return the one text of what makes a method: its name, settings, version and way with infeasible proposals."""
     fields = {"method": run.method, "settings": run.settings, "version": run.version, "infeasible": run.infeasible}
     return _canonical(fields)
 

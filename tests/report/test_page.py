@@ -264,7 +264,7 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         page.locator("#all").click()
         assert page.locator("#charts .curve").count() == 6 * 3
         rows = page.locator("#ert tbody tr")
-        assert rows.count() == 6 * 2 * 3
+        assert rows.count() == 6 * 2 * 2
         page.locator("#of-function").select_option(label="5 mismatched body")
         page.locator("#of-dimension").select_option(label="24")
         assert rows.count() == 6

@@ -189,7 +189,7 @@ function runningTimes() {
     row.times.forEach((time, k) =>
       least.set(place(row, k), Math.min(least.get(place(row, k)) ?? Infinity, time ?? Infinity)),
     );
-  const functions = new Map(D.times.map((row) => [row.function, `${row.function || ""} ${row.name}`.trim()]));
+  const functions = new Map(D.times.map((row) => [row.function, `${row.function} ${row.name}`]));
   const dimensions = [...new Set(D.times.map((row) => row.dimension))].sort((a, b) => a - b);
   const time = (above, k) => ({
     title: `ERT +${above}`,
