@@ -3,7 +3,7 @@
     python docs/studies/make_bundles.py posefit/suites/methods.zip
 
 That is one search of 100 evaluations for each dimension by each of six methods, on each function of the latest suite in
-its lowest dimension, on the fifteen first held-out instances. It takes about two minutes on two cores.
+its lowest dimension, on the fifteen first held-out instances. It takes about a minute on two cores.
 
 So that the file is small, a run keeps the improvements that reach another target, and its last one; and each point is
 rounded to as few binary digits as leave its cost what it was, to the last bit. Shares of targets, running times and
