@@ -27,6 +27,7 @@ from posefit.suites.running import SuiteRun
 
 FORMAT = 1
 MAX_BYTES = 500_000_000  # unpacked
+MAX_NUMBER = 2**53  # of a run, but for its seed: floats have it exactly
 MANIFEST = "manifest.json"
 TYPES = {"costs": "<f8", "evaluations": "<i8", "points": "<f8"}  # of the arrays
 FIELDS = ("digest", "format", "methods", "runs", "suite")  # of the manifest
@@ -149,7 +150,11 @@ def _check_manifest(manifest: Manifest, arrays: Arrays) -> None:
         raise InputError("methods must be listed once each, got one twice")
     for entry in manifest["runs"]:
         for name in RUN_FIELDS:
-            whole(name, entry[name], 1 if name in ("budget", "dimension", "evaluations", "improvements") else 0)
+            number = whole(
+                name, entry[name], 1 if name in ("budget", "dimension", "evaluations", "improvements") else 0
+            )
+            if number > MAX_NUMBER and name != "seed":
+                raise InputError(f"{name} must be at most {MAX_NUMBER}, got {quoted(number)}")
         if entry["method"] >= len(texts):
             raise InputError(f"method of a run must be 0 to {len(texts) - 1}, got {entry['method']}")
     steps = sum(entry["improvements"] for entry in manifest["runs"])
@@ -195,6 +200,8 @@ def method_text(run: SuiteRun) -> str:
 def _canonical(value: Any) -> str:
     """Return the one JSON text of a value."""
     try:
-        return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    except (ValueError, TypeError) as error:
+        text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+        text.encode()  # half of a character that takes two raises
+        return text
+    except (ValueError, TypeError, RecursionError) as error:
         raise InputError(f"a bundle must hold finite numbers and texts, got {cut(str(error))}") from None

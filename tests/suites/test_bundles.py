@@ -325,6 +325,33 @@ def test_what_is_no_bundle_is_refused(tmp_path: Path, text: bytes) -> None:
         verified(tmp_path / "a.zip")
 
 
+@each(
+    ("where", "value", "reason"),
+    [
+        ("runs", {"evaluations": 10**400}, "evaluations must be a whole number"),
+        ("runs", {"budget": 2**60}, "budget must be at most"),
+        ("runs", {"seed": -1}, "seed must be 0 or more"),
+        ("runs", {"seed": 0.5}, "seed must be a whole number"),
+        ("runs", {"method": 2}, "method of a run must be 0 to 1"),
+        ("runs", {"more": 1}, "must have the fields"),
+        ("methods", {"method": 7}, "a method and its version must be texts"),
+        ("methods", {"settings": [1]}, "settings must be values by their names"),
+        ("methods", {"infeasible": "hide"}, "infeasible must be one of"),
+        ("methods", {"version": "\ud800"}, "must hold finite numbers and texts"),
+    ],
+)
+def test_a_manifest_of_strange_values_is_refused(
+    honest: Path, tmp_path: Path, where: str, value: dict[str, Any], reason: str
+) -> None:
+    contents = contents_of(honest)
+    contents["manifest"][where][0] |= value
+    strange = value.get("version")
+    if strange:  # no digest is of it
+        contents["manifest"]["digest"] = ""
+    with pytest.raises(InputError, match=reason):
+        verified(packed(contents, tmp_path / "strange.zip", reseal=not strange))
+
+
 def test_an_honest_bundle_is_verified_and_its_searches_are_repeated(honest: Path, runs: list[SuiteRun]) -> None:
     bundle = verified(honest, RUNS)
     assert (bundle.repeated, bundle.unrepeatable) == (RUNS, ())
