@@ -18,7 +18,7 @@ from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry, version_of
-from posefit.statistics.profiles import attained, expected_running_time, hits
+from posefit.statistics.profiles import attained, expected_running_time, hits, running_time_interval
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
 
@@ -136,6 +136,8 @@ class SuiteScore:
     # expected evaluations to so much above the best known; None for never. Of all functions together there are none:
     # a mean over them would be that of the hardest
     running_times: dict[float, float | None]
+    # their 95 % intervals over instances; None for never, and twice where there is one instance
+    running_time_ends: dict[float, tuple[float | None, float | None]]
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
@@ -182,6 +184,10 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
     used = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, used)
+    shown = () if function == ALL else SHOWN
+    places = [int(np.flatnonzero(above == TARGETS)[0]) for above in shown]
+    rng, instances = np.random.default_rng(RNG_STREAM), [run.instance for run in runs]
+    low, high = running_time_interval(reached[:, places], used, instances, rng)
     points = [point for point in POINTS if point * dimension <= budget]
     shares = attained(reached, [*(point * dimension for point in points), float(used.max())])
     return SuiteScore(
@@ -195,7 +201,8 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         float(np.median([run.cost - run.best_known for run in runs])),
         float(shares[-1]),
         dict(zip(points, shares[:-1].tolist(), strict=True)),
-        {} if function == ALL else {above: _finite(times[np.flatnonzero(above == TARGETS)[0]]) for above in SHOWN},
+        {above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
+        {above: (_finite(low[k]), _finite(high[k])) for k, above in enumerate(shown)},
     )
 
 
