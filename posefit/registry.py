@@ -27,7 +27,7 @@ from posefit.errors import InputError
 from posefit.hooks import PROJECT, ClaimedOrder
 from posefit.reading import cut, quoted, suggestion
 from posefit.settings import Setting, settings_of
-from posefit.version import source_digest
+from posefit.version import posefit_build, source_digest
 
 if TYPE_CHECKING:
     import click
@@ -173,6 +173,11 @@ def claim_plugins() -> tuple[Plugin[ClaimedOrder], ...]:
 def claimed_orders() -> tuple[ClaimedOrder, ...]:
     """Return the claims of publications that all installed plugins register."""
     return tuple(claim for plugin in claim_plugins() for claim in plugin.offers)
+
+
+def version_of(origins: Iterable[str]) -> str:
+    """Return the version of posefit, and of a method whose plugins have these origins: see `Offer.origin`."""
+    return ", ".join([posefit_build(), *sorted(set(origins))])
 
 
 def optimiser(name: str) -> "OptimiserFactory":

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,12 +75,27 @@ SEARCH_SCORE = {
     "the best known one. ",
     "curves": "The share of all runs and targets that a method has reached after so many evaluations for each "
     "dimension of the problem, all dimensions together: the empirical distribution of running times. A higher curve "
-    "reaches more targets in the same time. The scale is the same for every function.",
+    "reaches more targets in the same time. The scale is the same for every function. "
+    "Intervals are those that other instances would give.",
 }
 
 
 def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs."""
+    changed = time.localtime((ledger.path / ROWS).stat().st_mtime)
+    made = f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', changed)}"
+    if runs.is_search:
+        return search_data(runs, "Report of single searches", made)
+    return _data(runs, "Report of a sweep", made, lambda data: _tracks(ledger, runs, data, warn))
+
+
+def search_data(runs: Runs, title: str, made: str) -> dict[str, Any]:
+    """Return the data of a page about single searches; `made` says of what and when."""
+    return _data(runs, title, made, lambda data: _searches(runs, data))
+
+
+def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], dict[str, Any]]) -> dict[str, Any]:
+    """Return the data of a page; `rest` adds what tracks alone or searches alone have."""
     contest = contest_of(runs)
     data: dict[str, Any] = {"sections": []}
     answer = "Every cell failed." if runs.failures else "No run has an error yet: there is nothing to compare."
@@ -98,12 +113,11 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
             "taking_part": contest.methods,
             **(_search_curves(contest) if runs.is_search else _track_curves(contest, board[0]["method"])),
         }
-    changed = (ledger.path / ROWS).stat().st_mtime
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
     data |= {
-        "title": "Report of single searches" if runs.is_search else "Report of a sweep",
+        "title": title,
         "headline": answer,
-        "made": f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', time.localtime(changed))}",
+        "made": made,
         "header": _header(runs, contest),
         "methods": [{"name": name, **fields} for name, fields in zip(runs.methods, runs.variants, strict=True)],
         "joints": [place.replace("_", " ") for place in PLACES],
@@ -115,7 +129,7 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
         "warned": {row: [warnings.index(text) for text in texts] for row, texts in runs.warnings.items()},
         "live": None,
         "failures": runs.failures,
-        **(_searches(runs, data) if runs.is_search else _tracks(ledger, runs, data, warn)),
+        **rest(data),
     }
     return data | {"sections": [*data["sections"], *(["failures"] if runs.failures else [])]}
 
@@ -154,7 +168,7 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
         "under": "evaluations of a frame",
         "series": [curve and vars(curve) for curve in curves.convergence(drawn, evaluations)],
     }
-    shares = curves.reached(drawn, evaluations)
+    shares = [{"values": values} for values in curves.reached(drawn, evaluations)]
     title = "Targets reached, of all runs and 51 costs an instance"
     return {
         "examples": three_tracks(contest, leader),
@@ -169,13 +183,13 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     }
 
 
-def _shares_chart(chart_id: str, title: str, under: str, shares: Iterable[Array], most: float) -> dict[str, Any]:
+def _shares_chart(chart_id: str, title: str, under: str, series: Sequence[Any], most: float) -> dict[str, Any]:
     return {
         "id": chart_id,
         "title": title,
         "label": "share of targets reached",
         "under": under,
-        "series": [{"values": values} for values in shares],
+        "series": series,
         "most": most,
         "stepped": True,
     }
@@ -189,13 +203,16 @@ def _drawn(contest: Contest) -> Contest:
 def _search_curves(contest: Contest) -> dict[str, Any]:
     evaluations = curves.search_grid(contest)
     charts = curves.search_curves(contest, evaluations)
-    most = min(1.0, 1.1 * max(0.05, *(float(shares[-1]) for _, values in charts for shares in values)))
+    most = min(1.0, 1.1 * max(0.05, *(float(one.values[-1]) for _, shares in charts for one in shares)))
     under = "evaluations for each dimension"
     return {
         "sections": ["leaderboard", "curves", *(["by-function"] if len(charts) > 1 else []), "times"],
         "by_function": function_shares(contest),
         "evaluations": evaluations,
-        "charts": [_shares_chart(f"chart-{k}", title, under, shares, most) for k, (title, shares) in enumerate(charts)],
+        "charts": [
+            _shares_chart(f"chart-{k}", title, under, [vars(one) for one in shares], most)
+            for k, (title, shares) in enumerate(charts)
+        ],
         "above": SHOWN,
         "times": curves.running_times(contest),
     }
@@ -317,7 +334,7 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
         notes.append("Budgets differ: compare methods of one budget only, as a longer search has lower costs.")
     if runs.is_search and len(_of_methods(runs, "infeasible")) > 1:
         notes.append("Infeasible proposals are treated differently: compare methods that treat them in the same way.")
-    if len(_of_methods(runs, "version")) > 1:
+    if len(_of_methods(runs, "version")) > 1 and any(runs.keys):
         notes.append("Commands run rows again if the same versions are installed.")
     return notes
 

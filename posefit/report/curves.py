@@ -10,9 +10,10 @@ from posefit.report.columns import LEVEL_NAMES
 from posefit.report.contest import BOOTSTRAP_SEED, Contest, mean, resamples, shared_rows
 from posefit.report.runs import Runs
 from posefit.statistics.intervals import Intervals, iqm_intervals
+from posefit.statistics.means import mean_intervals
 from posefit.statistics.profiles import Trace, attained, hits, targets
 from posefit.suites.functions import suite_function
-from posefit.suites.running import SHOWN, suite_scores
+from posefit.suites.running import ALL, SHOWN, suite_scores
 from posefit.uncertainty.calibration import LEVELS
 
 POINTS = 41  # of a curve of tracks
@@ -112,21 +113,34 @@ def search_grid(contest: Contest) -> Array:
     return np.unique(np.geomspace(1.0, max(most, 1.0), SEARCH_POINTS))
 
 
-def search_curves(contest: Contest, evaluations: Array) -> list[tuple[str, list[Array]]]:
-    """Return the shares (methods, p) of targets reached after evaluations, of all functions and then of each."""
-    functions, dimensions = (
-        np.array([place[name] for place in contest.places()]) for name in ("function", "dimension")
+def search_curves(contest: Contest, evaluations: Array) -> list[tuple[str, list[Intervals]]]:
+    """Return the shares (p,) of targets that each method reached after evaluations, of all functions, then of each.
+
+    Intervals are those that other instances would give.
+    """
+    functions, dimensions, instances = (
+        np.array([place[name] for place in contest.places()]) for name in ("function", "dimension", "instance")
     )
     used = contest.runs.hits[contest.rows] / dimensions.astype(np.float64)[None, :, None, None]
     parts = [("All functions", functions > 0)]
     numbers = np.unique(functions).tolist()
     if len(numbers) > 1:
         parts += [(f"{number} {suite_function(number).name}", functions == number) for number in numbers]
-    return [(title, [attained(hits_of_method[part], evaluations) for hits_of_method in used]) for title, part in parts]
+    curves = []
+    for title, part in parts:
+        shares = [
+            np.array([attained(hits_of_instance, evaluations) for hits_of_instance in hits_of_method[part]]).T
+            for hits_of_method in used
+        ]
+        curves.append((title, [mean_intervals(one, functions[part], instances[part]) for one in shares]))
+    return curves
 
 
 def running_times(contest: Contest) -> list[dict[str, Any]]:
-    """Return the scores of each method's shared runs, a row for each dimension and function: see `suite_scores`."""
+    """Return the scores of each method's shared runs, a row for each dimension and function: see `suite_scores`.
+
+    There are none of all functions together, whose mean would be that of the hardest.
+    """
     return [
         {
             "method": method,
@@ -137,9 +151,11 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
             "reached": 100.0 * score.reached,
             "above": score.above,
             "times": [score.running_times[above] for above in SHOWN],
+            "ends": [score.running_time_ends[above] for above in SHOWN],
         }
         for method in contest.methods
         for score in suite_scores(contest.runs.searches[k] for k in shared_rows(contest, method).tolist())
+        if score.function != ALL
     ]
 
 

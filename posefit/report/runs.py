@@ -21,6 +21,7 @@ from posefit.suites.running import SuiteRun
 from posefit.sweep.cell import settings_text
 from posefit.sweep.table import is_search, search_run
 from posefit.uncertainty.calibration import BINS
+from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
@@ -107,7 +108,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
         fields = marshal.dumps({**spec, **dict.fromkeys(LAST_FIELDS)}, 2)
         if fields not in heads:
             heads[fields] = _text(_variant(spec)), "" if searches else command_head(spec)
-        figures, *data = _search_data(row) if searches else _track_data(row)
+        figures, *data = _search_data(search_run(row)) if searches else _track_data(row)
         place = fields, spec["instance"]
         if place not in places:
             places[place] = sys.intern(_text(_place(spec)))
@@ -126,9 +127,23 @@ def _track_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
     return figures, joints, _binned(row["mode_reliability"]), arrays
 
 
-def _search_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
+def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
+    """Return searches as `runs_of` does, each with the name of the bundle it is of, which makes another method."""
+    rows = []
+    for bundle, run in named:
+        spec = _bundled_spec(bundle, run)
+        figures, *data = _search_data(run)
+        rows.append(_Row(_text(_place(spec)), _text(_variant(spec)), "", run.seed, "", (), figures, tuple(data)))
+    return _sorted_runs(posefit_build().removeprefix("posefit "), True, rows, (), ())
+
+
+def _bundled_spec(bundle: str, run: SuiteRun) -> dict[str, Any]:
+    names = ("suite", "function", "dimension", "instance", "method", "settings", "infeasible", "version", "seed")
+    return {**{name: getattr(run, name) for name in names}, "evaluations": run.budget, "bundle": bundle}
+
+
+def _search_data(run: SuiteRun) -> tuple[Any, ...]:
     """Return the figures of a search, its run, and its hits."""
-    run = search_run(row)
     evaluations = hits((run.evaluations, run.costs), run.targets)
     reached = 100.0 * float(np.isfinite(evaluations).mean())
     return [100.0 - reached, reached, run.cost - run.best_known], run, evaluations
@@ -213,7 +228,9 @@ def _bad_row(reason: str) -> dict[str, Any]:
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a spec that make a method."""
     if is_search(spec):
-        fields = {name: spec[name] for name in ("method", "settings", "infeasible", "version")}
+        fields = {
+            name: spec[name] for name in ("method", "settings", "infeasible", "version", "bundle") if name in spec
+        }
         return {**fields, "budget": spec["evaluations"] / spec["dimension"]}
     return {name: spec[name] for name in _METHOD_FIELDS}
 
@@ -225,7 +242,8 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
     else:
         count = variant["hypotheses"]
         words = [f"{variant['evaluations']} evaluations", f"{count} {'hypothesis' if count == 1 else 'hypotheses'}"]
-    return [*settings_text(variant["settings"]), *words, *variant["version"].split(", ")]
+    source = [f"of {variant['bundle']}"] if "bundle" in variant else variant["version"].split(", ")
+    return [*settings_text(variant["settings"]), *words, *source]
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:

@@ -98,8 +98,7 @@ class Problem:
         self.truth_cost = made.truth_cost  # of the true pose, which is in the box and feasible
         self.evaluations = 0
         self.best_observed_fvalue1 = np.inf
-        self._best: Array | None = None
-        self._steps: list[tuple[int, float]] = []
+        self._steps: list[tuple[int, float, Array]] = []  # evaluations, cost and point of each improvement
         self._began: float | None = None
 
     def __call__(self, proposals: object) -> Any:
@@ -173,9 +172,19 @@ class Problem:
     @property
     def best(self) -> Array:
         """The best proposal (d,) so far, repaired where it was not feasible. Raises ValueError before there is one."""
-        if self._best is None:
+        if not self._steps:
             raise InputError(f"{self.id} must have been evaluated, got {self.evaluations} evaluations and no cost")
-        return self._best.copy()
+        best: Array = self.repaired(self._steps[-1][2])[0]
+        return best
+
+    @property
+    def points(self) -> Array:
+        """The proposals (k, d) at which the cost fell; a problem with the same `infeasible` evaluates them to the same.
+
+        With "repair" they are those that were evaluated: in the box and feasible. With "penalise" they are as proposed,
+        since the penalty is of the distance. With "reject" only feasible ones have a cost.
+        """
+        return np.array([point for *_, point in self._steps]).reshape(-1, self.dimension)
 
     @property
     def trace(self) -> tuple[Array, Array]:
@@ -183,7 +192,7 @@ class Problem:
 
         It begins where a cost was measured: with "reject" that may be after some that were infinite.
         """
-        steps = list(self._steps)
+        steps = [(used, cost) for used, cost, _ in self._steps]
         if steps and steps[-1][0] < self.evaluations:
             steps.append((self.evaluations, steps[-1][1]))
         return np.array([used for used, _ in steps], dtype=np.float64), np.array([cost for _, cost in steps])
@@ -220,10 +229,11 @@ class Problem:
             costs[~allowed] = np.inf
         elif self.infeasible == "penalise":
             costs[~allowed] += PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
+        points = checked if self.infeasible == "penalise" else repaired
         for k in np.flatnonzero(costs < self.best_observed_fvalue1):
             if costs[k] < self.best_observed_fvalue1:
-                self.best_observed_fvalue1, self._best = float(costs[k]), repaired[k].copy()
-                self._steps.append((self.evaluations + int(k) + 1, self.best_observed_fvalue1))
+                self.best_observed_fvalue1 = float(costs[k])
+                self._steps.append((self.evaluations + int(k) + 1, self.best_observed_fvalue1, points[k].copy()))
         self.evaluations += len(checked)
         return costs
 

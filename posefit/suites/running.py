@@ -1,4 +1,4 @@
-"""An optimiser of a plugin on a problem of a suite; scores of runs: shares of targets, running times and costs.
+"""Runs on problems of a suite, of a plugin's optimiser or any loop; scores of runs: targets reached, running times.
 
 Only runs with the same method, function, dimension, budget and way with infeasible proposals are taken together.
 
@@ -17,8 +17,8 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
-from posefit.registry import registry
-from posefit.statistics.profiles import attained, expected_running_time, hits
+from posefit.registry import registry, version_of
+from posefit.statistics.profiles import attained, expected_running_time, hits, running_time_interval
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
 
@@ -29,8 +29,10 @@ RNG_STREAM = 2027  # part of the seed of every search
 class SuiteRun:
     """The run of a method on a problem."""
 
+    suite: str
     method: str
     settings: Mapping[str, Any]
+    version: str  # of posefit and of the method, with digests of their sources
     function: int
     dimension: int
     instance: int
@@ -41,6 +43,7 @@ class SuiteRun:
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
     costs: Array = field(repr=False)  # (k,)
+    points: Array | None = field(default=None, repr=False)  # see `Problem.points`; None of a ledger without them
 
     @property
     def cost(self) -> float:
@@ -64,26 +67,50 @@ def run_on(
     evaluations = EVALUATIONS * problem.dimension if evaluations is None else evaluations
     chosen, space = dict(chosen or {}), problem.space
     rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
-    factory = registry().optimiser(method)
-    settings.check(method, factory, chosen)
+    offer = registry().offer("optimiser", method)
+    settings.check(method, offer.factory, chosen)
     with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
-        optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
+        optimiser = offer.factory(space, rng, **settings.planned(offer.factory, chosen, evaluations))
     guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
     minimise(problem.evaluate, guarded, evaluations, budget_known=True)
-    if not len(problem.trace[0]):
+    return run_of(problem, method, chosen, seed=seed, budget=evaluations, source=offer.origin)
+
+
+def run_of(
+    problem: Problem,
+    method: str,
+    chosen: Mapping[str, Any] | None = None,
+    *,
+    seed: int = 0,
+    budget: int | None = None,
+    source: str = "",
+) -> SuiteRun:
+    """Return the run that any loop has made on a problem, by the name of its method and its settings.
+
+    `budget` is the problem's where it has one. `source` names the method's source, such as `my_search 3fa29b1c`: see
+    `posefit.version.source_digest`. Raises ValueError where nothing feasible was evaluated, or more than the budget.
+    """
+    if not len(problem.points):
         raise InputError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
+    if (budget := problem.budget if budget is None else budget) is None:
+        raise InputError(f"{problem.id}: budget must be known, here or of the problem, got none")
+    if problem.evaluations > budget:
+        raise InputError(f"{problem.id}: evaluations must be at most {budget}, the budget, got {problem.evaluations}")
     return SuiteRun(
+        problem.suite,
         method,
-        chosen,
+        dict(chosen or {}),
+        version_of([source] if source else []),
         problem.id_function,
         problem.dimension,
         problem.instance,
         seed,
-        evaluations,
+        budget,
         problem.infeasible,
         problem.best_known,
         problem.targets,
         *problem.trace,
+        problem.points,
     )
 
 
@@ -106,7 +133,11 @@ class SuiteScore:
     above: float  # median of the best costs above the best known
     reached: float  # share of runs and targets, at the end
     shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as budgets go
-    running_times: dict[float, float | None]  # expected evaluations to so much above the best known; None for never
+    # expected evaluations to so much above the best known; None for never. Of all functions together there are none:
+    # a mean over them would be that of the hardest
+    running_times: dict[float, float | None]
+    # their 95 % intervals over instances; None for never, and twice where there is one instance
+    running_time_ends: dict[float, tuple[float | None, float | None]]
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
@@ -153,6 +184,10 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
     used = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, used)
+    shown = () if function == ALL else SHOWN
+    places = [int(np.flatnonzero(above == TARGETS)[0]) for above in shown]
+    rng, instances = np.random.default_rng(RNG_STREAM), [run.instance for run in runs]
+    low, high = running_time_interval(reached[:, places], used, instances, rng)
     points = [point for point in POINTS if point * dimension <= budget]
     shares = attained(reached, [*(point * dimension for point in points), float(used.max())])
     return SuiteScore(
@@ -166,7 +201,8 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         float(np.median([run.cost - run.best_known for run in runs])),
         float(shares[-1]),
         dict(zip(points, shares[:-1].tolist(), strict=True)),
-        {above: _finite(times[np.flatnonzero(above == TARGETS)[0]]) for above in SHOWN},
+        {above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
+        {above: (_finite(low[k]), _finite(high[k])) for k, above in enumerate(shown)},
     )
 
 
@@ -188,7 +224,7 @@ def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
         function = one.name if one.function == ALL else f"{one.function} {one.name}"
         start = f"{one.dimension:>3} {function:22} {label:{wide}}"
         times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
-        ends.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}")
+        ends.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}".rstrip())
         shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
         courses.append(f"{start}{_cells(shares)}".rstrip())
     return ends + courses

@@ -4,7 +4,7 @@ import hashlib
 import io
 import json
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -38,13 +38,16 @@ class CellResult:
     """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
-    joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
+    # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; of a search the points (k, d) of its improvements,
+    # float64
+    joints: bytes = field(repr=False)
 
 
 class _Spec:
     """Everything that one run depends on. `posefit.sweep.plan` makes cells that are checked.
 
-    `version` is that of posefit and of the method's plugins, with digests of their sources: see `version_of`.
+    `version` is that of posefit and of the method's plugins, with digests of their sources: see
+    `posefit.registry.version_of`.
     """
 
     @cached_property
@@ -215,7 +218,8 @@ class SearchCell(_Spec):
             "trace": {"evaluations": [int(used) for used in run.evaluations], "cost": run.costs.tolist()},
             "warnings": [],
         }
-        return CellResult(row, b"")
+        assert run.points is not None
+        return CellResult(row, run.points.astype("<f8").tobytes())
 
 
 Cell = TrackCell | SearchCell
@@ -237,11 +241,6 @@ def run_cell(cell: Cell) -> CellResult:
     except ValueError:
         raise InputError(f"what {cell.method} measures must be finite numbers, got some that are not") from None
     return replace(result, row=row)
-
-
-def version_of(origins: Iterable[str]) -> str:
-    """Return the version of a cell whose method comes from plugins of these origins: see `Offer.origin`."""
-    return ", ".join([posefit_build(), *sorted(set(origins))])
 
 
 def other_version(origin: str) -> str | None:

@@ -13,10 +13,10 @@ from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, load_motion, training_clips
 from posefit.motion import built_in, recorded
 from posefit.reading import quoted, suggestion
-from posefit.registry import Offer, registry
+from posefit.registry import Offer, registry, version_of
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, settings_text, version_of
+from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, settings_text
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions, declared
 

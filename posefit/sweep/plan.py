@@ -47,10 +47,10 @@ from posefit import settings
 from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
 from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text
-from posefit.registry import registry
+from posefit.registry import registry, version_of
 from posefit.suites.functions import DIMENSIONS, FUNCTIONS, HELD_OUT, SUITES, checked_address, suite_function
 from posefit.suites.problem import EVALUATIONS, INFEASIBLE
-from posefit.sweep.cell import Cell, SearchCell, TrackCell, json_of, version_of
+from posefit.sweep.cell import Cell, SearchCell, TrackCell, json_of
 from posefit.sweep.check import FIELDS, cell_of, checked, families, flattened
 
 LISTS = {

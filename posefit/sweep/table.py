@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
@@ -88,17 +89,19 @@ def search_runs(ledger: "Ledger") -> Iterator[SuiteRun]:
         if not is_search(row["spec"]):
             raise InputError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
         count += 1
-        yield search_run(row)
+        yield search_run(row, ledger.points(row))
     if not count:
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
 
 
-def search_run(row: Mapping[str, Any]) -> SuiteRun:
-    """Return the run of a row of a single search."""
+def search_run(row: Mapping[str, Any], points: Array | None = None) -> SuiteRun:
+    """Return the run of a row of a single search, with the points of `Ledger.points`."""
     spec, trace = row["spec"], row["trace"]
     return SuiteRun(
+        spec["suite"],
         spec["method"],
         spec["settings"],
+        spec["version"],
         spec["function"],
         spec["dimension"],
         spec["instance"],
@@ -109,4 +112,5 @@ def search_run(row: Mapping[str, Any]) -> SuiteRun:
         row["best_known"] + TARGETS,
         np.array(trace["evaluations"], dtype=np.float64),
         np.array(trace["cost"], dtype=np.float64),
+        points,
     )

@@ -264,7 +264,7 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         page.locator("#all").click()
         assert page.locator("#charts .curve").count() == 6 * 3
         rows = page.locator("#ert tbody tr")
-        assert rows.count() == 6 * 2 * 3
+        assert rows.count() == 6 * 2 * 2
         page.locator("#of-function").select_option(label="5 mismatched body")
         page.locator("#of-dimension").select_option(label="24")
         assert rows.count() == 6
@@ -273,6 +273,17 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         assert "–" in rows.last.inner_text()
         page.locator("#lost button").last.click()
         assert 'suite = "posefit-2026.1"' in page.inner_text("#command")
+
+
+def test_a_leaderboard_opens_and_names_what_is_not_ranked(chromium: Any, tmp_path: Path) -> None:
+    (tmp_path / "broken.zip").write_bytes(b"PK")
+    done = run("suite", "board", tmp_path / "broken.zip", "--out", tmp_path / "board.html")
+    assert done.exit_code == 0, done.stderr
+    with shown(chromium, tmp_path / "board.html") as page:
+        assert page.inner_text("h1").startswith("Leaderboard of posefit-")
+        assert "broken.zip: expected a bundle of runs" in page.inner_text("#trouble")
+        assert page.locator("#leaders tbody tr").count() == 6
+        assert page.locator("#charts .band").count() == 4 * page.locator("#charts figure").count()
 
 
 def test_pages_of_one_run_or_of_failures_alone_open(chromium: Any, tmp_path: Path) -> None:

@@ -189,7 +189,7 @@ function runningTimes() {
     row.times.forEach((time, k) =>
       least.set(place(row, k), Math.min(least.get(place(row, k)) ?? Infinity, time ?? Infinity)),
     );
-  const functions = new Map(D.times.map((row) => [row.function, `${row.function || ""} ${row.name}`.trim()]));
+  const functions = new Map(D.times.map((row) => [row.function, `${row.function} ${row.name}`]));
   const dimensions = [...new Set(D.times.map((row) => row.dimension))].sort((a, b) => a - b);
   const time = (above, k) => ({
     title: `ERT +${above}`,
@@ -197,7 +197,9 @@ function runningTimes() {
     value: (row) => row.times[k],
     show: (row) => {
       if (!given(row.times[k])) return "–";
-      return make(row.times[k] === least.get(place(row, k)) ? "strong" : "span", {}, whole(row.times[k]));
+      const time = make(row.times[k] === least.get(place(row, k)) ? "strong" : "span", {}, whole(row.times[k]));
+      const [low, high] = row.ends[k].map((end) => (given(end) ? whole(end) : "∞"));
+      return given(row.ends[k][0]) ? [time, make("small", {}, `${low} – ${high}`)] : time;
     },
   });
   const columns = [
