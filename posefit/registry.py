@@ -111,6 +111,10 @@ class Registry:
 
     plugins: tuple[Plugin[Offer], ...]
 
+    def rivals(self, offer: Offer) -> list[Plugin[Offer]]:
+        """Return the plugins that are left out because they register the name of an offer, too."""
+        return [plugin for plugin in self.plugins if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause]
+
     @property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all plugins that were loaded."""
@@ -238,7 +242,7 @@ def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owner
 
     def add(name: str, offer: Any) -> None:
         if name in owners or name in offers:
-            raise ValueError(f"{name} is already registered by {owners.get(name, owner)}")
+            raise ValueError(f"{_taken(name)} {owners.get(name, owner)}")
         offers[name] = offer
 
     def command(offer: Any) -> None:
@@ -268,6 +272,10 @@ def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owner
     for kind in (what,) if what != "methods" else [f"{kind}s" for kind in KINDS]:
         getattr(manager.hook, f"posefit_register_{kind}")(register=registers[kind])
     return offers
+
+
+def _taken(name: str) -> str:
+    return f"{name} is already registered by"
 
 
 @contextmanager

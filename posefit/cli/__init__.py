@@ -14,6 +14,7 @@ import click
 
 from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.ambiguity import ambiguity
+from posefit.cli.group import Group
 from posefit.cli.motions import motions
 from posefit.cli.output import say
 from posefit.errors import InputError
@@ -33,7 +34,7 @@ def _sentence(command: click.Command) -> str:
     return " ".join((command.help or "").split("\n\n")[0].split())
 
 
-class _Commands(click.Group):
+class _Commands(Group):
     """Has plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors have a traceback."""
 
     def list_commands(self, _context: click.Context) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from posefit.errors import InputError
+from posefit.hooks import PROJECT
 from posefit.reading import quoted, suggestion
 from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
@@ -84,23 +85,30 @@ def diagnosis(plugins: Iterable[Plugin[Any]], verbose: bool = False) -> tuple[li
 
     Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
     """
-    lines, broken = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ], False
+    lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
+    states = set[str]()
     for plugin in plugins:
         offers = ", ".join(f"{_kind(offer)} {offer.name}" for offer in plugin.offers)
-        cause = (
-            " ".join(plugin.cause.split()) or f"offers {offers or 'nothing'}"
-        )  # on one line, whatever the error says
-        lines.append(f"{plugin.state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}")
+        state: str = "empty" if plugin.state == "loaded" and not offers else plugin.state
+        states.add(state)
+        cause = " ".join(plugin.cause.split()) or f"offers {offers}"  # on one line, whatever the error says
+        if state == "empty":
+            cause = "registers nothing: a hook such as posefit_register_optimisers must have the mark @hookimpl"
+        lines.append(f"{state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}")
         lines += [f"          {traced}" for traced in plugin.traceback.splitlines() if verbose]
-        broken |= plugin.state == "broken"
         for offer in plugin.offers:
             if isinstance(offer, Offer) and offer.missing:
                 lines.append(f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'")
             if isinstance(offer, Offer) and not offer.summary:
                 lines.append(f"          {offer.name} has no docstring to be listed with")
+            if isinstance(offer, Offer) and not offer.missing and plugin.distribution != PROJECT:
+                lines.append(f"          next: posefit check {offer.kind} {offer.name}")
     hint = "" if verbose else "; -v shows where they fail"
-    lines.append(f"broken plugins are left out; the others work{hint}" if broken else "all plugins work")
-    return lines, not broken
+    if "broken" in states:
+        lines.append(f"broken plugins are left out; the others are loaded{hint}")
+    else:
+        lines.append("all plugins are loaded, but not all offer something" if "empty" in states else "all plugins work")
+    return lines, not states & {"broken", "empty"}
 
 
 def _kind(offer: Any) -> str:

@@ -5,10 +5,11 @@ from typing import Any
 
 import click
 
+from posefit.cli.group import Group
 from posefit.cli.output import results_alone
 
 
-@click.group(invoke_without_command=True)
+@click.group(cls=Group, invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
@@ -46,7 +47,7 @@ def show(name: str) -> None:
 @click.option("-v", "--verbose", is_flag=True, help="Show where a plugin fails, too: its traceback.")
 @click.pass_context
 def doctor(context: click.Context, verbose: bool) -> None:
-    """Say of every plugin whether it works, and what to do where it does not; exit status 1 where one is broken."""
+    """Say of every plugin what it offers, or why nothing; exit status 1 where one is broken or offers nothing."""
     import warnings
 
     from posefit.cli.inspection import diagnosis

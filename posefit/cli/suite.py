@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from posefit.cli.group import Group
 from posefit.cli.options import parsed_by
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 NAME = "posefit-2026.1"
 
 
-@click.group(invoke_without_command=True)
+@click.group(cls=Group, invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def suite(context: click.Context, as_json: bool) -> None:

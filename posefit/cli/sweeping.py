@@ -18,7 +18,11 @@ LINES = 1000  # that are printed at a time
 @click.argument("plan")
 @click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
 @options(ENGINE)
-@click.option("--dry-run", is_flag=True, help="Print cells and about how long all take, and run none.")
+@click.option(
+    "--dry-run",
+    is_flag=True,
+    help="Print what cells there are and about how long all take, and run none; with --json each cell.",
+)
 @click.option("--keep-old", is_flag=True, help="Rows of another version of posefit or a plugin count, too.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")

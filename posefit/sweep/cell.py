@@ -102,14 +102,6 @@ class TrackCell(_Spec):
         return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
 
     @property
-    def summary(self) -> str:
-        """The cell in one line."""
-        views = ", ".join(f"{view:g}" for view in self.view_degrees)
-        where = f"{self.method} on {self.motion}, view {views}, instance {self.instance}, seed {self.seed}"
-        corruption = [f"{kind} {share:g}" for kind, share in self.corruption.items()]
-        return ", ".join([where, *settings_text(self.settings), *corruption])
-
-    @property
     def kind(self) -> tuple[object, ...]:
         """What the time of a frame depends on."""
         views, corrupted = len(self.view_degrees), bool(self.corruption)
@@ -175,12 +167,6 @@ class SearchCell(_Spec):
 
     def __str__(self) -> str:
         return f"{self.method} on f{self.function} in {self.dimension}D, instance {self.instance}, seed {self.seed}"
-
-    @property
-    def summary(self) -> str:
-        """The cell in one line."""
-        settings = "".join(f", {name}={value}" for name, value in sorted(self.settings.items()))
-        return f"{self}, {self.evaluations} evaluations{settings}"
 
     @property
     def kind(self) -> tuple[object, ...]:

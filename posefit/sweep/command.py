@@ -4,8 +4,11 @@ import json
 import os
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
+from dataclasses import fields
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +21,8 @@ from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
 
 DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
-LISTED = 20  # cells of a preview
+VALUES = 12  # of a field, that a preview lists
+WARNINGS = 5  # of a preview
 
 Say = Callable[[str], None]
 
@@ -80,9 +84,9 @@ def _unversioned(spec: Mapping[str, Any]) -> str:
 
 
 def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bool) -> Iterator[str]:
-    """Yield the lines of a preview: the cells of a plan, which are done already, and about how long the others take.
+    """Yield the lines of a preview: how many cells of a plan have which values, and about how long all take.
 
-    Or those of one JSON object with the same content. A million cells are never in memory together.
+    Or those of one JSON object with each cell, and whether it is done. A million cells are never in memory together.
     """
     from posefit.sweep.estimate import Estimate, KindTotal, Workload, estimate_of
 
@@ -90,6 +94,7 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
     ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
     left: Workload = {}
     workers = count = 0
+    counts: dict[str, Counter[str]] = {}
     if as_json:
         yield '{"cells": ['
     for k, cell in enumerate(cells):
@@ -100,10 +105,11 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
         if as_json:
             line = json.dumps({"key": cell.key, "done": done, **cell.spec})
             yield line if k == len(cells) - 1 else f"{line},"
-        elif k < LISTED:
-            yield f"{cell.key[:8]}  {cell.summary}{'  done' if done else ''}"
-    if len(cells) > LISTED and not as_json:
-        yield f"and {len(cells) - LISTED:,} more; --json lists all of them"
+        else:
+            for one in fields(cell):
+                value = getattr(cell, one.name)
+                text = value if isinstance(value, str) else json_of(value)
+                counts.setdefault(one.name, Counter())[text] += 1
     estimate = Estimate(0.0, {})
     if left:
         with closing(start()) as running:
@@ -113,10 +119,18 @@ def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bo
         untried = json.dumps(estimate.untried)
         yield f'], "seconds": {estimate.seconds!r}, "workers": {workers}, "untried": {untried}}}'
         return
-    for cell_text, reason in estimate.untried.items():
+    for name, values in counts.items():
+        if name in ("method", "motion") or (len(values) > 1 and name not in ("version", "files")):
+            shown = [f"{number:,} x {cut(value)}" for value, number in islice(values.items(), VALUES)]
+            more = [f"and {len(values) - VALUES:,} other values"] * (len(values) > VALUES)
+            yield f"{name:16}  {', '.join(shown + more)}"
+    for cell_text, reason in islice(estimate.untried.items(), WARNINGS):
         yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
-    takes = f": about {duration_text(estimate.seconds)} on {counted(workers, 'worker')}" if left else ""
-    yield f"{len(cells)} cells, {count} of them to run{takes}"
+    if len(estimate.untried) > WARNINGS:
+        yield f"warning: the same holds of {counted(len(estimate.untried) - WARNINGS, 'other kind')}; --json has each"
+    evaluations = sum(total.evaluations for total in left.values())
+    takes = f", {evaluations:,} evaluations: about {duration_text(estimate.seconds)} on {counted(workers, 'worker')}"
+    yield f"{len(cells):,} cells, {count:,} of them to run{takes if left else ''}"
 
 
 def engine(

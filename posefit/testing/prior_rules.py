@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.box import draw_population
+from posefit.fitting.box import REDRAWS, draw_population
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import SearchSpace
 from posefit.motion import built_in
@@ -19,6 +19,7 @@ from posefit.testing.results import BrokenError, SkippedError, expect
 
 ROWS = 100
 MAX_SECONDS = 5e-3  # to recover a pose
+MAX_COPIES = 0.1  # the share of a first population that may be copies before there is a warning
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,11 @@ def searchable(case: Case) -> str:
     drawn = draw_population(space, np.random.default_rng(0), ROWS)
     expect(space.feasible(drawn).all(), "a first population must be feasible, got some that are not")
     uniform = np.random.default_rng(0).uniform(-1.0, 1.0, (2000, space.dimensions))
-    return f"{100 * space.feasible(uniform).mean():.2g} % of the box is feasible"
+    share = space.feasible(uniform).mean()
+    copies, text = (1.0 - share) ** REDRAWS, f"{100 * share:.3g} % of the box is feasible"
+    if copies <= MAX_COPIES:
+        return text
+    return f"warning: only {text}: of a first population about {100 * copies:.0f} % are copies of the others"
 
 
 def speed(case: Case) -> str:

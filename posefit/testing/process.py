@@ -113,6 +113,12 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     from posefit.settings import parse_texts
 
     offer = registry().offer(kind, name)
+    if rivals := registry().rivals(offer):
+        theirs = ", ".join(f"{plugin.name} ({plugin.distribution} {plugin.version})" for plugin in rivals)
+        raise InputError(
+            f"{kind} {name!r} must be of one plugin, got that of {offer.distribution}, which is used, and that of "
+            f"{theirs}, which is left out: give it another name"
+        )
     settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:
         offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -21,10 +22,11 @@ from posefit.errors import InputError
 from posefit.motion import built_in
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
+from posefit_priors.pca import PCA
 from tests.cases import each
 from tests.commands import error_of, printed, run
 from tests.files import arrays
-from tests.plugins.test_registry import point
+from tests.plugins.test_registry import point, registering
 
 FEW = ["--population-size", "10", "--iterations", "4"]
 QUICK = [*FEW, "--size", "120x90"]
@@ -289,6 +291,37 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
     assert "line 7, in bad" not in result.stdout
     verbose = run("plugins", "doctor", "-v").stdout
     assert "no module named 'lost'\n          Traceback ...\n            line 7, in bad\n" in verbose
+
+
+def test_the_doctor_says_what_registers_nothing_and_what_to_type_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    from posefit import registry
+
+    def doctor(module: object) -> tuple[int, str]:
+        installed = registry.Registry(registry.load("methods", [point("mine", module)], {}))
+        monkeypatch.setattr(registry, "registry", lambda: installed)
+        result = run("plugins", "doctor")
+        return result.exit_code, result.stdout
+
+    status, text = doctor(SimpleNamespace(posefit_register_optimisers=print))  # without the mark of a hook
+    assert status == 1
+    assert "empty     mine (posefit-mine 1.0): registers nothing: " in text
+    assert text.endswith("all plugins are loaded, but not all offer something\n")
+    status, text = doctor(registering(("spiral", PCA), ("snail", PCA)))
+    assert status == 0
+    assert "    next: posefit check optimiser spiral\n          next: posefit check optimiser snail\n" in text
+    assert text.endswith("all plugins work\n")
+
+
+def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
+    for words, name, path in (
+        (["doctor"], "doctor", "posefit plugins doctor"),
+        (["trak"], "trak", "posefit track"),
+        (["plugins", "check"], "check", "posefit check"),
+        (["plugins", "docter"], "docter", "posefit plugins doctor"),
+        (["suite", "rn"], "rn", "posefit suite run"),
+    ):
+        assert error_of(*words) == f"posefit: No such command {name!r}; did you mean {path!r}?"
+    assert error_of("zebra") == "posefit: No such command 'zebra'"
 
 
 def test_check_reports_every_rule_and_how_many_ran() -> None:

@@ -63,14 +63,19 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
 
 
 @pytest.mark.slow
-def test_a_preview_lists_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
+def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
     result = run("sweep", plan, "--dry-run", "--workers", 2)
     assert result.exit_code == 0, result.stderr
-    lines = result.stdout.splitlines()
-    assert len(lines) == 9
-    assert "sapso@pca on walk, view 45, instance 0, seed 1, sapso.cooling=0.9, holes 0.5" in lines[6]
-    assert lines[-1].startswith("8 cells, 8 of them to run: about ")
-    assert lines[-1].endswith(" on 2 workers")
+    *lines, last = result.stdout.splitlines()
+    assert lines == [
+        "method            4 x sapso@pca, 4 x random@full",
+        "motion            8 x walk",
+        'settings          4 x {"sapso.cooling":0.9}, 4 x {}',
+        'corruption        4 x {}, 4 x {"holes":0.5}',
+        "seed              4 x 0, 4 x 1",
+    ]
+    assert last.startswith("8 cells, 8 of them to run, 1,280 evaluations: about ")  # 2 frames of 80 each
+    assert last.endswith(" on 2 workers")
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
     run("sweep", plan, "--out", tmp_path / "out")
     listed = json.loads(run("sweep", plan, "--dry-run", "--json", "--out", tmp_path / "out").stdout)
@@ -91,7 +96,23 @@ def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(pl
     assert result.exit_code == 0, result.stderr
     *_, warning, last = result.stdout.splitlines()
     assert warning.startswith("warning: random@pca on walk, instance 0, seed 0: InputError: ")
-    assert last.startswith("9 cells, 9 of them to run: about ")
+    assert last.startswith("9 cells, 9 of them to run, 1,440 evaluations: about ")  # 9 x 2 frames of 80
+
+
+def test_a_preview_of_many_cells_fits_a_screen_however_many_kinds_fail(plan: Path) -> None:
+    methods = [f"{name}@pca" for name in ("random", "pso", "sapso", "cma", "annealed", "particle")]
+    plan.write_text(
+        f'defaults.settings.pca.components = -1\n[product]\nmethods = {methods}\nmotions = ["walk"]\nseeds = 900\n'
+    )
+    result = run("sweep", plan, "--dry-run", "--workers", 1)
+    assert result.exit_code == 0, result.stderr
+    method, motion, seed, *warnings, last = result.stdout.splitlines()
+    assert method.split(maxsplit=1) == ["method", ", ".join(f"900 x {one}" for one in methods)]
+    assert motion.split(maxsplit=1) == ["motion", "5,400 x walk"]
+    assert seed.endswith(", 6 x 10, 6 x 11, and 888 other values")
+    assert len(warnings) == 6
+    assert warnings[-1] == "warning: the same holds of 1 other kind; --json has each"
+    assert last.startswith("5,400 cells, 5,400 of them to run, ")
 
 
 def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path, tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
 """The kit passes what is right and fails what is wrong, for the reason that was planted."""
 
+import re
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import pytest
 
+from posefit.arrays import Array
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
 from posefit.testing import (
@@ -14,6 +16,7 @@ from posefit.testing import (
     check_tracker,
     optimiser_checks,
     parametrize,
+    prior_checks,
     results,
     run_checks,
 )
@@ -110,6 +113,26 @@ def test_it_fails_each_bug_planted_in_a_prior_or_a_filter() -> None:
     for factory in (planted.ForgetsParticles, planted.Sound):
         failed = {result.name for result in check_optimiser(factory, next_frame="carry").of("failed")}
         assert "next_frame" in failed, factory
+
+
+def test_a_prior_of_which_hardly_anything_is_feasible_passes_with_a_warning() -> None:
+    def checked(share: float) -> str:
+        class Picky(PCA):
+            def feasible(self, latents: Array) -> Any:
+                return (latents[:, 0] - self.low[0]) < share * (self.high[0] - self.low[0])
+
+        check = next(check for check in prior_checks(Picky) if check.name == "searchable")
+        return check.run().detail
+
+    # a proposal is drawn 100 times: at 0.6 % feasible 0.994^100 = 55 % of them never are, at 50 % none
+    warning = re.fullmatch(
+        r"warning: only (0\.\d+) % of the box is feasible: of a first population about (\d+) % are copies of the others",
+        checked(0.006),
+    )
+    assert warning
+    assert 0.3 < float(warning[1]) < 1.0
+    assert int(warning[2]) == pytest.approx(100 * (1 - float(warning[1]) / 100) ** 100, abs=1)
+    assert re.fullmatch(r"(4|5)\d(\.\d)? % of the box is feasible", checked(0.5))
 
 
 def test_one_cause_ends_the_checks() -> None:

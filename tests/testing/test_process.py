@@ -68,6 +68,27 @@ def test_a_plugin_that_exits_fails_the_check_and_says_where() -> None:
     assert result["traceback"].splitlines()[-2].strip() == "sys.exit(0)"
 
 
+def test_a_name_that_two_plugins_register_is_not_checked_before_one_has_another(
+    monkeypatch: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.py").write_text(
+        "from posefit.plugin import hookimpl\n@hookimpl\n"
+        "def posefit_register_optimisers(register):\n    register('sapso', dict)\n"
+    )
+    info = tmp_path / "posefit_mine-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: posefit-mine\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[posefit]\nmine = mine\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    ran = posefit("check", "optimiser", "sapso")
+    assert ran.returncode == 2
+    assert ran.stderr.endswith(
+        "posefit: optimiser 'sapso' must be of one plugin, got that of posefit, which is used, and that of mine "
+        "(posefit-mine 1.0), which is left out: give it another name\n"
+    )
+    assert posefit("check", "optimiser", "pso", "--only", "shape").returncode == 0
+
+
 @pytest.mark.usefixtures("installed")
 def test_what_a_plugin_prints_is_in_no_result() -> None:
     checked = posefit("check", "optimiser", "talks", "--only", "shape", "--only", "new_process", "--json")
