@@ -1,0 +1,4 @@
+from ._posefit import Problem
+
+
+__all__ = ["Problem"]
