@@ -10,8 +10,8 @@ from contextlib import suppress
 from itertools import product
 from typing import Any, final
 
-import iohblade
 import ioh
+import iohblade
 import numpy as np
 from iohblade.tags import NoiseType, PrimaryCategories, VariableType
 
@@ -23,20 +23,17 @@ EXACT = [one.number for one in FUNCTIONS if one.exact and 9 in one.dimensions]
 
 TASK = """
 You are a Python expert who designs a new optimisation algorithm. You can use numpy v2 and the standard library.
-`func(x)` draws a person's body in the pose `x` and returns by how much it differs from a silhouette, from 100 down to 0.
-The search space is [-1, 1]^dim; what is not feasible there costs what its repair costs. There are plateaus, many local
-minima, and poses that look nearly the same. Write a class with `__init__(self, budget, dim)` and `__call__(self, func)`,
-which minimises `func` in at most `self.budget` calls, and returns the lowest value and its `x`.
+`func(x)` draws a person's body in the pose `x` and returns by how much it differs from a silhouette, 100 down to 0.
+The search space is [-1, 1]^dim; what is not feasible there costs what its repair costs. There are plateaus, many
+local minima, and poses that look nearly the same. Write a class with `__init__(self, budget, dim)` and
+`__call__(self, func)`, which minimises `func` in at most `self.budget` calls, and returns the lowest value and its `x`.
 """
 EXAMPLE = """
 A random search, for example:
 ```python
-import numpy as np
-
 class RandomSearch:
     def __init__(self, budget=900, dim=9):
         self.budget, self.dim = budget, dim
-
     def __call__(self, func):
         proposals = np.random.uniform(func.bounds.lb, func.bounds.ub, (self.budget, self.dim))
         costs = [func(x) for x in proposals]
@@ -44,7 +41,7 @@ class RandomSearch:
 ```
 """
 FORMAT = """
-Give a new algorithm for this task, in this format:
+Give a new algorithm in this format:
 # Description: <its main idea in one line>
 # Code:
 ```python

@@ -1,4 +1,3 @@
 from ._posefit import Problem
 
-
 __all__ = ["Problem"]

@@ -1,7 +1,6 @@
 import optuna
 import optunahub
 
-
 module = optunahub.load_module("benchmarks/posefit")
 problem = module.Problem(function=1, instance=10_000, dimension=9)
 study = optuna.create_study(directions=problem.directions)
