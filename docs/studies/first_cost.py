@@ -1,4 +1,4 @@
-"""How long it takes from `pip install` of posefit and a tool, in an empty environment, to the first cost in that tool."""
+"""How long it takes from `pip install` of posefit and a tool, in an empty environment, to the first cost there."""
 
 import json
 import subprocess
@@ -26,7 +26,8 @@ TOOLS = {  # the extra, and what prints a cost
     "nevergrad": "import numpy as np; from posefit_bridges.nevergrad import Problem; "
     + "print(Problem(1, 10_000, 9)(np.zeros(9)))",
     "evox": SUITE
-    + "import torch; from posefit_bridges.evox import Problem; print(float(Problem(posed).evaluate(torch.zeros(1, 9))))",
+    + "import torch; from posefit_bridges.evox import Problem; "
+    + "print(float(Problem(posed).evaluate(torch.zeros(1, 9))))",
     "iohblade": BLADE,
     "metabox": SUITE + "from posefit_bridges.metabox import Problem; print(Problem(posed).eval(np.zeros(9)))",
 }

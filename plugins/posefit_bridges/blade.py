@@ -40,14 +40,7 @@ class RandomSearch:
         return min(costs), proposals[np.argmin(costs)]
 ```
 """
-FORMAT = """
-Give a new algorithm in this format:
-# Description: <its main idea in one line>
-# Code:
-```python
-<code>
-```
-"""
+FORMAT = "\nAnswer in this form:\n# Description: <its main idea in one line>\n# Code:\n```python\n<code>\n```\n"
 
 
 @final

@@ -11,22 +11,20 @@ import torch
 from metaevobox.environment.problem.basic_problem import Basic_Problem, Basic_Problem_Torch
 
 from posefit.fitting.check import one_of
+from posefit.suites import problem as suites
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
-from posefit.suites.problem import Problem as SuiteProblem
-from posefit.suites.problem import suite
 
 
 class Problem(Basic_Problem):
     """A problem in the box from -1 to 1, with the optimum 0 or, where it is unknown, None; its name is its id.
 
-    What is not feasible costs what `problem` makes of it, by default what its repair costs. `reset` begins a new trace
-    of `problem`.
+    What is not feasible costs what `problem` makes of it, by default what its repair costs.
     """
 
     lb, ub = -1.0, 1.0
     T1 = 0.0  # milliseconds of evaluations, which MetaBox counts
 
-    def __init__(self, problem: SuiteProblem) -> None:
+    def __init__(self, problem: suites.Problem) -> None:
         self.problem, self.dim, self.optimum = problem, problem.dimension, problem.optimum
 
     def __str__(self) -> str:
@@ -49,9 +47,6 @@ class TorchProblem(Problem, Basic_Problem_Torch):
     def func(self, x: torch.Tensor) -> torch.Tensor:
         """Return the costs (n,) of a population (n, d), on its device."""
         return torch.as_tensor(super().func(x.numpy(force=True)), device=x.device)
-
-
-KINDS = {"numpy": Problem, "torch": TorchProblem}
 
 
 @final
@@ -79,16 +74,13 @@ class Dataset(torch.utils.data.Dataset[list[Problem]]):
         "easy" functions are those whose optimum is known, "difficult" ones the others; the lists are of the numbers of
         functions instead. Functions without the dimension are left out.
         """
-        one_of("version", version, KINDS)
+        one_of("version", version, ("numpy", "torch"))
         one_of("difficulty", difficulty, ("easy", "difficult", "all"))
-        usual = [one.number for one in FUNCTIONS if difficulty == "all" or one.exact == (difficulty == "easy")]
-        usual = [number for number in usual if dimension in FUNCTIONS[number - 1].dimensions]
+        kind = Problem if version == "numpy" else TorchProblem
+        usual = [one for one in FUNCTIONS if difficulty == "all" or one.exact == (difficulty == "easy")]
+        numbers = [one.number for one in usual if dimension in one.dimensions]
         train, test = (
-            [
-                KINDS[version](suite(SUITE, number, one, dimension))
-                for number in own or usual
-                for one in part[:instances]
-            ]
+            [kind(suites.suite(SUITE, number, one, dimension)) for number in own or numbers for one in part[:instances]]
             for own, part in ((user_train_list, TRAINING), (user_test_list, HELD_OUT))
         )
         return Dataset(train, train_batch_size), Dataset(test, test_batch_size)
