@@ -1,6 +1,7 @@
 """How long it takes from `pip install` of posefit and a tool, in an empty environment, to the first cost there."""
 
 import json
+import resource
 import subprocess
 import sys
 import tempfile
@@ -38,7 +39,7 @@ BESIDE = {"metabox": ["--no-deps", "metaevobox", "tianshou==1.1.0"]}  # its nump
 @click.argument("tools", nargs=-1, type=click.Choice(list(TOOLS)))
 @click.option("--first", multiple=True, metavar="PACKAGE", help="Install this before, such as a torch without CUDA.")
 def main(tools: Sequence[str], first: Sequence[str]) -> None:
-    """Build a wheel, and print a row for each tool: seconds to install, to the first cost, and the cost."""
+    """Build a wheel, and print a row for each tool: seconds of the clock and of a processor, and the cost."""
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         _run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", work, ROOT)
@@ -46,7 +47,7 @@ def main(tools: Sequence[str], first: Sequence[str]) -> None:
         for tool in tools or TOOLS:
             _run(sys.executable, "-m", "venv", work / tool)
             python = work / tool / "bin" / "python"
-            began = time.perf_counter()
+            began, processor = time.perf_counter(), _processor()
             if first:
                 _run(python, "-m", "pip", "install", *first)
             _run(python, "-m", "pip", "install", f"{wheel}[{tool}]")
@@ -55,8 +56,19 @@ def main(tools: Sequence[str], first: Sequence[str]) -> None:
             installed = time.perf_counter()
             cost = float(_run(python, "-c", TOOLS[tool]).split()[-1])
             ended = time.perf_counter()
-            seconds = {"install_s": round(installed - began, 1), "first_cost_s": round(ended - installed, 1)}
-            print(json.dumps({"tool": tool, **seconds, "total_s": round(ended - began, 1), "cost": cost}), flush=True)
+            seconds = {
+                "install_s": installed - began,
+                "first_cost_s": ended - installed,
+                "total_s": ended - began,
+                "processor_s": _processor() - processor,
+            }
+            print(json.dumps({"tool": tool, **{k: round(v, 1) for k, v in seconds.items()}, "cost": cost}), flush=True)
+
+
+def _processor() -> float:
+    """Return the seconds of a processor that all commands took, which other work on the machine does not lengthen."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _run(*command: object) -> str:

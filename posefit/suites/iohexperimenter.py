@@ -6,7 +6,9 @@ Computation 32(3), 2024. `pip install posefit[ioh]`.
 
 from typing import TYPE_CHECKING, final
 
-import ioh
+import numpy as np
+from ioh.iohcpp import RealBounds, RealSolution
+from ioh.problem import RealSingleObjective
 
 from posefit.arrays import Array
 
@@ -17,7 +19,7 @@ FIRST_ID = 26_100  # function 1 of posefit-2026.1 is 26101: none of IOHexperimen
 
 
 @final
-class IOHProblem(ioh.problem.RealSingleObjective):
+class IOHProblem(RealSingleObjective):
     """A problem with the number, instance, bounds and, where it is known, the optimum of the suite's.
 
     Proposals that are not feasible cost what `problem` makes of them. A budget of `problem` holds here, too.
@@ -25,8 +27,9 @@ class IOHProblem(ioh.problem.RealSingleObjective):
 
     def __init__(self, problem: "Problem") -> None:
         d, name = problem.dimension, f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
-        known = {} if problem.optimum is None else {"optimum": ioh.RealSolution(problem.made.truth, problem.optimum)}
-        super().__init__(name, d, problem.instance, bounds=ioh.RealBounds(d, -1.0, 1.0), **known)
+        unknown = problem.optimum is None
+        optimum = RealSolution([], np.nan) if unknown else RealSolution(problem.made.truth, problem.truth_cost)
+        super().__init__(name, d, problem.instance, bounds=RealBounds(d, -1.0, 1.0), optimum=optimum)
         self.set_id(FIRST_ID + problem.id_function)
         self.problem = problem
 
