@@ -7,8 +7,8 @@ Computation 32(3), 2024. `pip install posefit[ioh]`.
 from typing import TYPE_CHECKING, final
 
 import numpy as np
+from ioh import problem as problems
 from ioh.iohcpp import RealBounds, RealSolution
-from ioh.problem import RealSingleObjective
 
 from posefit.arrays import Array
 
@@ -19,7 +19,7 @@ FIRST_ID = 26_100  # function 1 of posefit-2026.1 is 26101: none of IOHexperimen
 
 
 @final
-class IOHProblem(RealSingleObjective):
+class IOHProblem(problems.RealSingleObjective):
     """A problem with the number, instance, bounds and, where it is known, the optimum of the suite's.
 
     Proposals that are not feasible cost what `problem` makes of them. A budget of `problem` holds here, too.

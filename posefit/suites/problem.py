@@ -34,7 +34,7 @@ from posefit.suites.functions import (
 from posefit.suites.instances import SuiteInstance, suite_instance
 
 if TYPE_CHECKING:
-    from ioh.problem import RealSingleObjective
+    from posefit.suites.iohexperimenter import IOHProblem
 
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
@@ -121,7 +121,7 @@ class Problem:
         """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
         return self._counted(self._checked(proposals).reshape(-1, self.dimension))
 
-    def ioh(self) -> "RealSingleObjective":
+    def ioh(self) -> "IOHProblem":
         """Return the problem as one of IOHexperimenter's: its count is this one's, and its `reset` resets both.
 
         Raises ImportError without the library ioh.
