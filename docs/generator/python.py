@@ -1,6 +1,8 @@
 """The reference of the Python packages: a page for each, with the docstrings of all its modules."""
 
+import ast
 import importlib
+import importlib.util
 import pkgutil
 from pathlib import Path
 
@@ -30,7 +32,15 @@ def _packages() -> list[str]:
 def _modules(package: str) -> list[str]:
     path = importlib.import_module(package).__path__
     modules = sorted(module.name for module in pkgutil.walk_packages(path, f"{package}."))
-    return [name for name in modules if importlib.import_module(name).__doc__]
+    return [name for name in modules if ast.get_docstring(ast.parse(_source(name)))]
+
+
+def _source(name: str) -> str:
+    """Return a module's code; it is not imported, as its library may be absent."""
+    spec = importlib.util.find_spec(name)
+    assert spec is not None
+    assert spec.origin is not None
+    return Path(spec.origin).read_text("utf-8")
 
 
 def _page(package: str, modules: list[str]) -> str:

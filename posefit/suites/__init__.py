@@ -15,4 +15,6 @@
 | runs as a file with the points of their improvements | bundles.py |
 | whether all that such a file claims is so | verification.py |
 | runs of posefit's own methods, made by `docs/studies/make_bundles.py` | methods.zip |
+| an optimiser on a problem; scores of runs | running.py |
+| a problem as one of IOHexperimenter's | iohexperimenter.py |
 """

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from importlib.resources import files
 from itertools import product
-from typing import Any, Literal, final
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from posefit.suites.functions import (
     suite_function,
 )
 from posefit.suites.instances import SuiteInstance, suite_instance
+
+if TYPE_CHECKING:
+    from posefit.suites.iohexperimenter import IOHProblem
 
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
@@ -96,6 +99,10 @@ class Problem:
         # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
         self.optimum = 0.0 if function.exact else None
         self.truth_cost = made.truth_cost  # of the true pose, which is in the box and feasible
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all evaluations: the count, the best, the trace, and when the first began."""
         self.evaluations = 0
         self.best_observed_fvalue1 = np.inf
         self._steps: list[tuple[int, float, Array]] = []  # evaluations, cost and point of each improvement
@@ -116,6 +123,15 @@ class Problem:
         """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
         values, back = exchanged("proposals", proposals)
         return back(self._counted(self._checked(values).reshape(-1, self.dimension)))
+
+    def ioh(self) -> "IOHProblem":
+        """Return the problem as one of IOHexperimenter's: its count is this one's, and its `reset` resets both.
+
+        Raises ImportError without the library ioh.
+        """
+        from posefit.suites.iohexperimenter import IOHProblem
+
+        return IOHProblem(self)
 
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""

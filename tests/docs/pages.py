@@ -35,7 +35,7 @@ class Block:
 def pages() -> list[Path]:
     """Return README and every page of the handbook that was written by hand."""
     files = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
-    written = [path for path in files if not {"_build", "generated"} & set(path.parts)]
+    written = [path for path in files if not {"_build", "generated", "contributions"} & set(path.parts)]
     return [ROOT / "README.md", *sorted(written)]
 
 

@@ -7,7 +7,9 @@ from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
+import iohinspector
 import numpy as np
+import polars
 import pytest
 
 import posefit
@@ -294,26 +296,46 @@ def test_a_loop_like_cocos_has_the_same_trace(traces) -> None:
             assert np.array_equal(problem.trace, expected)
 
 
-def test_iohexperimenter_logs_the_same_trace(traces, tmp_path: Path) -> None:
+def test_iohexperimenter_logs_the_same_trace_of_each_run(traces, tmp_path: Path) -> None:
     ioh = pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    logger = ioh.logger.Analyzer(root=str(tmp_path), folder_name="swarm", algorithm_name="PSO")
     for problem, expected in zip(problems(), traces, strict=True):
-        wrapped = ioh.wrap_problem(
-            problem, problem.id, ioh.ProblemClass.REAL, problem.dimension, problem.instance, lb=-1, ub=1
-        )
-        logger = ioh.logger.Analyzer(root=str(tmp_path), folder_name=problem.id, algorithm_name="PSO")
+        wrapped = problem.ioh()
+        meta = wrapped.meta_data
+        assert (meta.problem_id, meta.instance) == (26_100 + problem.id_function, problem.instance)
+        assert meta.n_variables == problem.dimension
+        assert np.array_equal((wrapped.bounds.lb, wrapped.bounds.ub), (problem.lower_bounds, problem.upper_bounds))
+        assert wrapped.optimum.y == 0.0 if problem.optimum == 0.0 else not np.isfinite(wrapped.optimum.y)
         wrapped.attach_logger(logger)
-        one_by_one(wrapped, swarm(problem.space), BUDGET)
+        for _ in range(2):
+            one_by_one(wrapped, swarm(problem.space), BUDGET)
+            assert np.array_equal(problem.trace, expected)
+            assert wrapped.state.evaluations == problem.evaluations == BUDGET
+            assert wrapped.state.current_best.y == problem.best_observed_fvalue1
+            wrapped.reset()
+            assert wrapped.state.evaluations == problem.evaluations == len(problem.trace[0]) == 0
         wrapped.detach_logger()
-        logger.close()
-        assert np.array_equal(problem.trace, expected)
-        assert wrapped.state.evaluations == problem.evaluations == BUDGET
-        assert wrapped.state.current_best.y == problem.best_observed_fvalue1
-        rows = next((tmp_path / problem.id).rglob("*.dat")).read_text("ascii").splitlines()[1:]
-        logged = [(float(used), float(cost)) for used, cost in (row.split() for row in rows)]
-        falls = np.flatnonzero(np.diff(expected[1], prepend=np.inf) < 0.0)
-        assert logged[: len(falls)] == [
-            (expected[0][k], pytest.approx(expected[1][k], abs=1e-9)) for k in falls
-        ]  # it logs a row where the cost falls, and the last one
+    logger.close()
+    manager = iohinspector.DataManager()
+    manager.add_folder(str(tmp_path / "swarm"))
+    logged = manager.load(monotonic=False, include_meta_data=True)
+    for (function, instance, dimension), (used, best) in zip(ADDRESSES, traces, strict=True):
+        falls = np.flatnonzero(np.diff(best, prepend=np.inf) < 0.0)
+        for run in (1, 2):
+            rows = logged.filter((polars.col("function_id") == 26_100 + function) & (polars.col("run_id") == run))
+            assert set(rows["instance"]) == {instance}
+            assert set(rows["dimension"]) == {dimension}
+            assert rows["evaluations"].to_list()[: len(falls)] == used[falls].tolist()
+            assert rows["raw_y"].to_list()[: len(falls)] == pytest.approx(best[falls], abs=1e-9)
+
+
+def test_iohexperimenter_finds_the_optimum_and_keeps_a_budget() -> None:
+    pytest.importorskip("ioh", reason="it has no wheels for every Python")
+    wrapped = problem(budget=1).ioh()
+    wrapped(wrapped.optimum.x)
+    assert wrapped.state.final_target_found
+    with pytest.raises(BudgetSpentError):
+        wrapped(wrapped.optimum.x)
 
 
 def test_cocos_own_solver_and_printer_run_on_a_suite(capsys) -> None:

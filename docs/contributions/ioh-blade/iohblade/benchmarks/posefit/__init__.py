@@ -1,0 +1,1 @@
+from posefit_bridges.blade import Problem as Posefit

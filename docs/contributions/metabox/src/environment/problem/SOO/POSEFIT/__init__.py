@@ -1,0 +1,1 @@
+from posefit_bridges.metabox import Dataset as Posefit_Dataset

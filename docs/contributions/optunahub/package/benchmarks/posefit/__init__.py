@@ -1,0 +1,3 @@
+from ._posefit import Problem
+
+__all__ = ["Problem"]
