@@ -197,9 +197,9 @@ function runningTimes() {
     value: (row) => row.times[k],
     show: (row) => {
       if (!given(row.times[k])) return "–";
-      const time = make(row.times[k] === least.get(place(row, k)) ? "strong" : "span", {}, whole(row.times[k]));
+      const shown = make(row.times[k] === least.get(place(row, k)) ? "strong" : "span", {}, whole(row.times[k]));
       const [low, high] = row.ends[k].map((end) => (given(end) ? whole(end) : "∞"));
-      return given(row.ends[k][0]) ? [time, make("small", {}, `${low} – ${high}`)] : time;
+      return given(row.ends[k][0]) ? [shown, make("small", {}, `${low} – ${high}`)] : shown;
     },
   });
   const columns = [
