@@ -53,6 +53,7 @@ for _id, _entry in (
     ("FitState", "fit:FitState"),
     ("Track", "track:Track"),
     ("Configure", "configure:Configure"),
+    ("Race", "race:Race"),
 ):
     register(
         id=f"posefit/{_id}-v0",
