@@ -126,7 +126,7 @@ def restarted_policy(slope: float = 0.05) -> Policy:
 
 
 def halving_policy() -> Policy:
-    """Return successive halving as a policy of Race-v0: after each of equal parts of the budget the better half goes on.
+    """Return successive halving as a policy of Race-v0: after each of equal parts of the budget the worse half stops.
 
     Those that are left take turns. K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and
     hyperparameter optimization, AISTATS 2016.
@@ -144,7 +144,7 @@ def halving_policy() -> Policy:
     return act
 
 
-def bandit_policy(curiosity: float = 0.03) -> Policy:
+def bandit_policy(curiosity: float = 0.4) -> Policy:
     """Return UCB1 as a policy of Race-v0: the lowest best cost, less what a search may gain that had few generations.
 
     That is `curiosity` times the root of ln(generations of all) / generations, in shown costs. It begins no search.
