@@ -95,7 +95,7 @@ def race_features(observation: Any) -> tuple[Array, Array]:
 
 def race_action(choice: Any, searches: int) -> Array:
     """Return the actions (..., searches + 1) of Race-v0 that make choices (...), whole numbers from 0 to searches."""
-    return 2.0 * np.eye(searches + 1)[np.asarray(choice)] - 1.0
+    return np.asarray(2.0 * np.eye(searches + 1)[np.asarray(choice)] - 1.0)
 
 
 def round_robin_policy() -> Policy:
@@ -103,7 +103,7 @@ def round_robin_policy() -> Policy:
 
     def act(observation: Any, step: int) -> Array:
         features, _ = race_features(observation)
-        searches = features.shape[-2]
+        searches: int = features.shape[-2]
         return race_action(np.full(features.shape[:-2], step % searches), searches)
 
     return act
@@ -154,7 +154,7 @@ def bandit_policy(curiosity: float = 0.4) -> Policy:
 
     def act(observation: Any, step: int) -> Array:
         features, _ = race_features(observation)
-        searches, used = features.shape[-2], features[..., 3]
+        searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
         total = step + searches
         generations = used / used.sum(axis=-1, keepdims=True) * total
         index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)

@@ -155,7 +155,7 @@ class RaceVectorEnv(SearchVectorEnv):
         spreads = np.log(np.maximum(swarms.spreads / MIN_SPREAD, 1.0)) / np.log(MAX_SPREAD / MIN_SPREAD)
         each = log_cost(swarms.costs), self._slopes / MAX_SLOPE, spreads, self._used / budgets
         common = log_cost(self._best)[:, None], self._left[:, None] / budgets, budgets / self._most
-        return np.minimum(np.concatenate([*each, *common], axis=1), 1.0).astype(np.float32)
+        return np.asarray(np.minimum(np.concatenate([*each, *common], axis=1), 1.0), dtype=np.float32)
 
     def _infos(self) -> Infos:
         poses = self._stage.poses(self._leaders)
