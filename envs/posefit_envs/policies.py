@@ -116,7 +116,7 @@ def restarted_policy(slope: float = 0.05) -> Policy:
     """
 
     def act(observation: Any, _: int) -> Array:
-        features, _ = race_features(observation)
+        features = race_features(observation)[0]
         open_ones = features[..., 1] >= slope
         longest = np.where(open_ones, features[..., 3], -1.0).argmax(axis=-1)
         searches = features.shape[-2]
