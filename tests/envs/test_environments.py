@@ -17,7 +17,7 @@ from posefit import SynthesisTracker
 from posefit_envs.instance import instance
 from tests.cases import each
 
-SEARCHES = ("posefit/FitImage-v0", "posefit/FitState-v0", "posefit/Track-v0", "posefit/Configure-v0")
+SEARCHES = tuple(f"posefit/{name}-v0" for name in ("FitImage", "FitState", "Track", "Configure", "Race"))
 MODES = "posefit/Modes-v0"
 IDS = (*SEARCHES, MODES)
 WORLDS: list[dict[str, Any]] = [
@@ -34,6 +34,7 @@ SHORT: dict[str, dict[str, Any]] = {
     "posefit/FitState-v0": {"max_evaluations": 7},
     "posefit/Track-v0": {"frames": 3, "evaluations_per_frame": 3},
     "posefit/Configure-v0": {"population_size": 5, "iterations": 4, "every": 1},
+    "posefit/Race-v0": {"searches": 3, "generations": [4, 6]},
     MODES: {"max_evaluations": 5},
 }
 
@@ -68,7 +69,7 @@ def trace(env: gym.Env[Any, Any], steps: int = 12) -> list[Any]:
     return results
 
 
-@each(("name", "arguments"), list(zip(IDS, [*WORLDS[1:], {"instance": 3}], strict=True)))
+@each(("name", "arguments"), list(zip(IDS, [*WORLDS, {"instance": 3}], strict=True)))
 def test_its_description_as_json_makes_an_equal_one(name: str, arguments: dict[str, Any]) -> None:
     env = gym.make(name, **{**arguments, **SHORT[name]})
     assert env.spec is not None

@@ -40,13 +40,19 @@ CONFIGURE: list[dict[str, Any]] = [
     {"population_size": 10, "iterations": 9, "every": 3, "translation": "aligned", "mismatch_percent": 8.0},
     {"population_size": 6, "iterations": 3, "every": 1, "prior": "full", "translation": "searched", "errors": False},
 ]
+RACE: list[dict[str, Any]] = [
+    {"searches": 3, "generations": (4, 9), "translation": "aligned", "mismatch_percent": 8.0},
+    {"population_size": 3, "generations": (1, 6), "prior": "full", "translation": "searched", "errors": False},
+    {"searches": 2, "generations": (30, 30), "view_degrees": [0.0, 90.0]},
+]
 CASES = {
     "posefit/FitImage-v0": FIT,
     "posefit/FitState-v0": FIT_STATE,
     "posefit/Track-v0": TRACK,
     "posefit/Configure-v0": CONFIGURE,
+    "posefit/Race-v0": RACE,
 }
-CHANGING = ("posefit/FitState-v0", "posefit/Configure-v0")  # whose reset gives infos of a search
+CHANGING = ("posefit/FitState-v0", "posefit/Configure-v0", "posefit/Race-v0")  # whose reset gives infos of a search
 
 
 @each(("name", "arguments"), [(name, one) for name, many in CASES.items() for one in many])
@@ -98,6 +104,7 @@ def test_the_checker_works_on_any_vector_and_names_what_is_wrong() -> None:
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
         ("posefit/FitState-v0", {}),
         ("posefit/Configure-v0", {"population_size": 5, "iterations": 5, "every": 1}),
+        ("posefit/Race-v0", {"generations": (2, 5)}),
     ],
 )
 def test_a_time_limit_truncates_a_vector_environment_too(name: str, arguments: dict[str, Any]) -> None:
@@ -154,7 +161,7 @@ def test_a_reset_gives_each_environment_its_instance(name: str) -> None:
     assert infos["_instance"].tolist() == mask.tolist()
 
 
-@each(("name", "d"), [("posefit/FitImage-v0", 9), ("posefit/Track-v0", 9), ("posefit/Configure-v0", 10)])
+@each(("name", "d"), [(name, 10 if name == "posefit/Configure-v0" else 9) for name in CASES if "State" not in name])
 def test_mistakes_are_named(name: str, d: int) -> None:
     vector = gym.make_vec(name, num_envs=3)
     with pytest.raises(error.ResetNeeded, match="reset must come before"):

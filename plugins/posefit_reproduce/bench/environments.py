@@ -16,6 +16,11 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "fit_each": ("FitImage-v0", ENDLESS),
     "track_each": ("Track-v0", {"frames": 2, "evaluations_per_frame": 10**9}),
     "configure_each": ("Configure-v0", {"iterations": 10**9}),
+    "race_each": ("Race-v0", {"generations": (10**9, 10**9)}),
+}
+LEARNING: dict[str, tuple[str, dict[str, Any]]] = {
+    "fit_learning": ("FitImage-v0", {"max_evaluations": EPISODE, "target_cost": -1.0}),
+    "race_learning": ("Race-v0", {"generations": (EPISODE, EPISODE)}),
 }
 
 
@@ -23,18 +28,18 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     """Return what a step of 40 environments takes a proposal, in microseconds: natively, and one by one.
 
     In `fit_shared` all have one instance, elsewhere each has its own. `kernel_us` is the cost of as many proposals
-    through the library. In `configure_all_threads` so many `threads` draw. `fit_learning` is what a learner has: random
-    instances, episodes of 40 steps, and their resets, in steps a second. The environments are found by name, as by
-    users.
+    through the library. In `configure_all_threads` so many `threads` draw. `fit_learning` and `race_learning` are what
+    a learner has: random instances, episodes of 40 steps, and their resets, in steps a second. The environments are
+    found by name, as by users.
     """
     vectors = {name: _pair(*case) for name, case in CASES.items()}
     vectors["configure_all_threads"] = _pair(*CASES["configure_each"], threads)
-    vectors["fit_learning"] = _pair("FitImage-v0", {"max_evaluations": EPISODE, "target_cost": -1.0})
+    vectors |= {name: _pair(*case) for name, case in LEARNING.items()}
     problem = vectors["fit_each"]["native"].unwrapped.problems[0]
     proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (ENVIRONMENTS, problem.space.dimensions))
     jobs: dict[str, Callable[[], object]] = {"kernel": lambda: problem.evaluate(proposals)}
     for name, envs in vectors.items():
-        steps = EPISODE + 1 if name == "fit_learning" else 1
+        steps = EPISODE + 1 if name in LEARNING else 1
         jobs |= {f"{name} {kind}": _steps(env, steps) for kind, env in envs.items()}
     seconds = fastest(jobs)
     kernel_us, figures = 1e6 * seconds["kernel"] / ENVIRONMENTS, {}
@@ -42,7 +47,7 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
         native, sync = (seconds[f"{name} {kind}"] for kind in envs)
         env = envs["native"].unwrapped
         evaluations = ENVIRONMENTS * int(getattr(env, "population_size", 1)) * int(getattr(env, "every", 1))
-        if name == "fit_learning":
+        if name in LEARNING:
             steps = ENVIRONMENTS * EPISODE
             figures[name] = {"steps_per_second": steps / native, "sync_steps_per_second": steps / sync}
         else:

@@ -1,0 +1,258 @@
+"""Does looking pay in Race-v0? Policies that do not look, that do, and that learn to, on held-out instances.
+
+All have the same instances, first populations and budgets, so that they are compared in pairs. The figure is
+ln(1 + best cost), which the rewards of an episode sum up to.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import click
+import gymnasium as gym
+import numpy as np
+
+from agents import HELD_OUT, check_learners
+from posefit.arrays import Array
+from posefit.evolution.strategy import Strategy
+from posefit_envs import to_sb3_vec_env
+from posefit_envs.policies import (
+    Policy,
+    bandit_policy,
+    halving_policy,
+    linear_policy,
+    restarted_policy,
+    round_robin_policy,
+    uniform_policy,
+)
+from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES, SEARCHES
+from posefit_reproduce.jobs import each
+from table import LEVEL, RESAMPLES, WORKERS, earlier, kept, markdown
+
+NAME = "posefit/Race-v0"
+INSTANCES, SEEDS = 192, 2
+# what a training of each learner has
+CURIOSITIES, SLOPES = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8), (0.01, 0.03, 0.05, 0.1, 0.2)
+CANDIDATES, EPISODES, GENERATIONS = 16, 24, 60  # CMA-ES: policies a generation, each in so many episodes
+LINEAR_WEIGHTS = 9
+DISCOUNT = 0.995
+PPO_ENVIRONMENTS, PPO_ROLLOUT, PPO_STEPS = 64, 64, 200_000
+PPO_SETTINGS: dict[str, Any] = {"n_steps": PPO_ROLLOUT, "batch_size": 512, "learning_rate": 1e-3, "gae_lambda": 0.98}
+LOG_DEVIATION = -1.0  # of PPO's first actions: of several that are clipped to 1 the first would count
+SAC_ENVIRONMENTS, SAC_STEPS = 16, 24_000
+SAC_SETTINGS: dict[str, Any] = {"buffer_size": SAC_STEPS, "gradient_steps": 4}
+REFERENCES = ("round robin", "random actions", "one restarted", "halving")
+LEARNERS = ("bandit", "linear, CMA-ES", "PPO, a shared net", "PPO", "SAC")
+
+
+class Turn(NamedTuple):
+    """One row: a policy, the seed of its training, and the held-out instances."""
+
+    agent: str
+    seed: int
+    instances: int
+
+
+def final_costs(policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]) -> tuple[Array, int]:
+    """Return ln(1 + best cost) (n,) at the end of an episode of every environment of a vector, and the steps made."""
+    observations, _ = env.reset(seed=list(seeds), options={"instance": list(numbers)})
+    costs, step, taken = np.full(env.num_envs, np.nan), 0, 0
+    while np.isnan(costs).any():
+        taken += int(np.isnan(costs).sum())
+        observations, _, ended, _, infos = env.step(policy(observations, step))
+        new = ended & np.isnan(costs)
+        costs[new] = np.log1p(infos["best_cost"][new])
+        step += 1
+    return costs, taken
+
+
+def _made(count: int) -> Any:
+    return gym.make_vec(f"posefit_envs:{NAME}", count, errors=False)
+
+
+def chosen(policies: Sequence[Policy], seed: int) -> tuple[Policy, int]:
+    """Return the best of several policies on as many training instances as are held out, and the steps made."""
+    rng, env = np.random.default_rng(seed), _made(INSTANCES)
+    numbers, seeds = rng.integers(HELD_OUT, size=INSTANCES).tolist(), rng.integers(2**31, size=INSTANCES).tolist()
+    results = [final_costs(policy, env, numbers, seeds) for policy in policies]
+    best = int(np.argmin([costs.mean() for costs, _ in results]))
+    return policies[best], sum(steps for _, steps in results)
+
+
+def evolved(seed: int) -> tuple[Policy, int]:
+    """Return the linear policy at the mean of CMA-ES, and the steps made.
+
+    All policies of a generation have the same episodes.
+    """
+    rng, env, taken = np.random.default_rng(seed), _made(CANDIDATES * EPISODES), 0
+    strategy = Strategy(np.zeros(LINEAR_WEIGHTS), np.ones(LINEAR_WEIGHTS), CANDIDATES)
+    for _ in range(GENERATIONS):
+        weights = strategy.sample(rng, CANDIDATES)
+        numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
+        policy = linear_policy(weights.repeat(EPISODES, axis=0))
+        tiled = np.tile(numbers, CANDIDATES).tolist(), np.tile(seeds, CANDIDATES).tolist()
+        costs, steps = final_costs(policy, env, *tiled)
+        strategy.learn(weights, costs.reshape(CANDIDATES, EPISODES).mean(axis=1))
+        taken += steps
+    return linear_policy(strategy.mean), taken
+
+
+def trained(agent: str, seed: int) -> tuple[Policy, int]:
+    """Return what Stable-Baselines3 learned, a draw of its distribution, and the steps made.
+
+    The middle of the distribution is worse: one of two searches that look alike has all turns.
+    """
+    import torch
+    from stable_baselines3 import PPO, SAC
+
+    torch.set_num_threads(1)
+    common: dict[str, Any] = {"seed": seed, "device": "cpu", "gamma": DISCOUNT}
+    if agent == "SAC":
+        model: Any = SAC("MlpPolicy", to_sb3_vec_env(_made(SAC_ENVIRONMENTS)), **SAC_SETTINGS, **common)
+    else:
+        policy = "MlpPolicy" if agent == "PPO" else _shared_net()
+        common |= PPO_SETTINGS | {"policy_kwargs": {"log_std_init": LOG_DEVIATION}}
+        model = PPO(policy, to_sb3_vec_env(_made(PPO_ENVIRONMENTS)), **common)
+    model.learn(SAC_STEPS if agent == "SAC" else PPO_STEPS)
+
+    def act(observation: Any, _: int) -> Array:
+        actions: Array = model.predict(observation, deterministic=False)[0]
+        return actions
+
+    return act, int(model.num_timesteps)
+
+
+def _shared_net() -> type:
+    """Return a policy of Stable-Baselines3 whose one net scores every search, and which has the number of another."""
+    import torch
+    from stable_baselines3.common.policies import ActorCriticPolicy
+    from torch import nn
+
+    width = 32
+
+    class Scores(nn.Module):  # type: ignore[misc]
+        latent_dim_pi, latent_dim_vf = SEARCHES + 1, 2 * width
+
+        def __init__(self) -> None:
+            super().__init__()
+            size = SEARCH_FEATURES + COMMON_FEATURES
+            self.score = nn.Sequential(nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh())
+            self.last, self.another = nn.Linear(width, 1), nn.Linear(COMMON_FEATURES, 1)
+            self.value = nn.Sequential(nn.Linear(size, width), nn.Tanh(), nn.Linear(width, width), nn.Tanh())
+
+        def _rows(self, shown: Any) -> Any:
+            common = shown[:, -COMMON_FEATURES:]
+            own = shown[:, :-COMMON_FEATURES].reshape(len(shown), SEARCH_FEATURES, SEARCHES).transpose(1, 2)
+            return torch.cat([own, common[:, None].expand(-1, SEARCHES, -1)], dim=2)
+
+        def forward_actor(self, shown: Any) -> Any:
+            scores = self.last(self.score(self._rows(shown)))[:, :, 0]
+            return torch.cat([scores, self.another(shown[:, -COMMON_FEATURES:])], dim=1)
+
+        def forward_critic(self, shown: Any) -> Any:
+            rows = self.value(self._rows(shown))
+            return torch.cat([rows.mean(dim=1), rows.amax(dim=1)], dim=1)
+
+        def forward(self, shown: Any) -> Any:
+            return self.forward_actor(shown), self.forward_critic(shown)
+
+    class SharedNet(ActorCriticPolicy):  # type: ignore[misc]
+        def _build_mlp_extractor(self) -> None:
+            self.mlp_extractor = Scores()
+
+        def _build(self, schedule: Any) -> None:
+            super()._build(schedule)
+            self.action_net = nn.Identity()  # scores are the actions
+            self.optimizer = self.optimizer_class(self.parameters(), lr=schedule(1), **self.optimizer_kwargs)
+
+    return SharedNet
+
+
+def policy_of(turn: Turn, env: Any) -> tuple[Policy, int]:
+    """Return the policy of a row, trained, and the steps of its training."""
+    plain: dict[str, Callable[[], Policy]] = {
+        "round robin": round_robin_policy,
+        "random actions": lambda: uniform_policy(env, np.random.default_rng(turn.seed)),
+        "halving": halving_policy,
+    }
+    if turn.agent in plain:
+        return plain[turn.agent](), 0
+    if turn.agent == "one restarted":
+        return chosen([restarted_policy(slope) for slope in SLOPES], turn.seed)
+    if turn.agent == "bandit":
+        return chosen([bandit_policy(curiosity) for curiosity in CURIOSITIES], turn.seed)
+    return evolved(turn.seed) if turn.agent == "linear, CMA-ES" else trained(turn.agent, turn.seed)
+
+
+def row_of_turn(turn: Turn) -> dict[str, Any]:
+    """Return a row: the final costs of a policy on the held-out instances, and what its training took."""
+    start, env = perf_counter(), _made(turn.instances)
+    policy, steps = policy_of(turn, env)
+    minutes = (perf_counter() - start) / 60.0
+    numbers = range(HELD_OUT, HELD_OUT + turn.instances)
+    costs, _ = final_costs(policy, env, numbers, numbers)
+    return turn._asdict() | {"steps": steps, "minutes": round(minutes, 2), "costs": costs.tolist()}
+
+
+def turn_of(row: Mapping[str, Any]) -> Turn:
+    """Return the turn of a row."""
+    return Turn(*(row[name] for name in Turn._fields))
+
+
+def race_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the printed table, the highest mean first; intervals are of 95 %, a bootstrap of seeds and instances."""
+    costs = {agent: np.array([row["costs"] for row in rows if row["agent"] == agent]) for agent in _agents(rows)}
+    cells = []
+    for agent, own in sorted(costs.items(), key=lambda item: -float(item[1].mean())):
+        mine = [row for row in rows if row["agent"] == agent]
+        steps, minutes = (np.mean([row[name] for row in mine]) for name in ("steps", "minutes"))
+        gains = [_interval(_drawn(costs["round robin"]) - _drawn(own), costs["round robin"].mean() - own.mean())]
+        gains += [_interval(_drawn(costs["one restarted"]) - _drawn(own), costs["one restarted"].mean() - own.mean())]
+        whole = costs["round robin"].mean() - costs["halving"].mean()
+        shares = (_drawn(costs["round robin"]) - _drawn(own)) / (
+            _drawn(costs["round robin"]) - _drawn(costs["halving"])
+        )
+        gains += [_interval(shares, (costs["round robin"].mean() - own.mean()) / whole)]
+        cells.append([agent, f"{steps:,.0f}", str(len(own)), f"{minutes:.1f}", f"{own.mean():.2f}", *gains])
+    heads = ["policy", "trained steps", "seeds", "minutes", "ln(1 + cost)", "below round robin", "below one restarted"]
+    yield from markdown([*heads, "share of halving's gain"], cells)
+
+
+def _agents(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(row["agent"] for row in rows))
+
+
+def _drawn(costs: Array) -> Array:
+    """Return means (2000,) of costs (seeds, instances) by a bootstrap of both, with the same instances for all."""
+    rng = np.random.default_rng(0)
+    columns = rng.integers(costs.shape[1], size=(RESAMPLES, costs.shape[1]))
+    seeds = rng.integers(len(costs), size=(RESAMPLES, len(costs)))
+    return np.array([costs[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)])
+
+
+def _interval(drawn: Array, value: float) -> str:
+    low, high = np.quantile(drawn, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+
+
+@click.command(help=__doc__)
+@click.option("--agent", "names", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
+@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
+@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
+@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
+@WORKERS
+def main(names: tuple[str, ...], seeds: int, instances: int, rows: str | None, workers: int | None) -> None:
+    learners = names or LEARNERS
+    check_learners({"ppo"} if any(name.startswith(("PPO", "SAC")) for name in learners) else set())
+    turns = [Turn(agent, 0, instances) for agent in REFERENCES]
+    turns += [Turn(agent, seed, instances) for agent in learners for seed in range(seeds)]
+    done = earlier(rows, turn_of)
+    jobs = {turn: partial(row_of_turn, turn) for turn in turns if turn not in done}
+    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
+    for line in race_lines([done[turn] for turn in turns]):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()
