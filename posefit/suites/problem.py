@@ -240,7 +240,7 @@ class Problem:
             raise BudgetSpentError(f"{self.id}: its {self._limit:g} seconds are over")
         allowed = self.space.feasible(checked)
         repaired = checked if allowed.all() else self.made.repaired(checked)
-        costs = self.made.posed.evaluate(repaired)
+        costs: Array = self.made.posed.evaluate(repaired)
         if self.infeasible == "reject":
             costs[~allowed] = np.inf
         elif self.infeasible == "penalise":
