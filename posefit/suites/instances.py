@@ -52,7 +52,7 @@ class SuiteInstance:
     subject: str
     posed: PoseProblem = field(repr=False)
     box: SuiteBox = field(repr=False)
-    truth: Array = field(repr=False)  # (d,) the proposal of the true pose
+    truth: Array = field(repr=False)  # (d,) the proposal of the true pose, for tests: a search that reads it cheats
     truth_cost: float  # of that proposal; 0 where the function is exact
     decoy: Array | None = field(default=None, repr=False)  # (d,) of function 6, the mirrored pose
 
@@ -123,6 +123,8 @@ class _Draft:
 
     def made(self, problem: PoseProblem, truth: Array, decoy: Array | None = None) -> SuiteInstance:
         cost = float(problem.evaluate(truth[None])[0])
+        truth = truth.copy()
+        truth.setflags(write=False)
         return SuiteInstance(self.function, self.number, self.subject, problem, self.box, truth, cost, decoy)
 
 

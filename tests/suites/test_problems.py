@@ -62,6 +62,11 @@ def test_the_true_pose_is_in_the_box_and_the_optimum_where_it_is_known() -> None
             assert posed.truth_cost < 40.0
 
 
+def test_the_truth_cannot_be_written_to() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        problem().made.truth[0] = 0.0
+
+
 def test_a_box_is_learned_from_other_people() -> None:
     subjects = {number: suite_instance(1, number, 9).subject for number in (*range(40), *HELD_OUT[:40])}
     assert {subjects[number] for number in subjects if number in TRAINING} == set(TRAINING_PEOPLE)
