@@ -28,4 +28,5 @@ class Problem(EvoxProblem):
     @torch.compiler.disable
     def evaluate(self, pop: torch.Tensor) -> torch.Tensor:
         """Return the costs (n,) of a population (n, d), in its precision and on its device."""
-        return torch.as_tensor(self.problem.evaluate(pop.numpy(force=True)), dtype=pop.dtype, device=pop.device)
+        costs: torch.Tensor = self.problem.evaluate(pop.detach())
+        return costs

@@ -137,7 +137,7 @@ def suite_submit(ledger: str, out: str) -> None:
 
 
 @suite.command("verify")
-@click.argument("bundles", nargs=-1, required=True, metavar="FILE...")
+@click.argument("bundles", nargs=-1, required=True, metavar="FILE...", type=click.Path(exists=True))
 @click.option("--repeat", default=0, metavar="K", help="Run K searches again, which the bundle's digest chooses.")
 @click.pass_context
 def suite_verify(context: click.Context, bundles: tuple[str, ...], repeat: int) -> None:
