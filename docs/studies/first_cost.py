@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 ROOT = Path(__file__).parents[2]
-SUITE = "import posefit, numpy as np; posed = posefit.suite('posefit-2026.1', 1, 10_000, 9); "
+SUITE = "import posefit, numpy as np; posed = posefit.suite('posefit-2026.2', 1, 10_000, 9); "
 BLADE = """from posefit_bridges.blade import EXAMPLE, Problem
 from iohblade import Solution
 problem = Problem(training_instances=[(1, 10_000, 9)], budget_factor=1)

@@ -75,6 +75,27 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
 
 
 @jit
+def add_components(latents, components, angles):
+    """Add components (m, k) times latents (n, m) to angles (n, k), one after the other: a row's bits are its own."""
+    for i in range(latents.shape[0]):
+        for m in range(latents.shape[1]):
+            latent = latents[i, m]
+            for k in range(angles.shape[1]):
+                angles[i, k] += latent * components[m, k]
+
+
+@jit
+def spreads_away(latents, spread, away):
+    """Write the distance of latents (n, m) from the middle (n,), in spreads (m,)."""
+    for i in range(latents.shape[0]):
+        total = 0.0
+        for m in range(latents.shape[1]):
+            scaled = latents[i, m] / spread[m]
+            total += scaled * scaled
+        away[i] = np.sqrt(total)
+
+
+@jit
 def unpack_proposals(proposals, centre, half, anchor, first, mean, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
 

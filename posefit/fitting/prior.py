@@ -11,7 +11,8 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
+from posefit.fitting.kernels import add_components
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
@@ -77,8 +78,8 @@ class Components:
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
         angles = np.tile(self.mean, (len(latents), 1))
-        for k, direction in enumerate(self.components):  # a matrix product's last bits depend on rows and machine
-            angles += latents[:, k, None] * direction
+        # a matrix product's last bits depend on rows and machine
+        add_components(writeable(latents), writeable(self.components), angles)
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:

@@ -121,7 +121,7 @@ TABLE_FIGURES = tuple(name for name, column in COLUMNS.items() if column.in_tabl
 
 # Figures of single searches, computed from their traces.
 _REACHED = Measure("reached", "targets", "%", 1, "Share of all runs and targets that were reached")
-_ABOVE = Measure("above", "above", "", 2, "Median of the best costs above the best known one")
+_ABOVE = Measure("above", "above", "", 2, "Median of the best costs above the true pose's")
 SEARCH_COLUMNS = {
     "reached": Column("reached", _REACHED, (), higher_is_better=True),
     "above": Column("above", _ABOVE, ()),

@@ -72,7 +72,7 @@ SEARCH_SCORE = {
     "alone": "one instance",
     "paired": "instances",
     "leaderboard": "Shares of targets are means over all runs and targets. Above is the median of the best costs above "
-    "the best known one. ",
+    "the true pose's. ",
     "curves": "The share of all runs and targets that a method has reached after so many evaluations for each "
     "dimension of the problem, all dimensions together: the empirical distribution of running times. A higher curve "
     "reaches more targets in the same time. The scale is the same for every function. "
@@ -290,7 +290,7 @@ def _search_facts(runs: Runs) -> dict[str, Any]:
         "seeds": f"{len(runs.seeds):,}",
         "evaluations for each dimension": [f"{budget:g}" for budget in _of_methods(runs, "budget")],
         "infeasible proposals": _of_methods(runs, "infeasible"),
-        "targets of a problem": f"{len(TARGETS)} costs, from {TARGETS[0]:g} to {TARGETS[-1]:g} above the best known",
+        "targets of a problem": f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's",
         "posefit": _of_methods(runs, "version"),
     }
 

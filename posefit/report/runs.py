@@ -146,7 +146,7 @@ def _search_data(run: SuiteRun) -> tuple[Any, ...]:
     """Return the figures of a search, its run, and its hits."""
     evaluations = hits((run.evaluations, run.costs), run.targets)
     reached = 100.0 * float(np.isfinite(evaluations).mean())
-    return [100.0 - reached, reached, run.cost - run.best_known], run, evaluations
+    return [100.0 - reached, reached, run.cost - run.truth_cost], run, evaluations
 
 
 def _sorted_runs(

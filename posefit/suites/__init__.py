@@ -2,12 +2,12 @@
 
     import posefit
 
-    problem = posefit.suite("posefit-2026.1", function=1, instance=10_000, dimension=9)
+    problem = posefit.suite("posefit-2026.2", function=1, instance=10_000, dimension=9)
     print(problem([0.0] * 9), problem.evaluations, problem.targets[-1])
 
 | looking for | file |
 |---|---|
-| one problem by its numbers, many to go through; calls, counts, budgets, targets, best known costs | problem.py |
+| one problem by its numbers, many to go through; calls, counts, budgets, targets | problem.py |
 | which functions, dimensions and instances there are | functions.py |
 | the instances of each function | instances.py |
 | the boxes that are searched, made by `docs/studies/make_boxes.py` | boxes.py |
@@ -15,6 +15,5 @@
 | runs as a file with the points of their improvements | bundles.py |
 | whether all that such a file claims is so | verification.py |
 | runs of posefit's own methods, made by `docs/studies/make_bundles.py` | methods.zip |
-| an optimiser on a problem; scores of runs | running.py |
 | a problem as one of IOHexperimenter's | iohexperimenter.py |
 """

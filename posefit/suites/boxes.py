@@ -15,13 +15,14 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
+from posefit.fitting.kernels import spreads_away
 from posefit.fitting.prior import Components
 
 HELD_OUT_PEOPLE = ("16", "49", "135")
 TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
 STEP = 1e-4  # radians, and what a stored component is a whole multiple of
-SIZES = (6, 13, 21, 37)  # components of the boxes of 9, 16, 24 and 40 dimensions
+SIZES = (6, 7, 13, 17, 21, 37)  # components of the boxes of 9, 10, 16, 20, 24 and 40 dimensions
 HELD_OUT_GROUP = "held out"  # the name of the box learned from all people for training
 
 
@@ -33,7 +34,7 @@ class Learned:
     components: Array = field(repr=False)  # (37, 63)
     spread: Array  # (37,) standard deviation along each, radians
     half: Array  # (37,) of the box along each, radians
-    reach: Array  # (4,) by `SIZES`: how far from the mean poses are, in spreads
+    reach: Array  # (6,) by `SIZES`: how far from the mean poses are, in spreads
     low: Array  # (63,) the range of each joint angle
     high: Array  # (63,)
     order: NDArray[np.int64]  # (63,) joint angles by their variation, the largest first
@@ -76,10 +77,9 @@ class ComponentBox(Components):
 
     def _beyond(self, latents: Array) -> Array:
         """Return how far latents (n, m) are from the middle (n,): 1 on the ellipsoid."""
-        total = np.zeros(len(latents))
-        for k, spread in enumerate(self._spread):
-            total += (latents[:, k] / spread) ** 2
-        return np.asarray(np.sqrt(total) / self._reach)
+        away = np.empty(len(latents))
+        spreads_away(writeable(latents), self._spread, away)
+        return away / self._reach
 
 
 @final
@@ -89,6 +89,7 @@ class AngleBox:
     def __init__(self, learned: Learned, count: int) -> None:
         self.angles = np.sort(learned.order[:count])
         self.mean, self.low, self.high = learned.mean, learned.low[self.angles], learned.high[self.angles]
+        self.reach = 0.5 * (self.high - self.low)
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
@@ -109,14 +110,30 @@ class AngleBox:
         return np.asarray(latents)
 
 
-SuiteBox = ComponentBox | AngleBox
+@final
+class RotatedBox(Components):
+    """The latents of an `AngleBox`, scaled to -1 to 1 and rotated: each moves all of its joint angles."""
+
+    def __init__(self, learned: Learned, count: int, rng: np.random.Generator) -> None:
+        plain = AngleBox(learned, count)
+        self.angles, self.reach = plain.angles, plain.reach
+        rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))
+        self._rotation = np.round(rotation * np.sign(np.diag(signs)) / STEP) * STEP
+        mean, components = learned.mean.copy(), np.zeros((count, len(learned.mean)))
+        mean[plain.angles] = 0.5 * (plain.low + plain.high)
+        components[:, plain.angles] = self._rotation * plain.reach
+        super().__init__(mean, components, -np.ones(count), np.ones(count))
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63)."""
+        return np.asarray((angles - self.mean)[:, self.angles] / self.reach @ self._rotation.T)
+
+    def within_reach(self, latents: Array) -> Array:
+        """Return the latents (n, m) as they are."""
+        return np.asarray(latents)
 
 
-@lru_cache(maxsize=64)
-def box_without(subject: str, dimension: int, angles: bool) -> SuiteBox:
-    """Return the box, learned without one person, of so many dimensions, the root's three among them."""
-    kind: type[SuiteBox] = AngleBox if angles else ComponentBox
-    return kind(learned_without(subject), dimension - 3)
+SuiteBox = ComponentBox | AngleBox | RotatedBox
 
 
 def is_upright(pose: Array) -> bool:

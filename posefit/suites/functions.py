@@ -6,12 +6,13 @@ from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
 from posefit.reading import quoted
 
-SUITE = "posefit-2026.1"
+SUITE = "posefit-2026.2"
 SUITES = (SUITE,)
 TRAINING = range(10_000)  # instances to learn from and to tune on
 HELD_OUT = range(10_000, 20_000)  # instances of other people
 INSTANCES = range(20_000)
-DIMENSIONS = (9, 16, 24, 40, 66)
+ANGLES = (20, 24, 40, 66)  # dimensions of the functions that search joint angles themselves
+DIMENSIONS = (9, 10, 16, 20, 24, 40, 66)
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class SuiteFunction:
     name: str
     summary: str
     exact: bool  # whether the box holds a proposal of cost 0, as the silhouette is of one of its poses
-    dimensions: tuple[int, ...] = (9, 16, 24, 40)
+    dimensions: tuple[int, ...] = (9, 10, 16, 20, 24, 40)
 
 
 FUNCTIONS = (
@@ -32,8 +33,11 @@ FUNCTIONS = (
     SuiteFunction(4, "corrupted", "as 1, the silhouette spoilt in two ways", False),
     SuiteFunction(5, "mismatched body", "as 1, bones and radii up to 8 % off the person's", False),
     SuiteFunction(6, "ambiguous", "seen from the side and afar: the mirrored stride is nearly as good", True),
-    SuiteFunction(7, "high-dimensional", "as 1, joint angles themselves instead of components", True, (24, 40, 66)),
+    SuiteFunction(7, "high-dimensional", "as 1, joint angles themselves instead of components", True, ANGLES),
     SuiteFunction(8, "aligned translation", "as 1, the place unknown and taken from the silhouette's borders", False),
+    SuiteFunction(
+        9, "rotated", "as 7, the box rotated at random: coordinates cannot be searched one by one", True, ANGLES
+    ),
 )
 
 

@@ -24,8 +24,17 @@ from posefit.motion import recorded
 from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, SuiteBox, box_without, is_upright
-from posefit.suites.functions import TRAINING, suite_function
+from posefit.suites.boxes import (
+    HELD_OUT_PEOPLE,
+    TRAINING_PEOPLE,
+    AngleBox,
+    ComponentBox,
+    RotatedBox,
+    SuiteBox,
+    is_upright,
+    learned_without,
+)
+from posefit.suites.functions import TRAINING
 
 RNG_STREAM = 2026  # part of the seed of every instance
 SIZE = (120, 160)  # pixels
@@ -72,7 +81,14 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     rng = np.random.default_rng([RNG_STREAM, function, number])
     people = TRAINING_PEOPLE if number in TRAINING else HELD_OUT_PEOPLE
     subject = people[int(rng.integers(len(people)))]
-    box = box_without(subject, dimension, angles=suite_function(function).name == "high-dimensional")
+    learned, count = learned_without(subject), dimension - 3  # the root has three
+    box: SuiteBox
+    if function == 7:
+        box = AngleBox(learned, count)
+    elif function == 9:
+        box = RotatedBox(learned, count, np.random.default_rng([RNG_STREAM, function, number, dimension]))
+    else:
+        box = ComponentBox(learned, count)
     return _MAKERS[function](_Draft(function, number, subject, box, rng))
 
 
@@ -149,11 +165,10 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
 def _still(draft: _Draft, pose: Array) -> Array:
     """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
     offs = draft.rng.uniform(-0.5, 0.5, 66)
-    if draft.function != 7:
+    if isinstance(draft.box, ComponentBox):
         return pose
     moved = pose.copy()
-    reach = 0.5 * (draft.box.high - draft.box.low)
-    still = 3 + draft.box.angles[np.abs(reach - np.radians(10.0)) < 1e-3]  # type: ignore[union-attr]
+    still = 3 + draft.box.angles[np.abs(draft.box.reach - np.radians(10.0)) < 1e-3]
     moved[still] += np.radians(10.0) * offs[still]
     return moved
 
@@ -227,4 +242,5 @@ _MAKERS: dict[int, Callable[[_Draft], SuiteInstance]] = {
     6: _ambiguous,
     7: _single,
     8: _aligned,
+    9: _single,
 }

@@ -3,15 +3,13 @@
 `suite` returns one by its numbers, `Suite` goes through many. A problem's attributes have the names of COCO's, so that
 loops written for those run on it as they are.
 
-The best known costs are in known.json, which `docs/studies/audit.py` made. A cost of the file may fall in a later
-version, and problems may be added; none may rise or go. Nothing else of a suite ever changes.
+Problems may be added to a suite; nothing else of one ever changes.
 """
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from functools import lru_cache
-from importlib.resources import files
 from itertools import product
+from pickle import PicklingError
 from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
@@ -21,7 +19,7 @@ from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import one_of, positive, whole
-from posefit.reading import parsed_json, quoted
+from posefit.reading import quoted
 from posefit.suites.functions import (
     DIMENSIONS,
     FUNCTIONS,
@@ -40,7 +38,7 @@ if TYPE_CHECKING:
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
 
-TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)  # above the reference, 32 to 0.25: a pixel is about 0.03
+TARGETS = 2.0 ** np.arange(5.0, -2.25, -0.25)  # above the true pose's cost, 32 to 0.25: a pixel is about 0.03
 PENALTY = 100.0  # cost of a half-side of the box between a penalised proposal and its repair
 EVALUATIONS = 100  # of the usual budget, for each dimension
 
@@ -91,7 +89,7 @@ class Problem:
         self.id_function = function.number
         self.instance = self.id_instance = made.number
         self.dimension = self.number_of_variables = d = len(made.truth)
-        # without blanks, as in posefit-2026.1_f001_i00017_d09; and in words
+        # without blanks, as in posefit-2026.2_f001_i00017_d09; and in words
         self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
         self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
         self.space: Space = made.posed.space  # as posefit's own optimisers take it: `factory(problem.space, rng)`
@@ -160,15 +158,9 @@ class Problem:
         return drawn
 
     @property
-    def best_known(self) -> float:
-        """The lowest known cost: the truth's, or that of known.json."""
-        known: float = known_file()["best"].get(self.id, np.inf)
-        return min(self.truth_cost, known)
-
-    @property
     def targets(self) -> Array:
-        """The costs to be reached (29,), falling from 32 to 0.25 above the best known."""
-        return np.asarray(self.best_known + TARGETS)
+        """The costs to be reached (29,), falling from 32 to 0.25 above the true pose's."""
+        return np.asarray(self.truth_cost + TARGETS)
 
     @property
     def final_target_hit(self) -> bool:
@@ -212,6 +204,18 @@ class Problem:
         if steps and steps[-1][0] < self.evaluations:
             steps.append((self.evaluations, steps[-1][1]))
         return np.array([used for used, _ in steps], dtype=np.float64), np.array([cost for _, cost in steps])
+
+    def __deepcopy__(self, memo: object) -> "Problem":
+        """Return a problem with the same count, best and trace, which are its own from now on."""
+        copy: Problem = object.__new__(Problem)
+        copy.__dict__.update(self.__dict__, _steps=self._steps.copy())
+        return copy
+
+    def __getstate__(self) -> Any:
+        raise PicklingError(
+            f"{self.id} counts evaluations in its own process and cannot be sent to another: make it there with "
+            "posefit.suite, or give it whole populations, in one process"
+        )
 
     def __repr__(self) -> str:
         return f"<{self.id}: {self.evaluations} evaluations, best {self.best_observed_fvalue1:.4g}>"
@@ -328,10 +332,3 @@ class Suite:
 
     def __iter__(self) -> Iterator[Problem]:
         return (self[index] for index in range(len(self)))
-
-
-@lru_cache(maxsize=1)
-def known_file() -> dict[str, Any]:
-    """Return the contents of known.json: how it was made, and `best`, a cost by a problem's id."""
-    contents: dict[str, Any] = parsed_json((files("posefit.suites") / "known.json").read_text(encoding="utf-8"))
-    return contents

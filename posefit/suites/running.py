@@ -2,8 +2,8 @@
 
 Only runs with the same method, function, dimension, budget and way with infeasible proposals are taken together.
 
-Targets are an instance's own, from 32 to 0.25 above its best known cost. Hansen et al., COCO: a platform for comparing
-continuous optimizers in a black-box setting, 2021.
+Targets are an instance's own, from 32 to 0.25 above the cost of its true pose. Hansen et al., COCO: a platform for
+comparing continuous optimizers in a black-box setting, 2021.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,7 +39,7 @@ class SuiteRun:
     seed: int
     budget: int  # of evaluations
     infeasible: str  # the way with infeasible proposals: see `Problem`
-    best_known: float
+    truth_cost: float
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
     costs: Array = field(repr=False)  # (k,)
@@ -107,7 +107,7 @@ def run_of(
         seed,
         budget,
         problem.infeasible,
-        problem.best_known,
+        problem.truth_cost,
         problem.targets,
         *problem.trace,
         problem.points,
@@ -115,7 +115,7 @@ def run_of(
 
 
 ALL = 0  # the number that stands for all functions together
-SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the best known, those with an expected running time
+SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the true pose's cost, those with an expected running time
 POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at which shares are reported
 
 
@@ -130,11 +130,11 @@ class SuiteScore:
     budget: int  # evaluations that a run could have had
     infeasible: str  # the way with infeasible proposals: see `posefit.suites.problem.Problem`
     runs: int
-    above: float  # median of the best costs above the best known
+    above: float  # median of the best costs above the true poses'; below 0 where searches find lower ones
     reached: float  # share of runs and targets, at the end
     shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as budgets go
-    # expected evaluations to so much above the best known; None for never. Of all functions together there are none:
-    # a mean over them would be that of the hardest
+    # expected evaluations to so much above the true pose's cost; None for never. Of all functions there are none: a
+    # mean over them would be that of the hardest
     running_times: dict[float, float | None]
     # their 95 % intervals over instances; None for never, and twice where there is one instance
     running_time_ends: dict[float, tuple[float | None, float | None]]
@@ -198,7 +198,7 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         budget,
         runs[0].infeasible,
         len(runs),
-        float(np.median([run.cost - run.best_known for run in runs])),
+        float(np.median([run.cost - run.truth_cost for run in runs])),
         float(shares[-1]),
         dict(zip(points, shares[:-1].tolist(), strict=True)),
         {above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},

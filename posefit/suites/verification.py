@@ -60,7 +60,7 @@ def _problem(run: SuiteRun) -> tuple[int, ...]:
 
 
 def _claims(manifest: Mapping[str, Any], arrays: Mapping[str, Any]) -> list[SuiteRun]:
-    """Return the runs that are claimed, their targets and best known costs still unknown.
+    """Return the runs that are claimed, their targets and the true poses' costs still unknown.
 
     Raises InputError where an address is none of the suite's, or a run comes twice.
     """
@@ -133,7 +133,7 @@ def _evaluated(claim: SuiteRun) -> SuiteRun:
             k = wrong[0]
             after = f"cost after {claim.evaluations[k]:.0f} evaluations"
             raise InputError(f"{after} must be that of its point, {float(costs[k])!r}, got {float(claim.costs[k])!r}")
-    return replace(claim, best_known=problem.best_known, targets=problem.targets)
+    return replace(claim, truth_cost=problem.truth_cost, targets=problem.targets)
 
 
 def _repeat(

@@ -198,7 +198,7 @@ class SearchCell(_Spec):
         run = run_on(problem, self.method, self.settings, evaluations=self.evaluations, seed=self.seed)
         row = {
             "cost": run.cost,
-            "best_known": run.best_known,
+            "truth_cost": run.truth_cost,
             "evaluations_used": problem.evaluations,
             "dimensions": problem.dimension,
             "trace": {"evaluations": [int(used) for used in run.evaluations], "cost": run.costs.tolist()},

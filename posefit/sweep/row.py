@@ -229,5 +229,5 @@ _ROW: dict[str, Check] = {
     "joints": _place,
 }
 _TRACK_ROW = {**_ROW, "joint_errors_mm": _joint_errors, "mode_reliability": _reliability}
-_SEARCH_ROW: dict[str, Check] = {**_ROW, "trace": _search_trace, "cost": _number, "best_known": _number}
+_SEARCH_ROW: dict[str, Check] = {**_ROW, "trace": _search_trace, "cost": _number, "truth_cost": _number}
 _SEVERAL, _TRACK_SEVERAL = {*_FIGURES, *_SEARCH_ROW}, {*_FIGURES, *_TRACK_ROW}

@@ -31,7 +31,7 @@ class RandomSearch:
 
 
 def problem(function: int = 1, **more: object) -> Problem:
-    return posefit.suite("posefit-2026.1", function, 10_000, 9, **more)  # type: ignore[arg-type]
+    return posefit.suite("posefit-2026.2", function, 10_000, 9, **more)  # type: ignore[arg-type]
 
 
 def check(searched: Problem, proposals: Iterable[object], costs: Iterable[float], precision: type = np.float64) -> None:
@@ -181,5 +181,5 @@ def test_metaboxs_own_episode_has_the_trace_of_a_plain_loop(version: str) -> Non
     if version == "torch":  # MetaBox's optimisers of numpy give arrays
         posed.eval = lambda x, own=posed.eval: own(torch.as_tensor(x)).numpy()
     episode = BBO_TestUnit(optimiser, posed, 1).run_batch_episode()
-    assert (episode["problem_name"], episode["fes"]) == ("posefit-2026.1_f001_i10000_d09", 300)
+    assert (episode["problem_name"], episode["fes"]) == ("posefit-2026.2_f001_i10000_d09", 300)
     check(posed.problem, np.concatenate(episode["metadata"]["X"]), np.concatenate(episode["metadata"]["Cost"]))

@@ -11,7 +11,7 @@ BUDGET = 100  # evaluations for each dimension
 
 
 def cell(method: str, function: int = 1, dimension: int = 9, instance: int = 10_000, **more: Any) -> SearchCell:
-    suite = "posefit-2026.1"
+    suite = "posefit-2026.2"
     return SearchCell(method, suite, function, dimension, instance, more.pop("budget", BUDGET) * dimension, **more)
 
 
@@ -22,7 +22,7 @@ def search_result(cell: SearchCell, targets: int) -> CellResult:
     if used[-1] < cell.evaluations:
         used, costs = [*used, cell.evaluations], [*costs, costs[-1]]
     row = {
-        **{"key": cell.key, "spec": cell.spec, "status": "done", "cost": costs[-1], "best_known": 0.0},
+        **{"key": cell.key, "spec": cell.spec, "status": "done", "cost": costs[-1], "truth_cost": 0.0},
         **{"evaluations_used": cell.evaluations, "dimensions": cell.dimension, "seconds": 0.1, "warnings": []},
         "trace": {"evaluations": used, "cost": costs},
     }

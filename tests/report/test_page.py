@@ -272,7 +272,7 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         assert rows.first.locator("strong").count() == 2  # to 16 and to 4 above, as soon as others
         assert "–" in rows.last.inner_text()
         page.locator("#lost button").last.click()
-        assert 'suite = "posefit-2026.1"' in page.inner_text("#command")
+        assert 'suite = "posefit-2026.2"' in page.inner_text("#command")
 
 
 def test_a_leaderboard_opens_and_names_what_is_not_ranked(chromium: Any, tmp_path: Path) -> None:

@@ -1,16 +1,18 @@
 """A number stands for the same problem for ever; a problem counts, repairs and keeps its budget in any library's loop."""
 
 import json
-import re
 from collections.abc import Callable
+from copy import copy, deepcopy
 from itertools import product
 from pathlib import Path
+from pickle import PicklingError
 from types import SimpleNamespace
 
 import iohinspector
 import numpy as np
 import polars
 import pytest
+from scipy.optimize import differential_evolution
 
 import posefit
 from posefit.fitting.box import draw_population
@@ -18,7 +20,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_without
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import suite_instance
-from posefit.suites.problem import BudgetSpentError, Problem, known_file
+from posefit.suites.problem import BudgetSpentError, Problem
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
@@ -176,14 +178,24 @@ def test_a_budget_of_seconds_begins_with_the_first_evaluation(monkeypatch: pytes
     assert posed.evaluations == 2
 
 
-def test_targets_fall_to_a_quarter_above_the_best_known_and_a_truth_may_be_above_them() -> None:
-    exact, mismatched = problem(1, 10_000, 9), problem(5, 10_000, 9)
-    assert mismatched.truth_cost > mismatched.best_known + 0.25
-    for posed, hit in ((exact, True), (mismatched, False)):
-        assert posed.targets - posed.best_known == pytest.approx([2.0 ** (5 - k / 4) for k in range(29)])
+def test_targets_fall_to_a_quarter_above_the_cost_of_the_true_pose() -> None:
+    for posed in (problem(1, 10_000, 9), problem(5, 10_000, 9)):
+        assert posed.targets - posed.truth_cost == pytest.approx([2.0 ** (5 - k / 4) for k in range(29)])
         assert not posed.final_target_hit
         posed(posed.made.truth)
-        assert posed.final_target_hit == hit
+        assert posed.final_target_hit
+
+
+def test_a_rotated_box_has_the_size_of_the_plain_one_and_no_coordinate_is_a_joint_angle() -> None:
+    """A rotation keeps lengths; rounded to four digits it does so to about one in a thousand."""
+    plain, rotated = (problem(number, 10_000, 66).made.box for number in (7, 9))
+    latents = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 63))
+    away = (rotated.inverse_transform(latents) - 0.5 * (plain.low + plain.high)) / plain.reach
+    assert np.linalg.norm(away, axis=1) == pytest.approx(np.linalg.norm(latents, axis=1), rel=2e-3)
+    assert np.abs(rotated.components / plain.reach).max() < 0.8
+    assert rotated.transform(rotated.inverse_transform(latents)) == pytest.approx(latents, abs=1e-2)
+    other = problem(9, 10_001, 66).made.box
+    assert not np.array_equal(rotated.components, other.components)
 
 
 def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
@@ -200,40 +212,32 @@ def test_a_suite_goes_through_its_problems_and_lists_its_functions() -> None:
     assert suite[0] is not suite[0]  # nothing evaluated yet, each time
 
 
-def test_the_file_names_problems_of_the_suite_and_costs_below_their_truths() -> None:
-    best = known_file()["best"]
-    for name, cost in list(best.items())[::9]:
-        function, instance, dimension = map(int, re.fullmatch(r"posefit-2026.1_f(\d+)_i(\d+)_d(\d+)", name).groups())  # type: ignore[union-attr]
-        problem = posefit.suite("posefit-2026.1", function, instance, dimension)
-        assert problem.id == name
-        assert 0.0 <= cost == problem.best_known < problem.truth_cost
-        assert problem.targets[-1] == cost + 0.25
-    assert "posefit-2026.1_f001_i00000_d09" not in best
-
-
-def test_what_is_best_known_never_rises_and_no_problem_goes() -> None:
-    usual = "random, sapso, pso, cma, annealed, scipy with the usual one"
-    assert known_file()["made_by"] == f"cma with 100 times the usual budget, and {usual}"
-    best = known_file()["best"]
-    assert len(best) >= 151  # in the suite's first version
-    first = {"f004_i10000_d09": 7.427, "f005_i10000_d09": 0.9715, "f005_i10001_d40": 0.9295, "f008_i10000_d40": 0.2070}
-    for name, cost in first.items():
-        assert best[f"posefit-2026.1_{name}"] <= cost
+def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_not_be_counted() -> None:
+    posed = problem()
+    with pytest.raises(PicklingError, match="cannot be sent to another: make it there with posefit.suite"):
+        differential_evolution(posed, [(-1.0, 1.0)] * 9, workers=2, updating="deferred", maxiter=1)
+    with pytest.raises(PicklingError, match="counts evaluations in its own process"):
+        copy(posed)
+    posed(np.zeros(9))
+    twin = deepcopy(posed)
+    twin(np.full(9, 0.1))
+    assert (posed.evaluations, twin.evaluations) == (1, 2)
+    assert len(posed.trace[0]) == 1
 
 
 @each(
     ("make", "message"),
     [
-        (lambda: posefit.suite("posefit-2025", 1, 0, 9), "suite must be one of posefit-2026.1, got 'posefit-2025'"),
-        (lambda: problem(9), "function must be one of 1, 2, 3, 4, 5, 6, 7, 8, got 9"),
+        (lambda: posefit.suite("posefit-2025", 1, 0, 9), "suite must be one of posefit-2026.2, got 'posefit-2025'"),
+        (lambda: problem(10), "function must be one of 1, 2, 3, 4, 5, 6, 7, 8, 9, got 10"),
         (lambda: problem(np.array([1, 2])), r"function must be a whole number of at least 1, got array\(\[1, 2\]\)"),  # type: ignore[arg-type]
         (lambda: problem(1, 20_000), "instance must be at most 19999, got 20000"),
-        (lambda: problem(7, 0, 9), "dimension of function 7 must be one of 24, 40, 66, got 9"),
+        (lambda: problem(7, 0, 9), "dimension of function 7 must be one of 20, 24, 40, 66, got 9"),
         (lambda: problem(infeasible="ignore"), "infeasible must be one of repair, reject, penalise, got 'ignore'"),
         (lambda: problem(budget=0), "budget must be at least 1, got 0"),
         (lambda: problem(seconds=0.0), "seconds must be above 0, got 0.0"),
         (lambda: posefit.Suite(functions=[1], dimensions=[66]), r"at least one problem, got none in \[66\] dimensions"),
-        (lambda: posefit.Suite(dimensions=[10]), "dimension must be one of 9, 16, 24, 40, 66, got 10"),
+        (lambda: posefit.Suite(dimensions=[11]), "dimension must be one of 9, 10, 16, 20, 24, 40, 66, got 11"),
         (lambda: posefit.Suite(functions=9), "functions must be a list of numbers, got 9"),  # type: ignore[arg-type]
     ],
 )
@@ -267,7 +271,7 @@ def swarm(space: posefit.Space) -> posefit.Optimiser:
 
 
 def problems() -> list[Problem]:
-    return [posefit.suite("posefit-2026.1", *address) for address in ADDRESSES]
+    return [posefit.suite("posefit-2026.2", *address) for address in ADDRESSES]
 
 
 @pytest.fixture(scope="module")
@@ -291,7 +295,7 @@ def one_by_one(function, optimiser, budget):
 
 def test_a_loop_like_cocos_has_the_same_trace(traces) -> None:
     for (function, instance, dimension), expected in zip(ADDRESSES, traces, strict=True):
-        suite = posefit.Suite("posefit-2026.1", functions=[function], dimensions=[dimension], instances=[instance])
+        suite = posefit.Suite("posefit-2026.2", functions=[function], dimensions=[dimension], instances=[instance])
         for problem in suite:  # as in COCO's example experiment
             assert problem.evaluations == 0
             assert len(problem.lower_bounds) == len(problem.upper_bounds) == problem.number_of_variables == dimension
