@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.suites.running import run_on, suite_scores
+from posefit.suites.running import method_name, run_on, suite_scores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan, search_cells
@@ -51,7 +51,7 @@ def test_the_functions_are_listed() -> None:
     done = run("suite")
     assert done.exit_code == 0
     assert "7  high-dimensional     d = 20, 24, 40, 66" in done.stdout
-    assert [one["number"] for one in json.loads(run("suite", "--json").stdout)] == list(range(1, 9))
+    assert [one["number"] for one in json.loads(run("suite", "--json").stdout)] == list(range(1, 10))
 
 
 def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_pat
 def test_a_function_without_a_chosen_dimension_is_left_out_and_named() -> None:
     done = run("suite", "run", "random", "--function", 1, "--function", 7, "--instances", "10000:10001", "--budget", 5)
     assert done.exit_code == 0, done.stderr
-    assert "function 7 is left out: it has dimensions 24, 40, 66" in done.stderr
+    assert "function 7 is left out: it has dimensions 20, 24, 40, 66" in done.stderr
     assert "1 single image" in done.stdout
 
 
@@ -213,3 +213,22 @@ def test_a_mistake_is_one_line_and_status_2(
 def test_a_mistake_in_a_plan_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Plan.of({"suite": "posefit-2026.2", "methods": ["sapso"], "functions": [1], **change})
+
+
+@pytest.mark.filterwarnings("ignore:  less than 15 instances")
+def test_cocopp_reads_every_run(results: Path, tmp_path: Path) -> None:
+    cocopp = pytest.importorskip("cocopp", reason="it is in the extra dev")
+    done = run("suite", "table", results, "--coco", tmp_path / "coco")
+    assert done.exit_code == 0, done.stderr
+    runs = list(search_runs(Ledger(results)))
+    for folder in (tmp_path / "coco").iterdir():
+        for read in cocopp.load(str(folder)):
+            place = read.algId, read.funcId, read.dim
+            mine = [one for one in runs if (method_name(one), one.function, one.dimension) == place]
+            mine.sort(key=lambda one: one.instance)
+            assert mine
+            assert read.instancenumbers == [one.instance for one in mine]
+            for target in (16.0, 4.0, 1.0):
+                hits = [one.evaluations[one.costs - one.truth_cost <= target][:1] for one in mine]
+                expected = [float(hit[0]) if len(hit) else np.nan for hit in hits]
+                assert np.array_equal(read.detEvals([target])[0], expected, equal_nan=True)
