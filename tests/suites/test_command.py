@@ -215,7 +215,7 @@ def test_a_mistake_in_a_plan_is_named_before_anything_runs(change: dict[str, Any
         Plan.of({"suite": "posefit-2026.2", "methods": ["sapso"], "functions": [1], **change})
 
 
-@pytest.mark.filterwarnings("ignore:  less than 15 instances")
+@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_cocopp_reads_every_run(results: Path, tmp_path: Path) -> None:
     cocopp = pytest.importorskip("cocopp", reason="it is in the extra dev")
     done = run("suite", "table", results, "--coco", tmp_path / "coco")
