@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.suites.running import method_name, run_on, suite_scores
+from posefit.suites.running import run_on, suite_scores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan, search_cells
@@ -223,8 +223,8 @@ def test_cocopp_reads_every_run(results: Path, tmp_path: Path) -> None:
     runs = list(search_runs(Ledger(results)))
     for folder in (tmp_path / "coco").iterdir():
         for read in cocopp.load(str(folder)):
-            place = read.algId, read.funcId, read.dim
-            mine = [one for one in runs if (method_name(one), one.function, one.dimension) == place]
+            place = folder.name.split("-")[0], read.funcId, read.dim  # in the name, settings follow a hyphen
+            mine = [one for one in runs if (one.method, one.function, one.dimension) == place]
             mine.sort(key=lambda one: one.instance)
             assert mine
             assert read.instancenumbers == [one.instance for one in mine]
