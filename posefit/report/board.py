@@ -53,6 +53,8 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
         name = path.stem if path.stem not in bundles else f"{path.stem} {bundle.digest[:8]}"
         bundles[name] = bundle
         notes += [f"Seeds of {name} are not checked. {reason}." for reason in bundle.unrepeatable]
+    if len(bundles) == 1 and not unranked:
+        say("no bundle was found: the board shows posefit's own methods alone")
     ranked = []
     for name, bundle in bundles.items():
         for of_method in _by_method(bundle.runs):
