@@ -35,6 +35,7 @@ WAY = np.linspace(0.0, 1.0, 101)[:, None]
 TILE, WINDOW, ACROSS = 220, 1.3, 3  # pixels of a slice; how far it goes, in distances to the next basin; in a row
 
 Cost = Callable[[Array], Array]
+Shares = dict[str, list[float]]  # of targets, by method, after each budget
 Key = tuple[str, int, int, int]  # suite, function, dimension, instance
 HEADS = {  # of the features, with how they are written
     "dimension": ("d", "{:.0f}"),
@@ -204,10 +205,10 @@ def sliced(cost: Cost, basins: list[tuple[float, Array]], rng: np.random.Generat
             cv2.drawMarker(image, (x, y), (0, 0, 255), cv2.MARKER_CROSS, 11, 2)
     band = np.full((22, TILE, 3), 255, dtype=np.uint8)
     cv2.putText(band, title, (4, 15), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
-    return cv2.copyMakeBorder(np.vstack([band, image]), 2, 2, 2, 2, cv2.BORDER_CONSTANT, value=(255, 255, 255))
+    return np.pad(np.vstack([band, image]), ((2, 2), (2, 2), (0, 0)), constant_values=255)
 
 
-def shares_of(targets: Array, reached: Sequence[Mapping[str, Sequence[float]]]) -> dict[str, list[float]]:
+def shares_of(targets: Array, reached: Sequence[Mapping[str, Sequence[float]]]) -> Shares:
     """Return the shares of targets (n, t) by method after each budget, and those of the best of all methods."""
     costs = {name: np.array([one[name] for one in reached]) for name in METHODS}
     costs["best of all"] = np.min(list(costs.values()), axis=0)
@@ -251,18 +252,24 @@ def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
     yield from markdown(["function", *(head for head, _ in HEADS.values()), "nearest of bbob"], cells)
 
 
-def share_lines(shares: Mapping[int, Mapping[str, Sequence[float]]]) -> Iterator[str]:
-    """Yield the tables of targets reached, and of how alike methods are ordered on two functions."""
+def share_lines(shares: Mapping[int, Sequence[Shares]]) -> Iterator[str]:
+    """Yield the tables of targets reached, and of how alike methods are ordered on two functions.
+
+    `shares` are by function those of all its instances, and of two halves of them, which are how alike one function is.
+    """
     cells = []
-    for number, table in shares.items():
+    for number, (table, *_) in shares.items():
         wins = [max(METHODS, key=lambda name: table[name][k]) for k in range(len(BUDGETS))]
         texts = [" ".join(f"{100.0 * share:.0f}" for share in table[name]) for name in (*METHODS, "best of all")]
         cells.append([f"{number} {suite_function(number).name}", ", ".join(dict.fromkeys(wins)), *texts])
     yield from markdown(["function", "leads", *METHODS, "best of all"], cells, 2)
     yield ""
-    ranks = {n: rankdata([table[name] for name in METHODS], axis=0).ravel() for n, table in shares.items()}
-    alike = {n: [f"{np.corrcoef(mine, other)[0, 1]:.2f}" for other in ranks.values()] for n, mine in ranks.items()}
-    yield from markdown(["methods' order", *map(str, alike)], [[str(n), *texts] for n, texts in alike.items()])
+    ranks = {n: [rankdata([one[name] for name in METHODS], axis=0).ravel() for one in shares[n]] for n in shares}
+    cells = []
+    for n in shares:
+        pairs = [ranks[n][1:] if n == other else (ranks[n][0], ranks[other][0]) for other in shares]
+        cells.append([f"{n} {suite_function(n).name}", *(f"{np.corrcoef(*pair)[0, 1]:.2f}" for pair in pairs)])
+    yield from markdown(["methods' order", *map(str, shares)], cells)
 
 
 @click.command(help=__doc__)
@@ -288,13 +295,16 @@ def main(
     found = {key: results[key][0] for key in problems}
     rows = {(SUITE, n, d, 0): medians([found[key] for key in problems if key[1] == n]) for n, d in sizes.items()}
     click.echo("\n".join(feature_lines(rows | {key: medians([results[key]]) for key in others})))
-    own = [key[1] == near[1] for key, near in nearest(problems, list(found.values()), [SUITE]).items()]
-    click.echo(f"\n{sum(own)} of {len(own)} instances are nearest to one of their own function.")
+    near = nearest(problems, list(found.values()), [SUITE])
+    own = {number: sum(key[1] == number == other[1] for key, other in near.items()) for number in sizes}
+    texts = [f"{count} of function {number}" for number, count in own.items()]
+    click.echo(f"\nInstances nearest to one of their own function, of {instances} each: {', '.join(texts)}")
     click.echo(f"Points that cost something else when asked again: {max(row['noise'] for row in found.values()):.0%}\n")
     shares = {}
     for number in sizes:
         mine = [results[key] for key in problems if key[1] == number]
-        shares[number] = shares_of(np.array([targets for _, targets, *_ in mine]), [costs for *_, costs, _ in mine])
+        parts = [mine, mine[::2], mine[1::2] or mine]
+        shares[number] = [shares_of(np.array([one[1] for one in part]), [one[2] for one in part]) for part in parts]
     click.echo("\n".join(share_lines(shares)))
     if picture is not None:
         tiles = [results[SUITE, number, d, HELD_OUT[0]][-1] for number, d in sizes.items()]
