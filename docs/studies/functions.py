@@ -219,7 +219,8 @@ def medians(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Return the medians of features, the mean share of descents, and the evaluations for each dimension it takes."""
     row = {name: float(np.median([one[name] for one in rows])) for name in rows[0]}
     row["elsewhere"] = float(np.mean([one["elsewhere"] for one in rows]))
-    return {**row, "effort": row["evaluations"] / (1.0 - row["elsewhere"]) if row["elsewhere"] < 1.0 else np.inf}
+    arrived = 1.0 - row["elsewhere"]
+    return {**row, "effort": row["evaluations"] / arrived if arrived else np.inf}
 
 
 def compared(rows: Sequence[Mapping[str, float]]) -> Array:
@@ -245,9 +246,7 @@ def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
     cells = []
     for key, row in rows.items():
         name = f"{key[1]} {suite_function(key[1]).name}" if key[0] == SUITE else f"bbob {key[1]}"
-        texts = [
-            form.format(row[feature]) if np.isfinite(row[feature]) else "-" for feature, (_, form) in HEADS.items()
-        ]
+        texts = [form.format(row[feature]).replace("%", " %") for feature, (_, form) in HEADS.items()]
         cells.append([name, *texts, str(near[key][1]) if key[0] == SUITE and key in near else ""])
     yield from markdown(["function", *(head for head, _ in HEADS.values()), "nearest of bbob"], cells)
 
