@@ -87,6 +87,8 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
     known = seen & (said["unknown_sides"] == 0.0)
     lengths = [np.linalg.norm(motion.skeleton.offsets, axis=1) for motion in (actor.motion, estimate)]
     off = np.abs(lengths[1] / lengths[0] - 1.0)
+    borders = [true_joints[seen, :, 1] + sign * actor.body.joint_radii() for sign in (1.0, -1.0)]
+    tall = borders[0].max(axis=1) - borders[1].min(axis=1)
     return {
         "seen": int(seen.sum()),
         "body_iou": _body_iou(estimate, body, situation, truth),
@@ -101,6 +103,7 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
         "said_unknown": _share(said["unknown_sides"][seen] == 1.0, said["unknown_sides"][seen]),
         "held": float(1.0 - np.array([row["usable"] for row in track.frames])[seen].mean()),
         "known_wrong": float(swapped[known].mean()) if known.any() else None,
+        "upright": float(np.median(tall)) / actor.body.stature,
         "stature_cm": 100.0 * (body.stature - actor.body.stature),
         **{name: float(off[[k for k, bone in enumerate(BONES) if bone[1:] in bones]].mean()) for name, bones in PARTS},
         **angle_errors(actor.motion, clinical_angles(estimate.skeleton, estimate.poses), seen),
@@ -172,6 +175,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "mpjpe_mm": ("MPJPE mm", 0, 1.0),
     "mpjpe_everywhere_mm": ("where all see mm", 0, 1.0),
     "place_mm": ("place mm", 0, 1.0),
+    "upright": ("stands upright %", 0, 100.0),
     "facing_right": ("facing %", 0, 100.0),
     "lost": ("lost %", 0, 100.0),
     "said_lost": ("said lost %", 0, 100.0),
@@ -181,6 +185,7 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "inside": ("inside 80 %", 0, 100.0),
     **{name: (f"{name} off %", 0, 100.0) for name, _ in PARTS},
     **{name: (f"{name.replace('_', ' ')} off, degrees", 1, 1.0) for name in SAGITTAL},
+    "cpu_ms": ("CPU ms a frame", 0, 1.0),
 }
 
 
@@ -254,7 +259,7 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         made = film(scene, plates, shot.seed, shot.extraction.startswith(GIVEN), folder)
         frames = (made.first, None)
         row: dict[str, Any] = {**shot._asdict(), "people": scene.people, "frames": len(scene)}
-        began, said = time.perf_counter(), list[str]()
+        began, spent, said = time.perf_counter(), time.process_time(), list[str]()
         try:
             result = track(
                 made.videos,
@@ -270,6 +275,7 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         except ValueError as error:
             return row | {"refused": str(error).replace(f"{folder}/", "")}
         row["minutes"] = (time.perf_counter() - began) / 60.0
+        row["cpu_ms"] = 1e3 * (time.process_time() - spent) / len(scene)
         with np.load(folder / "track" / "poses.npz") as stored:
             radii, joint_radii = stored["radii"], stored["joint_radii"][:, list(stored["levels"]).index(0.8)]
         row |= extraction_figures(result.scene, made.masks) | track_figures(result, radii, scene, made.masks)

@@ -159,13 +159,13 @@ def root_deviation_costs(places: Array, expected: Array, eye: Array | None, step
 
     `eye` (3,) is where the only camera stands: a silhouette tells little of how far away from it a body is.
     """
-    off = places - expected
-    along = np.zeros(off.shape[:-1])
+    x, y, z = (places[..., axis] - expected[..., axis] for axis in range(3))  # sums over axes of 3 take far longer
+    along: Array | float = 0.0
     if eye is not None:
         sights = places - eye
         sights /= np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-        along = (off * sights).sum(axis=-1) ** 2
-    across = (off**2).sum(axis=-1) - along
+        along = (x * sights[:, 0] + y * sights[:, 1] + z * sights[:, 2]) ** 2
+    across = x**2 + y**2 + z**2 - along
     return np.asarray(np.log1p(0.5 * (across / steps.straying**2 + along / steps.depth**2)))
 
 
@@ -195,5 +195,8 @@ def transition_costs(transition: Transition, *, steps: Steps) -> Array:
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
         costs += root_deviation_costs(beam.places, ahead.places[:, None], transition.eye, steps)
-    turned = np.abs(wrapped(beam.yaws - before.yaws[:, None]))
-    return np.asarray(np.minimum(costs, steps.jump) + SPIN_COST * np.maximum(turned - steps.fastest, 0.0))
+    costs = np.minimum(costs, steps.jump)
+    if steps.fastest < np.pi:
+        turned = np.abs(wrapped(beam.yaws - before.yaws[:, None]))
+        costs += SPIN_COST * np.maximum(turned - steps.fastest, 0.0)
+    return costs

@@ -6,6 +6,7 @@ Poses are compared by codes: a few numbers a pose.
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -148,15 +149,19 @@ class Exemplars:
     def __len__(self) -> int:
         return len(self.poses)
 
+    @cached_property
+    def _line(self) -> tuple[float, Array]:
+        """How long a clip's part is of a line on which all clips lie one after the other, and where poses lie (K,)."""
+        length = 1.0 + float(self.times.max())
+        return length, self.clips * length + self.times
+
     def after(self, states: Rows, seconds: float) -> tuple[Codes, Array, Array]:
         """Return codes (n, D) of what came `seconds` after some states, how far they turned (n,) and went (n, 3).
 
         Displacements are those of a body whose yaw was 0. Between two poses all is interpolated; a clip that has
         ended stays in its last pose.
         """
-        last = self.lasts[self.clips[states]]
-        length = 1.0 + float(self.times.max())  # of the line on which all clips lie one after the other
-        line = self.clips * length + self.times
+        last, (length, line) = self.lasts[self.clips[states]], self._line
         times = np.minimum(self.times[states] + seconds, self.times[last])
         before = np.searchsorted(line, self.clips[states] * length + times, "right") - 1
         following = np.minimum(before + 1, last)
@@ -220,7 +225,7 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
     """Return the states of motions; the latest are kept for the same motions and skeleton."""
     global _latest
     digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
-    arrays = [skeleton.offsets, skeleton.axes]
+    arrays = [skeleton.offsets.round(9), skeleton.axes]  # metres: one build comes about in several ways
     for motion in motions:
         arrays += [motion.skeleton.axes, motion.poses, motion.translations]
     for array in arrays:

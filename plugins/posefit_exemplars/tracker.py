@@ -208,7 +208,10 @@ class ExemplarTracker:
         full = int(min(FULL * self.evaluations, (self.evaluations - last) / (1.0 + look.share)))
         small = int((self.evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
-        elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
+        search = small - around
+        if latest is not None and self.hypotheses is not None:
+            search //= look.cameras  # several leave less open
+        elsewhere, looked = self._elsewhere(look, latest, search, rng)
         beams = [elsewhere]
         if latest is not None:
             beams.append(next_states(self.exemplars, latest, seconds, self.steps, around, root))

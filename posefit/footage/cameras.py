@@ -1,7 +1,7 @@
 """The scene of real cameras: their masks or videos, with their calibrations."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -70,10 +70,7 @@ def combined(
         if (camera.width, camera.height) != size:
             raise _of_another_size("", size, (camera.width, camera.height))
         cameras.append(camera)
-        straight = view.masks if maps is None else undistorted(view.masks, maps)
-        if maps is not None and straight.landmarks is not None:
-            straight = replace(straight, landmarks=calibration.straightened(straight.landmarks, size))
-        masks.append(straight)
+        masks.append(view.masks if maps is None else undistorted(view.masks, calibration, maps))
         if k == 0 and pictures is not None and maps is not None:
             pictures = partial(_straightened, pictures, maps)
     # several cameras distinguish front and back themselves

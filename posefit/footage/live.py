@@ -12,12 +12,14 @@ from typing import Any, BinaryIO, cast
 import cv2
 import numpy as np
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.images import PIXELS
 from posefit.footage.masks import FPS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video, scaled
+from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
@@ -44,6 +46,8 @@ class LiveMask:
     mask: Mask = field(repr=False)
     valid: Mask = field(repr=False)
     usable: bool  # whether it shows enough of the person to be searched
+    # (27, 3), see `Segmenter`; 0 where it gives none
+    landmarks: Array = field(default_factory=lambda: np.zeros((len(JOINTS), 3)), repr=False)
 
 
 class Stream:
@@ -192,7 +196,8 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
     for live in images:
         image = scaled(live.image, segmentation.size)
         person, row = segmentation.person(segmenter, image, quality, live.number)
-        yield LiveMask(live, person.mask, person.valid, bool(row["usable"]))
+        landmarks = segmentation.landmarks_of(segmenter)
+        yield LiveMask(live, person.mask, person.valid, bool(row["usable"]), landmarks)
 
 
 def _of_one_size(stream: Stream) -> Iterator[LiveImage]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Observation
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.silhouette.mask import Silhouette
@@ -57,14 +58,19 @@ def empty_planes(count: int, size: tuple[int, int]) -> Planes:
     return np.empty((count, octets), dtype=np.uint8)
 
 
-def undistorted(masks: PackedMasks, maps: tuple[Any, Any]) -> PackedMasks:
-    """Return masks as of a pinhole camera; pixels that the lens did not cover are unknown."""
+def undistorted(masks: PackedMasks, calibration: Calibration, maps: tuple[Any, Any]) -> PackedMasks:
+    """Return masks, and landmarks, as of a pinhole camera; pixels that the lens did not cover are unknown.
+
+    `maps` are those of the calibration for pictures of the masks' size.
+    """
     straight, valid = empty_planes(len(masks), masks.size), empty_planes(len(masks), masks.size)
     for k in range(len(masks)):
-        bent = masks.silhouette(k)
-        for planes, plane in ((straight, bent.mask), (valid, bent.valid)):
+        seen = masks.silhouette(k)
+        for planes, plane in ((straight, seen.mask), (valid, seen.valid)):
             planes[k] = np.packbits(cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0)
-    return replace(masks, masks=straight, valid=valid)
+    bent = masks.landmarks
+    landmarks = None if bent is None else calibration.straightened(bent, masks.size)
+    return replace(masks, masks=straight, valid=valid, landmarks=landmarks)
 
 
 @dataclass(frozen=True, eq=False)

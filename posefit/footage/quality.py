@@ -18,7 +18,7 @@ from posefit.arrays import Array
 from posefit.footage.masks import Views
 from posefit.geometry.camera import Camera
 from posefit.silhouette.foreground import Image, Person
-from posefit.silhouette.mask import Mask, Silhouette, box_of
+from posefit.silhouette.mask import Mask, Silhouette, box_of, padded_box
 
 # of a frame
 AREA_FRAMES = 15  # latest frames that a frame's area is compared with
@@ -118,15 +118,17 @@ class FrameQuality:
         """
         if self._edges is None or not mask.any():
             return False
-        inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
-        outline = mask & ~inner
-        now, before = _edges(image)[outline], self._edges[outline]
+        box = padded_box(mask, 2)  # what is farther away changes no edge at the mask
+        inner = cv2.erode(mask[box].astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
+        outline = mask[box] & ~inner
+        now, before = _edges(image[box])[outline], self._edges[box][outline]
         return bool((before > EDGE_RATIO * now + EDGE_LEVELS).sum() > (now > EDGE_RATIO * before + EDGE_LEVELS).sum())
 
 
 def changed_pixels(image: Image, earlier: Image) -> Mask:
     """Return which pixels (height, width) changed from one picture to another, but for single ones, which are noise."""
-    changed = np.asarray(cv2.absdiff(image, earlier).max(axis=2) > MOVING_LEVELS, dtype=np.uint8)
+    levels = cv2.split(cv2.absdiff(image, earlier))
+    changed = np.asarray(cv2.max(cv2.max(levels[0], levels[1]), levels[2]) > MOVING_LEVELS, dtype=np.uint8)
     return np.asarray(cv2.medianBlur(changed, 5) > 0)
 
 

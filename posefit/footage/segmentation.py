@@ -187,7 +187,7 @@ class Segmentation:
                 self._shifts.append(motion.shift(image))
             result, row = self.person(segmenter, image, quality, self.start + k)
             self._facings.append(float(getattr(segmenter, "facing", math.nan)))
-            self._landmarks.append(self._landmarks_of(segmenter))
+            self._landmarks.append(self.landmarks_of(segmenter))
             self._middles.append(
                 float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
             )
@@ -232,7 +232,7 @@ class Segmentation:
         whole[:, y : y + tall, x : x + wide] = planes
         return whole[0], whole[1]
 
-    def _landmarks_of(self, segmenter: Segmenter) -> Array:
+    def landmarks_of(self, segmenter: Segmenter) -> Array:
         """Return a segmenter's landmarks (27, 3) of the latest frame, at their place in the whole frame; 0 for none."""
         landmarks = getattr(segmenter, "landmarks", None)
         given = np.array(np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks, dtype=np.float64)

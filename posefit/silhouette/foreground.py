@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.errors import InputError
-from posefit.silhouette.mask import Mask
+from posefit.silhouette.mask import Mask, padded_box
 
 Image = NDArray[np.uint8]  # (height, width, 3)
 
@@ -193,32 +193,36 @@ def _cleaned(mask: Mask, height: int) -> Mask:
 
 def _largest(mask: Mask) -> tuple[Mask, int, float]:
     """Return the largest piece with those near it, how many pieces count, and the share of the largest other."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    box, kept = padded_box(mask, 0), np.zeros_like(mask)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask[box].astype(np.uint8), connectivity=8)
     if count < 2:
-        return np.zeros_like(mask), 0, 0.0
+        return kept, 0, 0.0
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + int(areas.argmax())
     reach = _morphed(labels == largest, cv2.MORPH_DILATE, 2.0 * NEAR * stats[largest, cv2.CC_STAT_HEIGHT])
-    near = np.unique(labels[reach & mask])
-    near = near[near > 0]
     mine = np.zeros(count, dtype=bool)
-    mine[near] = True
+    mine[labels[reach & mask[box]]] = True
     rival = float(areas[~mine[1:]].max(initial=0) / areas[mine[1:]].sum())
-    return np.isin(labels, near), int(np.count_nonzero(areas > PIECE * areas.max())), rival
+    kept[box] = mine[labels]
+    return kept, int(np.count_nonzero(areas > PIECE * areas.max())), rival
 
 
 def _morphed(mask: Mask, operation: int, size: float) -> Mask:
     side = 2 * max(1, round(0.5 * size)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    return np.asarray(cv2.morphologyEx(mask.astype(np.uint8), operation, kernel) > 0)
+    box, morphed = padded_box(mask, side), np.zeros_like(mask)
+    morphed[box] = cv2.morphologyEx(mask[box].astype(np.uint8), operation, kernel) > 0
+    return morphed
 
 
 def without_holes(mask: Mask, most: float = HOLE) -> Mask:
     """Return a mask whose holes are filled that have at most this share of its area."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
-    height, width = mask.shape
+    box, filled = padded_box(mask, 1), mask.copy()
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask[box]).astype(np.uint8), connectivity=4)
+    height, width = labels.shape
     lefts, tops, widths, heights, areas = stats[:count].T
     enclosed = (lefts > 0) & (tops > 0) & (lefts + widths < width) & (tops + heights < height)
     fills = enclosed & (areas <= most * mask.sum())
     fills[0] = False  # the person
-    return np.asarray(mask | fills[labels])
+    filled[box] |= fills[labels]
+    return filled

@@ -41,12 +41,17 @@ def box_of(mask: Mask) -> tuple[int, int, int, int]:
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
-def without_small_pieces(mask: Mask) -> Mask:
-    """Return a mask without its small pieces, which are not the person."""
+def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
+    """Return the rows and columns of a mask's pixels, and so many about them; the first pixel where it has none."""
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))
     if not wide:
-        return mask
-    box = np.s_[top : top + tall, left : left + wide]  # where it takes less time to tell pieces apart
+        return slice(1), slice(1)
+    return slice(max(top - margin, 0), top + tall + margin), slice(max(left - margin, 0), left + wide + margin)
+
+
+def without_small_pieces(mask: Mask) -> Mask:
+    """Return a mask without its small pieces, which are not the person."""
+    box = padded_box(mask, 0)  # where it takes less time to tell pieces apart
     count, numbers, pieces, _ = cv2.connectedComponentsWithStats(mask[box].astype(np.uint8), connectivity=8)
     if count <= 2:
         return mask

@@ -111,17 +111,19 @@ def _scene_of(
         names = [f"{name}, frame {live.source.number}" for live in seen]
         masks = np.packbits([live.mask.ravel() for live in seen], axis=1)
         valid = np.packbits([live.valid.ravel() for live in seen], axis=1)
-        return PackedMasks(names, size, masks, valid, np.array([live.usable for live in seen]))
+        usable, landmarks = np.array([live.usable for live in seen]), np.array([live.landmarks for live in seen])
+        known = landmarks if landmarks[..., 2].any() else None
+        return PackedMasks(names, size, masks, valid, usable, landmarks=known)
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
     body, view = body_of(options.asf, options.height), CameraView(packed(first), (), name)
     scene = combined([view], name, body, known, facing, options.up, fps)
-    maps = next((each.maps(size) for each in known if isinstance(each, Calibration) and each.distorted), None)
+    bent = next(((each, each.maps(size)) for each in known if isinstance(each, Calibration) and each.distorted), None)
 
     def observed(live: LiveMask) -> Observation:
         masks = packed([live])
-        return Views([masks if maps is None else undistorted(masks, maps)])[0]  # type: ignore[no-any-return]
+        return Views([masks if bent is None else undistorted(masks, *bent)])[0]  # type: ignore[no-any-return]
 
     return scene, observed
 

@@ -30,7 +30,8 @@ def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, rea
     curve, slope = np.diag(LOOSE), LOOSE * np.append(np.zeros(3), pose - mean)
     for number, camera in enumerate(walk.task.cameras):
         view = contours.MaskContours.of(camera, number, [walk.observations[k]], place[None])
-        body = contours.projected_body(walk.task.body, view.camera, pose[None], place[None])[0]
+        here = walk.task.body.skeleton.joints(pose[None], place[None])
+        body = contours.projected_body(walk.task.body, view.camera, here)[0]
         joints = 1 + len(contours.BONE_STARTS)
         drawn = body[: 2 * joints].reshape(1, -1, 2), body[2 * joints :].reshape(1, -1, 2)
         count = contours.BODY_NUMBERS
@@ -43,7 +44,8 @@ def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, rea
         curves, slopes = out[0][0], out[1][0]
         deviation = contours.BORDER_DEVIATION**2 + (contours.PIXEL_DEVIATION / view.metres[0]) ** 2
         worth = 1.0 / (view.metres[0] ** 3 * contours.CORRELATION_LENGTH * deviation)
-        ways = contours.pose_jacobian(walk.task.body, view.camera, pose[None], place[None], range(ANGLES))[0]
+        turned = contours.turned_joints(walk.task.body, pose[None], place[None], range(ANGLES))
+        ways = contours.jacobian(body[None], contours.projected_body(walk.task.body, view.camera, turned))[0]
         curve += worth * ways.T @ curves @ ways
         slope += worth * ways.T @ slopes
     free = np.append([True] * 3, walk.motion.skeleton.free)

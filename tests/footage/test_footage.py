@@ -119,7 +119,7 @@ def test_lens_distortion_is_undone_and_what_the_lens_missed_is_unknown(tmp_path:
     undone = cv2.undistortPoints(bent, one.matrix, one.distortion, P=one.matrix).reshape(SIZE[1], SIZE[0], 2)
     bent_mask = cv2.remap(straight.astype(np.uint8), undone.astype(np.float32), None, cv2.INTER_NEAREST)
     np.savez(tmp_path / "a.npz", masks=bent_mask[None])
-    masks = undistorted(read_masks(tmp_path / "a.npz", (None, None)), one.maps(SIZE))
+    masks = undistorted(read_masks(tmp_path / "a.npz", (None, None)), one, one.maps(SIZE))
     silhouette = masks.silhouette(0)
     assert iou(silhouette.mask, straight) > 0.93 > iou(bent_mask > 0, straight)
     assert not silhouette.valid.all()

@@ -20,11 +20,12 @@ from posefit.tracking.smoothing import contours, kernels
 from posefit.tracking.smoothing.contours import (
     BONE_STARTS,
     MaskContours,
-    build_jacobian,
     distances_outside,
     fit_contours,
-    pose_jacobian,
+    grown_bodies,
+    jacobian,
     projected_body,
+    turned_joints,
 )
 from posefit.tracking.smoothing.path import Visibility
 from posefit.tracking.smoothing.smooth import smoothed
@@ -110,24 +111,28 @@ def test_jacobians_are_the_change_with_poses_places_and_builds() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(2)
     poses, places = rng.normal(0.0, 0.3, (3, 66)), rng.normal(0.0, 0.2, (3, 3)) + [0.0, 0.9, 0.0]
     angles = [0, 1, 9, 30]
-    here = projected_body(body, CAMERA, poses, places)
-    np.testing.assert_allclose(here[:, :54].reshape(3, 27, 2), CAMERA.project(body.skeleton.joints(poses, places))[0])
+    joints = body.skeleton.joints(poses, places)
+    here = projected_body(body, CAMERA, joints)
+    np.testing.assert_allclose(here[:, :54].reshape(3, 27, 2), CAMERA.project(joints)[0])
     step = rng.normal(0.0, 1e-3, (3, 7))
     turned = poses.copy()
     turned[:, angles] += step[:, 3:]
-    there = projected_body(body, CAMERA, turned, places + step[:, :3])
-    slopes = pose_jacobian(body, CAMERA, poses, places, angles)
+    there = projected_body(body, CAMERA, body.skeleton.joints(turned, places + step[:, :3]))
+    slopes = jacobian(here, projected_body(body, CAMERA, turned_joints(body, poses, places, angles)))
     np.testing.assert_allclose(there - here, np.einsum("tqn,tn->tq", slopes, step), atol=2e-3)
     growth = rng.normal(0.0, 1e-3, len(NAMES))
-    there = projected_body(shaped(body, np.exp(growth), 1.7), CAMERA, poses, places)
-    here = projected_body(shaped(body, np.ones(len(NAMES)), 1.7), CAMERA, poses, places)
-    slopes = build_jacobian(body.scaled(1.7 / body.stature, 1.7 / body.stature), CAMERA, poses, places, 1.7)
+    tall = body.scaled(1.7 / body.stature, 1.7 / body.stature)
+    here, there, *grown = (
+        projected_body(one, CAMERA, one.skeleton.joints(poses, places))
+        for one in (tall, shaped(body, np.exp(growth), 1.7), *grown_bodies(tall, 1.7))
+    )
+    slopes = jacobian(here, np.array(grown))
     np.testing.assert_allclose(there - here, slopes @ growth, atol=2e-3)
 
 
 def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(3)
-    numbers = projected_body(body, CAMERA, np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))
+    numbers = projected_body(body, CAMERA, body.skeleton.joints(np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]])))
     points = rng.uniform(40.0, 160.0, (30, 2))
     nothing = np.zeros((1, 1, 1), np.float32), np.zeros((1, 2), np.int64), np.ones((1, 2), np.int64)
 

@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 from posefit.errors import InputError
+from posefit.fitting.tracker import SynthesisTracker
 from posefit.footage import live
 from posefit.footage.live import LiveImage, Stream, live_masks, netpbm_images
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
+from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
+from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.tracking.live import track_live, write_live
@@ -110,6 +113,41 @@ def test_the_background_is_that_of_the_first_frames_or_a_picture(given, every_fr
     assert [mask.source.number for mask in masks] == [0, 1, 2, 3] if given else [90, 91, 92]
     mask, true = masks[-1].mask, (person != empty).any(axis=2)
     assert (mask & true).sum() > 0.95 * max(mask.sum(), true.sum())
+
+
+class Marked:
+    """Gives a landmark beside what is bright."""
+
+    def __init__(self):
+        self.landmarks = np.zeros((len(JOINTS), 3))
+
+    def segment(self, image):
+        self.landmarks[0] = [5.0, 7.0, 0.5]
+        mask = image[..., 0] > 127
+        return mask, np.zeros_like(mask)
+
+
+def test_a_method_gets_the_landmarks_of_a_segmenter_also_through_a_lens(monkeypatch, every_frame, walk):
+    seen, follow = [], SynthesisTracker.track
+
+    def noted(observation):
+        seen.append(observation.landmarks)
+        return observation
+
+    monkeypatch.setattr(Extraction, "segmenter", lambda _how, _film: Marked())
+    monkeypatch.setattr(SynthesisTracker, "track", lambda self, frames, rng: follow(self, map(noted, frames), rng))
+    raised = np.roll(walk, -5, axis=1)  # off the picture's lower border
+    ppm = b"".join(b"P6 160 120 255\n" + np.repeat(255 * mask.astype(np.uint8), 3).tobytes() for mask in raised)
+    pinhole = np.array([[165.0, 0.0, 79.5], [0.0, 165.0, 59.5], [0.0, 0.0, 1.0]])
+    lens = Calibration("lens", (160, 120), pinhole, np.array([-0.2, 0.0, 0.0, 0.0]), None, None)
+    for camera in ((), (lens,)):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(ppm)))
+        seen.clear()
+        assert len(list(track_live(**QUICK, extraction=Extraction("mixture"), camera=camera))) == len(walk)
+        point = [[5.0, 7.0, 0.5]] if not camera else lens.straightened(np.array([[5.0, 7.0, 0.5]]), (160, 120))
+        for landmarks in seen:
+            np.testing.assert_allclose(landmarks[0, :1], point)
+            assert not landmarks[0, 1:, 2].any()
 
 
 @each("damaged", [0, 5])

@@ -19,7 +19,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS
+from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
 from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
@@ -106,38 +106,39 @@ BODY_NUMBERS = 2 * len(JOINTS) + 2 * len(BONES)  # of a drawn body: pixels of jo
 DIFFERENCE = 1e-4  # radians, metres, or of the logarithm of a factor: of a difference quotient
 
 
-def projected_body(body: Body, camera: Camera, poses: Array, places: Array) -> Array:
-    """Return where the joints (T, 106) of poses (T, 66) are in the picture, and how wide the bones' ends, in pixels.
+def projected_body(body: Body, camera: Camera, joints: Array) -> Array:
+    """Return where joints (..., 27, 3) are in the picture, and how wide the bones' ends (..., 106), in pixels.
 
     A joint that is nearer than 5 cm, or behind the camera, counts as that far.
     """
-    points = body.skeleton.joints(poses, places) @ camera.rotation.T + camera.translation
+    points = joints @ camera.rotation.T + camera.translation
     far = np.maximum(points[..., 2:], NEAR)
     pixels = points[..., :2] / far * camera.focal + camera.centre
     metres = np.sqrt(camera.focal.prod()) / far[..., 0]
-    radii = np.stack([metres[:, BONE_STARTS] * body.radii[:, 0], metres[:, 1:] * body.radii[:, 1]], axis=-1)
-    return np.concatenate([pixels.reshape(len(poses), -1), radii.reshape(len(poses), -1)], axis=1)
+    radii = np.stack([metres[..., BONE_STARTS] * body.radii[:, 0], metres[..., 1:] * body.radii[:, 1]], axis=-1)
+    lead = joints.shape[:-2]
+    return np.concatenate([pixels.reshape(*lead, -1), radii.reshape(*lead, -1)], axis=-1)
 
 
-def pose_jacobian(body: Body, camera: Camera, poses: Array, places: Array, angles: Sequence[int]) -> Array:
-    """Return how those numbers change with the root's place and some angles (T, 106, 3 + angles)."""
+def turned_joints(body: Body, poses: Array, places: Array, angles: Sequence[int]) -> Array:
+    """Return the joints (3 + angles, T, 27, 3) of poses (T, 66), of each an axis of the place or an angle off."""
     count = 3 + len(angles)
     turned, moved = np.repeat(poses[None], count, axis=0), np.repeat(places[None], count, axis=0)
     for k in range(3):
         moved[k, :, k] += DIFFERENCE
     for k, angle in enumerate(angles, 3):
         turned[k, :, angle] += DIFFERENCE
-    there = projected_body(body, camera, turned.reshape(-1, ANGLES), moved.reshape(-1, 3))
-    changes = there.reshape(count, len(poses), BODY_NUMBERS) - projected_body(body, camera, poses, places)
-    return np.ascontiguousarray(np.moveaxis(changes, 0, 2)) / DIFFERENCE
+    return body.skeleton.joints(turned, moved)
 
 
-def build_jacobian(body: Body, camera: Camera, poses: Array, places: Array, height: float | None) -> Array:
-    """Return how those numbers change with the logarithms of the factors of the build (T, 106, 17)."""
-    here = projected_body(body, camera, poses, places)
-    bodies = [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
-    there = [projected_body(other, camera, poses, places) for other in bodies]
-    return (np.stack(there, axis=2) - here[:, :, None]) / DIFFERENCE
+def grown_bodies(body: Body, height: float | None) -> list[Body]:
+    """Return 17 bodies, of each of which the logarithm of a factor of the build is off by `DIFFERENCE`."""
+    return [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
+
+
+def jacobian(here: Array, there: Array) -> Array:
+    """Return how numbers (T, q) change (T, q, n) that are `there` (n, T, q) where each of n is off by `DIFFERENCE`."""
+    return np.ascontiguousarray(np.moveaxis(there - here, 0, 2)) / DIFFERENCE
 
 
 BORDER_DEVIATION = 0.01  # metres that a point of the border may be off: standard deviation, as all that follow
@@ -234,8 +235,11 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     curves, slopes = np.zeros((count, numbers, numbers)), np.zeros((count, numbers))
     mixed, curve, slope = np.zeros((count, numbers, factors)), np.zeros((factors, factors)), np.zeros(factors)
     poses, places = part.fitted.poses, part.fitted.translations
+    here, turned = part.fitted.joints, turned_joints(part.body, poses, places, angles)
+    bodies = grown_bodies(part.body, part.height) if factors else []
+    built = [body.skeleton.joints(poses, places) for body in bodies]
     for view in borders:
-        drawn = projected_body(part.body, view.camera, poses, places)
+        drawn = projected_body(part.body, view.camera, here)
         centres, radii = drawn[:, : 2 * joints].reshape(count, -1, 2), drawn[:, 2 * joints :].reshape(count, -1, 2)
         out = np.zeros((count, BODY_NUMBERS, BODY_NUMBERS)), np.zeros((count, BODY_NUMBERS))
         scales = np.maximum(scale * view.metres, MIN_ROBUST_SCALE)
@@ -245,22 +249,23 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / view.metres) ** 2
         worth = 1.0 / (view.metres**3 * CORRELATION_LENGTH * deviation)
         curvature, gradient = out[0] * worth[:, None, None], out[1] * worth[:, None]
-        ways = pose_jacobian(part.body, view.camera, poses, places, angles)
+        ways = jacobian(drawn, projected_body(part.body, view.camera, turned))
         across = ways.transpose(0, 2, 1)
         curves += across @ (curvature @ ways)
         slopes += (across @ gradient[..., None])[..., 0]
         if factors:
-            grown = build_jacobian(part.body, view.camera, poses, places, part.height)
+            each = zip(bodies, built, strict=True)
+            grown = jacobian(drawn, np.stack([projected_body(body, view.camera, joints) for body, joints in each]))
             mixed += across @ (curvature @ grown)
             curve += np.einsum("tqi,tqj->ij", grown, curvature @ grown)
             slope += np.einsum("tqi,tq->i", grown, gradient)
     fitted, estimate, turns, spread = part.fitted, part.estimate, np.zeros(factors), part.spread
-    squares, turned = Squares(count, numbers), slice(3, numbers)
+    squares, some = Squares(count, numbers), slice(3, numbers)
     squares.add(slice(None), curves, slopes)
     add_root(squares, estimate, part.visibility, ROOT_DEVIATION, places - estimate.translations)
     change = wrapped(poses - estimate.poses)[:, angles]
-    squares.add(turned, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
-    squares.add_bends(turned, change, fitted.fps**2 / ANGLE_ACCELERATION)
+    squares.add(some, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
+    squares.add_bends(some, change, fitted.fps**2 / ANGLE_ACCELERATION)
     add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.eyes), angles)
     if not factors:
         way = squares.least()
