@@ -98,6 +98,13 @@ def test_wilcoxon_is_scipys_and_its_adjustment_holms():
     assert [pair.adjusted for pair in some] == holm([pairs[2].p_value, pairs[5].p_value]).tolist()
 
 
+@each("seed", range(3))
+def test_with_ties_and_equal_blocks_wilcoxon_is_scipys_too(seed):
+    errors = np.random.default_rng(seed).integers(0, 4, (2, 8, 1)).astype(float)
+    (pair,) = wilcoxon(errors)
+    assert pair.p_value == pytest.approx(stats.wilcoxon(*errors[:, :, 0], zero_method="pratt").pvalue)
+
+
 def test_blocks_without_a_difference_count_against_one():
     (equal,) = wilcoxon(np.ones((2, 3, 3)))
     assert (equal.difference, equal.p_value) == (0.0, 1.0)
