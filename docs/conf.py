@@ -17,13 +17,14 @@ author = "The posefit developers"
 project_copyright = "The posefit developers"
 release = version = posefit.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
 exclude_patterns = ["_build", "contributions"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
+toc_object_entries = False  # thousands, and every page would look through them for its navigation
 # what the modules of posefit_bridges, and `Problem.ioh`, build upon
 autodoc_mock_imports = ["evox", "ioh", "iohblade", "metaevobox", "nevergrad", "optuna", "optunahub", "pymoo", "torch"]
 autodoc_typehints_format = "short"

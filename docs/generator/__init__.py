@@ -1,8 +1,8 @@
 """What of the handbook is made from the code: settings, figures, equations, commands, environments.
 
 `python docs/generator` writes it into the pages, between `<!-- from the code: NAME -->` and `<!-- end -->`, and so does
-docs/conf.py before every build; tests/docs compares it with the code. The pages of the Python modules are not in the
-repository.
+docs/conf.py before every build; tests/docs compares it with the code. The pages of the Python modules and those of the
+environments, which are docstrings alone, are not in the repository.
 """
 
 import re
@@ -14,7 +14,6 @@ import architecture
 from generator import angles, commands, environments, equations, figures, joints, python, settings
 
 DOCS = Path(__file__).parents[1]
-MODULES = DOCS / "generated" / "python"
 PARTS = {
     "background/equations.md": equations.page,
     "howto/measuring.md": angles.page,
@@ -32,16 +31,16 @@ def pages() -> dict[str, str]:
     Raises ValueError where packages import each other in a circle.
     """
     parts = {name: _with_part((DOCS / name).read_text("utf-8"), make()) for name, make in PARTS.items()}
-    manuals = {f"reference/environments/{name}.md": text for name, text in environments.pages().items()}
-    return {**parts, **manuals, "pictures/architecture.svg": architecture.drawing()}
+    return {**parts, "pictures/architecture.svg": architecture.drawing()}
 
 
 def write() -> None:
     """Write every generated page."""
-    shutil.rmtree(MODULES, ignore_errors=True)
+    shutil.rmtree(DOCS / "generated", ignore_errors=True)
     for name, text in {
         **pages(),
         **{f"generated/python/{name}.rst": text for name, text in python.pages().items()},
+        **{f"generated/environments/{name}.md": text for name, text in environments.pages().items()},
     }.items():
         path = DOCS / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,7 +20,6 @@ from posefit.tracking.options import TrackOptions
 from posefit_exemplars.contours import precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import KNOWN_SHIFT, REACHES, TURN
-from posefit_reproduce.bench.processor import check_named
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
 POSES = 40  # of a call, by which the effort of a step is measured
@@ -94,7 +93,6 @@ def _peak_mb() -> float:
 @click.argument("frames", type=click.IntRange(1))
 def main(frames: int) -> None:
     """Print the figures; a thousand frames take one or two minutes."""
-    check_named()
     for name, value in follow_figures(frames).items():
         click.echo(f"{name:12} {round(value, 3):,g}")
 

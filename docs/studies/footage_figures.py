@@ -233,7 +233,7 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     yield "mm: HumanEva's error, the mean distance of 15 virtual markers, and the same with both pelvises in one place"
 
 
-@click.command("figures")
+@click.command()
 @click.argument("folder", type=click.Path())
 @click.option("--only", default="", metavar="TEXT", help="Films with it in their path; by default a walk and a run.")
 @click.option("--activity", type=click.Choice(["walk", "run"]), help="What films show whose names do not say it.")
@@ -241,7 +241,7 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
 @CLIPS
 @click.option("--out", metavar="DIR", help="New folder for report.json and the pictures of figures 8 and 10.")
 @options((FRAMES, *track_flags("height"), *EXTRACTION, JSON))
-def figures(out: str | None, as_json: bool, **given: Any) -> None:
+def main(out: str | None, as_json: bool, **given: Any) -> None:
     """Figures 8 and 10 of Acta Automatica Sinica 38(5), on real films.
 
     FOLDER is that of KTH's actions, HumanEva-I or CMU's motion capture database as unpacked, or a film by itself. Of
@@ -259,3 +259,7 @@ def figures(out: str | None, as_json: bool, **given: Any) -> None:
     click.echo(json.dumps(report) if as_json else "\n".join(_lines(report)))
     if out and not as_json:
         click.echo(f"written to {out}: look at {', '.join(report['figures'])}")
+
+
+if __name__ == "__main__":
+    main()

@@ -42,11 +42,11 @@ class Problem(Basic_Problem):
 
 @final
 class TorchProblem(Problem, Basic_Problem_Torch):
-    """The same of tensors, in double precision."""
+    """The same of tensors."""
 
-    def func(self, x: torch.Tensor) -> torch.Tensor:
-        """Return the costs (n,) of a population (n, d), on its device."""
-        return torch.as_tensor(super().func(x.numpy(force=True)), device=x.device)
+    def func(self, x: torch.Tensor) -> Any:
+        """Return the costs (n,) of a population (n, d), on its device and in its precision."""
+        return super().func(x.detach())
 
 
 @final

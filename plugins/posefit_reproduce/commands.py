@@ -91,15 +91,13 @@ def sapso_command(
 def bench_command(threads: int | None, device: str | None, as_json: bool) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
 
-    `cpu` names the processor that the loops are compiled for and the instructions it has. It is this machine's, or the
-    one that the environment variable NUMBA_CPU_NAME names: x86-64-v3 has AVX2 and no AVX-512, x86-64-v2 has SSE4.
+    `cpu` names the processor that the loops are compiled for: this machine's, or the one that the environment variable
+    NUMBA_CPU_NAME names, such as x86-64-v3, which has AVX2 and no AVX-512, or x86-64-v2, which has SSE4.
     """
     from posefit.silhouette.cuda.device import check_device
-    from posefit_reproduce.bench.processor import check_named
 
     if None not in (threads, device):
         raise InputError("bench must have --threads or --device, got both")
-    check_named()
     if device is None:
         from posefit_reproduce.bench.experiment import loop_figures
 

@@ -20,6 +20,7 @@ from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
+FEW = 13  # blocks, for which scipy has exact p-values with ties, too, and goes through all signs one by one
 LETTERS = ascii_letters  # of as many groups at most
 _SHAPE = ("methods", "instances", "seeds")
 
@@ -89,7 +90,7 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
     """Return two-sided paired comparisons of all, or of some, pairs of methods; errors (methods, instances, seeds).
 
     Blocks in which both are equal are ranked but count for neither (Pratt, 1959). The p-value is exact for up to 50
-    blocks without ties, as in scipy. Holm's adjustment is over the pairs compared: Holm, 1979.
+    blocks without ties and up to 13 with ties, as in scipy. Holm's adjustment is over the pairs compared: Holm, 1979.
     """
     array = finite("errors", errors, _SHAPE, (2, 1, 1))
     chosen = list(combinations(range(len(array)), 2)) if pairs is None else list(pairs)
@@ -108,7 +109,15 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
 def _signed_rank(differences: Array) -> float:
     if not differences.any():
         return 1.0
-    return float(stats.wilcoxon(differences, zero_method="pratt").pvalue)
+    if len(differences) > FEW:
+        return float(stats.wilcoxon(differences, zero_method="pratt").pvalue)
+    ranks = np.rint(2.0 * stats.rankdata(np.abs(differences))).astype(np.int64)  # whole numbers, though ties share one
+    positive = int(ranks[differences > 0.0].sum())
+    counts = np.ones(1)  # of signs whose positive ranks have the sum 0, 1, 2, ...
+    for rank in ranks[differences != 0.0]:
+        counts = np.pad(counts, (0, rank)) + np.pad(counts, (rank, 0))
+    tail = min(counts[: positive + 1].sum(), counts[positive:].sum())
+    return float(min(1.0, 2.0 * tail / counts.sum()))
 
 
 def holm(p_values: ArrayLike) -> Array:

@@ -20,8 +20,12 @@ from tests.docs.pages import ROOT, RUN, SHOWN, Block, blocks, pages
 
 BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
-SLOW = tuple(
-    f"docs/{page}.md" for page in ("ways/sweep", "howto/ambiguity", "howto/suite", "howto/masks", "reference/settings")
+SLOW = (
+    *(
+        f"docs/{page}.md"
+        for page in ("ways/sweep", "howto/ambiguity", "howto/suite", "howto/leaderboard", "howto/masks")
+    ),
+    *("docs/reference/settings.md", "docs/notebooks/array_to_angles.ipynb", "docs/notebooks/learner.ipynb"),
 )
 VIDEO = ROOT.parent / "shared/data/video/sports2d_walk"
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from footage_figures import SINGLE, TALL, Choice, figures, filmed_scene, footage_report
+from footage_figures import SINGLE, TALL, Choice, filmed_scene, footage_report, main
 from footage_sets import POINTS, errors_mm, films_in, read_c3d, recording_of, virtual_points
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -135,7 +135,7 @@ def stands() -> dict[str, Array]:
 
 
 def fails(*words: object) -> str:
-    result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(figures, [*map(str, words)])
+    result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(main, [*map(str, words)])
     assert (result.exit_code, result.stdout) == (2, ""), result.output
     (line,) = [line for line in result.stderr.splitlines() if "film/s" not in line]
     return line

@@ -106,7 +106,7 @@ def test_boltzmann_weights_are_exponentials_and_0_where_a_cost_is_not_finite() -
     np.testing.assert_allclose(boltzmann_weights(np.array([np.inf, np.nan]), 2.0), 0.5)
 
 
-NOISE, DRAWS, TRUTHS = 0.2, 9, 400
+NOISE, DRAWS, TRUTHS = 0.2, 9, 200
 
 
 def observed(proposals: Array) -> Array:

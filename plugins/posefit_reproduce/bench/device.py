@@ -14,8 +14,7 @@ from posefit.silhouette.cost import areas
 from posefit.silhouette.cuda.device import check_device, moved_to
 from posefit.sweep.command import cores
 from posefit_reproduce.bench.experiment import seen_at
-from posefit_reproduce.bench.kernel import bench_problem, fastest
-from posefit_reproduce.bench.processor import processor
+from posefit_reproduce.bench.kernel import bench_problem, fastest, processor
 from posefit_swarm.sapso import SAPSO
 
 SIZES = ((320, 240), (1280, 720))

@@ -16,9 +16,8 @@ from posefit.silhouette.cost import areas, project
 from posefit.silhouette.mask import Silhouette
 from posefit.sweep.command import cores
 from posefit_reproduce.bench.environments import vector_env
-from posefit_reproduce.bench.kernel import SIZE, bench_problem, fastest, opencv_costs
+from posefit_reproduce.bench.kernel import SIZE, bench_problem, fastest, opencv_costs, processor
 from posefit_reproduce.bench.optimisers import OURS, PARTICLES, optimiser_us, wide_space
-from posefit_reproduce.bench.processor import processor
 from posefit_swarm.sapso import SAPSO
 
 FEW, MANY = 40, 4000  # poses in a call

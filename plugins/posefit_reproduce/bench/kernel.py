@@ -1,7 +1,9 @@
-"""The benchmark's problem, its costs drawn by OpenCV into an image of bytes, and how jobs are timed."""
+"""The benchmark's problem, its costs drawn by OpenCV into an image of bytes, how jobs are timed, and on what."""
 
+import platform
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -35,6 +37,17 @@ def fastest(jobs: dict[str, Callable[[], object]]) -> dict[str, float]:
                 ended = time.perf_counter()
                 seconds[name] = min(seconds[name], ended - began)
     return seconds
+
+
+def processor() -> dict[str, str]:
+    """Return this machine's processor, and the one that loops are compiled for, as LLVM calls it."""
+    from numba.core.registry import cpu_target
+
+    listed = Path("/proc/cpuinfo")
+    lines = listed.read_text().splitlines() if listed.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    _, compiled_for, _ = cpu_target.target_context.codegen().magic_tuple()
+    return {"name": names[0] if names else platform.processor() or platform.machine(), "compiled_for": compiled_for}
 
 
 SIZE = (320, 240)

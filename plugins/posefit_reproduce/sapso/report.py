@@ -157,7 +157,7 @@ def _shortened(results: PaperResults, clips: bool, workers: int) -> list[str]:
         f"frames: {tests}; the paper has {FRAMES} of each, at a rate it does not give, here {FPS:.0f} a second",
         f"training poses (the paper's): {trained}; which clips it took, and of whom, the paper does not say",
         f"silhouettes: rendered, {SIZE[0]} x {SIZE[1]} pixels, seen from {views} degrees (0: in front), both ours",
-        "left out: figures 8 and 10, of real video, which docs/studies/footage.py makes of a copy of the data sets",
+        "left out: figures 8 and 10, of real video: docs/studies/footage_figures.py makes them of a copy of the films",
         "full space: the range of the training poses; PF is in that space, as far as the paper tells",
         f"every method has the same evaluations a frame, which the paper's had not; {at_once} ran at once",
     ]
