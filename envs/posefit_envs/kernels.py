@@ -13,7 +13,7 @@ from posefit.fitting.kernels import move_to_borders, unpack_proposals
 from posefit.geometry.kernels import LANES, empty_lanes, place_lanes, read_joints, set_offsets
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
-from posefit_swarm.kernels import step
+from posefit_swarm.kernels import remember, step
 
 
 class Scenes(NamedTuple):
@@ -48,8 +48,7 @@ def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations)
     many, block, (slots, lanes) = poses.shape[1], np.empty(LANES, np.int64), empty_lanes()
     joints, origins = np.empty((many, joint_radii.shape[1], 3)), np.zeros((many, 3))
     for i in rows:
-        for lane in range(LANES):
-            set_offsets(lanes, lane, scenes.offsets[i])
+        set_offsets(lanes, 0, LANES, scenes.offsets[i])
         for first in range(0, many, LANES):
             for lane in range(LANES):
                 block[lane] = min(first + lane, many - 1)
@@ -93,7 +92,7 @@ def draw_scenes(chain, scenes, width, height, rows, poses, translations, areas, 
                 if i != drawn[lane]:
                     rotation, place = scenes.rotations[i, v], scenes.places[i, v]
                     view = View(rotation, place, scenes.focals[i, v], scenes.centres[i, v], width, height)
-                    set_scene(work, lane, scenes.offsets[i], scenes.radii[i], view)
+                    set_scene(work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view)
                     drawn[lane] = i
             outline_poses(chain, flat, places, block, width, height, work)
             for lane in range(min(LANES, total - first)):
@@ -146,15 +145,9 @@ def teach_swarms(rows, chosen, moved, costs, swarms):
         s = chosen[i]
         bests, best_costs, leader = swarms.bests[i, s], swarms.best_costs[i, s], swarms.leaders[i, s]
         for k in range(particles):
-            better = costs[i, k] < best_costs[k]
-            if better:
-                best_costs[k] = costs[i, k]
             for j in range(d):
                 swarms.positions[i, s, k, j] = moved[i, k, j]
-                if better:
-                    bests[k, j] = moved[i, k, j]
-            if best_costs[k] < best_costs[leader]:
-                leader = k
+            leader = remember(k, moved[i, k], costs[i, k], bests, best_costs, leader)
         spread = 0.0
         for j in range(d):
             mean, square = 0.0, 0.0
