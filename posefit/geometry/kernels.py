@@ -201,30 +201,31 @@ def sine_cosine(angle):
 
 @jit
 def empty_lanes():
-    """Return room for LANES poses in the world's frame: the slots of their angles, and their numbers."""
+    """Return room for LANES poses in the world's frame: the slots of angles and the angles in them, and numbers."""
     lanes = np.empty(_END)
     for k in range(12 * LANES):
         lanes[_VIEW + k] = 1.0 if k // LANES % 5 == 0 else 0.0
-    return np.empty(_ANGLES, np.int64), lanes
+    return np.empty(2 * _ANGLES, np.int64), lanes
 
 
 @inlined
-def set_view(lanes, lane, rotation, translation, focal, centre):
-    """Place the joints of a lane in a camera's picture: x and y in pixels, times the depth, and the depth."""
+def set_view(lanes, first, stop, rotation, translation, focal, centre):
+    """Place the joints of some lanes in a camera's picture: x and y in pixels, times the depth, and the depth."""
     for i in range(3):
-        for j in range(3):
-            across = focal[i] * rotation[i, j] + centre[i] * rotation[2, j] if i < 2 else rotation[2, j]
-            lanes[_VIEW + LANES * (4 * i + j) + lane] = across
-        across = focal[i] * translation[i] + centre[i] * translation[2] if i < 2 else translation[2]
-        lanes[_VIEW + LANES * (4 * i + 3) + lane] = across
+        for j in range(4):
+            own, depth = (rotation[i, j], rotation[2, j]) if j < 3 else (translation[i], translation[2])
+            value = focal[i] * own + centre[i] * depth if i < 2 else depth
+            for lane in range(first, stop):
+                lanes[_VIEW + LANES * (4 * i + j) + lane] = value
 
 
 @inlined
-def set_offsets(lanes, lane, offsets):
-    """Give a lane the bones of a body (26, 3)."""
+def set_offsets(lanes, first, stop, offsets):
+    """Give some lanes the bones of a body (26, 3)."""
     for b in range(_BONES):
         for i in range(3):
-            lanes[_OFFSET + LANES * (3 * b + i) + lane] = offsets[b, i]
+            for lane in range(first, stop):
+                lanes[_OFFSET + LANES * (3 * b + i) + lane] = offsets[b, i]
 
 
 @inlined
@@ -240,15 +241,14 @@ def place_lanes(chain, poses, places, rows, slots, lanes):
     count = 0
     for a in range(_ANGLES):
         if slots[a] != 0 or a < 3:
-            slots[a] = count
+            slots[a], slots[_ANGLES + count] = count, a
             count += 1
         else:
             slots[a] = _STILL
     for lane in range(LANES):
         pose, place = poses[rows[lane]], places[rows[lane]]
-        for a in range(_ANGLES):
-            if slots[a] != _STILL:
-                lanes[_ANGLE + LANES * (slots[a] & NATURAL) + lane] = pose[a]
+        for k in range(count):
+            lanes[_ANGLE + LANES * k + lane] = pose[slots[_ANGLES + k] & NATURAL]
         for i in range(3):
             lanes[_PLACE + LANES * i + lane] = place[i]
     for k in range(LANES * count):
@@ -278,8 +278,7 @@ def place_frames(chain, pose, place, sines, cosines, frames):
     And the sine and cosine (66,) of its angles.
     """
     slots, lanes = empty_lanes()
-    for lane in range(LANES):
-        set_offsets(lanes, lane, chain.offsets)
+    set_offsets(lanes, 0, LANES, chain.offsets)
     place_lanes(chain, pose.reshape(1, -1), place.reshape(1, -1), np.zeros(LANES, np.int64), slots, lanes)
     for a in range(_ANGLES):
         moves, at = slots[a] != _STILL, LANES * (slots[a] & NATURAL)
@@ -304,8 +303,7 @@ def joint_positions(chain, poses, places):
     """Return the joints (n, 27, 3) of poses (n, 66) with their roots at places (n, 3)."""
     n, rows = poses.shape[0], np.empty(LANES, np.int64)
     joints, (slots, lanes) = np.empty((n, _JOINTS, 3)), empty_lanes()
-    for lane in range(LANES):
-        set_offsets(lanes, lane, chain.offsets)
+    set_offsets(lanes, 0, LANES, chain.offsets)
     for first in range(0, n, LANES):
         for lane in range(LANES):
             rows[lane] = min(first + lane, n - 1)

@@ -84,8 +84,7 @@ def count_areas(
     view = View(rotation, translation, focal, centre, width, height)
     n, silhouette = poses.shape[0], np.uint64(pixels)
     rows, work = np.empty(LANES, np.int64), scratch(width, height)
-    for lane in range(LANES):
-        set_scene(work, lane, offsets, radii, view)
+    set_scene(work, 0, LANES, offsets, radii, view)
     for first in range(0, n, LANES):
         for lane in range(LANES):
             rows[lane] = min(first + lane, n - 1)

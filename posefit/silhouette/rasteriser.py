@@ -355,16 +355,17 @@ def scratch(width, height):
 
 
 @inlined
-def set_scene(work, lane, offsets, radii, view):
-    """Give a lane a body, of bones (26, 3) and radii (26, 2), and a camera."""
+def set_scene(work, first, stop, offsets, radii, view):
+    """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
     (_, lanes), (ends, _, _, _, _, _, _, _), _ = work
-    set_offsets(lanes, lane, offsets)
+    set_offsets(lanes, first, stop, offsets)
     centre = view.centre[0] - 0.5, view.centre[1] - 0.5
-    set_view(lanes, lane, view.rotation, view.translation, view.focal, centre)
+    set_view(lanes, first, stop, view.rotation, view.translation, view.focal, centre)
     scale = math.sqrt(view.focal[0] * view.focal[1])
     for b in range(radii.shape[0]):
         for end in range(2):
-            ends[_SCALED + end * ROOM + LANES * b + lane] = scale * radii[b, end]
+            for lane in range(first, stop):
+                ends[_SCALED + end * ROOM + LANES * b + lane] = scale * radii[b, end]
 
 
 @jit
@@ -402,8 +403,7 @@ def fill_pose(lane, work):
 def draw_pose(chain, radii, view, pose, place):
     """Return the bit image of one body, pose (66,), root at a place (3,)."""
     work = scratch(view.width, view.height)
-    for lane in range(LANES):
-        set_scene(work, lane, chain.offsets, radii, view)
+    set_scene(work, 0, LANES, chain.offsets, radii, view)
     rows = np.zeros(LANES, np.int64)
     outline_poses(chain, pose.reshape(1, -1), place.reshape(1, -1), rows, view.width, view.height, work)
     return fill_pose(0, work)[0]
