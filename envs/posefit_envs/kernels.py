@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, jit
 from posefit.fitting.kernels import move_to_borders, unpack_proposals
-from posefit.geometry.kernels import Chain, empty_frames, place_joints
+from posefit.geometry.kernels import LANES, empty_lanes, place_lanes, read_joints, set_offsets
 from posefit.silhouette.kernels import count, paint_bits
-from posefit.silhouette.rasteriser import View, draw_pose, scratch
-from posefit_swarm.kernels import step
+from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
+from posefit_swarm.kernels import remember, step
 
 
 class Scenes(NamedTuple):
@@ -45,13 +45,16 @@ def unpack_scenes(proposals, centres, halves, anchors, first, poses, translation
 @jit
 def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations):
     """Move translations (n, k, 3) of some rows to where poses (n, k, 66) fill the borders (n, views, 4)."""
-    bones, many = chain.parents.size, poses.shape[1]
-    sines, cosines, origin = np.empty(poses.shape[2]), np.empty(poses.shape[2]), np.zeros(3)
-    frames, joints = empty_frames(bones + 1), np.empty((many, bones + 1, 3))
+    many, block, (slots, lanes) = poses.shape[1], np.empty(LANES, np.int64), empty_lanes()
+    joints, origins = np.empty((many, joint_radii.shape[1], 3)), np.zeros((many, 3))
     for i in rows:
-        own = Chain(chain.parents, chain.angles, chain.turns, chain.turned, scenes.offsets[i])
-        for k in range(many):
-            place_joints(own, poses[i, k], origin, sines, cosines, frames, joints[k])
+        set_offsets(lanes, 0, LANES, scenes.offsets[i])
+        for first in range(0, many, LANES):
+            for lane in range(LANES):
+                block[lane] = min(first + lane, many - 1)
+            place_lanes(chain, poses[i], origins, block, slots, lanes)
+            for lane in range(min(LANES, many - first)):
+                read_joints(lanes, lane, joints[first + lane])
         move_to_borders(
             joints,
             joint_radii[i],
@@ -71,21 +74,30 @@ def draw_scenes(chain, scenes, width, height, rows, poses, translations, areas, 
     Where there are `pictures` (n, height, width, views), and k is 1, they become the backdrops with `value` in the
     pixels of each body; those of other rows stay as they are.
     """
-    views, bones = scenes.places.shape[1], chain.parents.size
-    rotations, places, focals, centres = scenes.rotations, scenes.places, scenes.focals, scenes.centres
-    work = scratch(
-        View(rotations[0, 0], places[0, 0], focals[0, 0], centres[0, 0], width, height), bones, poses.shape[2]
-    )
-    for i in rows:
-        own = Chain(chain.parents, chain.angles, chain.turns, chain.turned, scenes.offsets[i])
-        if pictures.size:
+    views, many, total = scenes.places.shape[1], poses.shape[1], rows.size * poses.shape[1]
+    flat, places = poses.reshape(-1, poses.shape[2]), translations.reshape(-1, 3)
+    work, block, drawn = scratch(width, height), np.empty(LANES, np.int64), np.empty(LANES, np.int64)
+    if pictures.size:
+        for i in rows:
             pixels, backdrop = pictures[i].reshape(-1), scenes.backdrops[i].reshape(-1)
             for p in range(pixels.size):
                 pixels[p] = backdrop[p]
-        for v in range(views):
-            view = View(rotations[i, v], places[i, v], focals[i, v], centres[i, v], width, height)
-            for k in range(poses.shape[1]):
-                image, box = draw_pose(own, scenes.radii[i], view, poses[i, k], translations[i, k], work)
+    for v in range(views):
+        drawn[:] = -1  # the scene of a lane
+        for first in range(0, total, LANES):
+            for lane in range(LANES):
+                at = min(first + lane, total - 1)
+                i = rows[at // many]
+                block[lane] = many * i + at % many
+                if i != drawn[lane]:
+                    rotation, place = scenes.rotations[i, v], scenes.places[i, v]
+                    view = View(rotation, place, scenes.focals[i, v], scenes.centres[i, v], width, height)
+                    set_scene(work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view)
+                    drawn[lane] = i
+            outline_poses(chain, flat, places, block, width, height, work)
+            for lane in range(min(LANES, total - first)):
+                i, k = block[lane] // many, block[lane] % many
+                image, box = fill_pose(lane, work)
                 if pictures.size:
                     paint_bits(image, box, value, pictures[i, :, :, v])
                 body, overlap = count(image, scenes.observed[i, v], scenes.valid[i, v], box)
@@ -133,15 +145,9 @@ def teach_swarms(rows, chosen, moved, costs, swarms):
         s = chosen[i]
         bests, best_costs, leader = swarms.bests[i, s], swarms.best_costs[i, s], swarms.leaders[i, s]
         for k in range(particles):
-            better = costs[i, k] < best_costs[k]
-            if better:
-                best_costs[k] = costs[i, k]
             for j in range(d):
                 swarms.positions[i, s, k, j] = moved[i, k, j]
-                if better:
-                    bests[k, j] = moved[i, k, j]
-            if best_costs[k] < best_costs[leader]:
-                leader = k
+            leader = remember(k, moved[i, k], costs[i, k], bests, best_costs, leader)
         spread = 0.0
         for j in range(d):
             mean, square = 0.0, 0.0

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from posefit.arrays import inlined, jit
-from posefit.geometry.kernels import Chain, empty_frames, place_frames
+from posefit.geometry.kernels import Chain, place_frames
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 from posefit.tracking.smoothing.contours import (
@@ -223,7 +223,7 @@ def fit_poses(
     more than `most` a step.
     """
     chain = Chain(parents, angles, turns, turned, offsets)
-    frames = empty_frames(parents.size + 1)
+    frames = np.empty((parents.size + 1, 4, 3))
     sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
     screws, forces, curves = np.empty((NUMBERS, 6)), np.empty((parents.size + 1, 6)), np.empty((parents.size + 1, 6, 6))
     matrix, slopes = np.empty((NUMBERS, NUMBERS)), np.empty(NUMBERS)

@@ -99,6 +99,16 @@ def move(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_bes
 
 
 @jit
+def remember(i, position, cost, best, best_costs, leader):
+    """Make a position (d,) that costs less the best of particle i; return the row of the best of all."""
+    if cost < best_costs[i]:  # SAPSO A1.2b
+        for j in range(position.size):
+            best[i, j] = position[j]
+        best_costs[i] = cost
+    return i if best_costs[i] < best_costs[leader] else leader
+
+
+@jit
 def accept(moved, costs, chances, temperature, kept, swarm, accepted):
     """Accept or refuse each move by the annealing rule and update the personal bests; return the swarm's best row.
 
@@ -119,12 +129,7 @@ def accept(moved, costs, chances, temperature, kept, swarm, accepted):
                 velocity[i, j] *= kept
         if accepted[i]:
             position_costs[i] = costs[i]
-        if position_costs[i] < best_costs[i]:  # SAPSO A1.2b
-            for j in range(moved.shape[1]):
-                best[i, j] = position[i, j]
-            best_costs[i] = position_costs[i]
-        if best_costs[i] < best_costs[leader]:
-            leader = i
+        leader = remember(i, position[i], position_costs[i], best, best_costs, leader)
     return leader
 
 

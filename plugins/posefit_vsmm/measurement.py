@@ -14,7 +14,7 @@ from posefit.arrays import Array
 from posefit.fitting.landmarks import DEVIATION, GROUPS, MIRRORED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import empty_frames, place_joints
+from posefit.geometry.kernels import place_frames
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_vsmm.imm import Measurement
 from posefit_vsmm.joints import OWN, Lines, detected, rule_errors
@@ -51,12 +51,12 @@ class Figure:
         pose, chained = np.empty(ANGLES), np.empty(matrix.shape)
         bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
         sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
-        frames, joints = empty_frames(len(JOINTS)), np.empty((len(JOINTS), 3))
-        place_joints(self.skeleton.chain, pose, state[:3], sines, cosines, frames, joints)
+        frames = np.empty((len(JOINTS), 4, 3))
+        place_frames(self.skeleton.chain, pose, state[:3], sines, cosines, frames)
         count = len(POINTS)
         points, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
         others = np.empty((count, 3, len(offset)))
-        points_and_jacobian(sines, cosines, frames, joints, points, jacobian, others)
+        points_and_jacobian(sines, cosines, frames, frames[:, 3].copy(), points, jacobian, others)
         jacobian[:, :, FIRST_BONE:] += (others.reshape(-1, len(offset)) @ chained).reshape(count, 3, -1)
         return points, jacobian
 

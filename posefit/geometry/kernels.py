@@ -1,7 +1,8 @@
 """Forward kinematics in numba: plain functions over arrays, shapes checked by the callers.
 
-A bone stands here as plain Python, and below it as numba compiles it, four numbers at a time: its loops would not have
-it in vector registers.
+LANES poses are moved at a time, side by side in vector registers. All numbers of them are in one flat array, LANES of a
+kind after those of another: offsets known to the compiler are what lets it see that loops over lanes may run in
+registers. A bone stands here as plain Python, and below it as numba compiles it.
 """
 
 from collections.abc import Sequence
@@ -17,11 +18,25 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
 
+LANES = 8  # poses side by side: two vector registers of AVX2, one of AVX-512
+
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.
 _PI_HIGH, _PI_LOW = 3.141592653589793, 1.2246467991473532e-16
 
-_ROWS, _COLUMNS = 4, 4  # of a frame; the last row is padding, the last column the place of its origin
+# Where rows of lanes begin: angles that are not 0 in all lanes, each in a slot, and the root's three; their sines and
+# cosines; the root's place in the world; a matrix (3, 4) from there to the frame that joints are placed in; bones
+# (26, 3) in their own frames; axes (27, 3) of three coordinates; and joints, each coordinate of all 27 in turn.
+_ANGLES, _BONES, _JOINTS = 66, 26, 27
+_ANGLE, _SINE, _COSINE = (kind * _ANGLES * LANES for kind in range(3))
+_PLACE = 3 * _ANGLES * LANES
+_VIEW = _PLACE + 3 * LANES
+_OFFSET = _VIEW + 12 * LANES
+_AXES = _OFFSET + 3 * _BONES * LANES
+X, Y, Z = (_AXES + (9 + i) * _JOINTS * LANES for i in range(3))
+_END = Z + _JOINTS * LANES
+_STILL = -1  # the slot of an angle that is 0 in all lanes
+NATURAL = 0x7FFFFFFF  # an index that is provably not negative needs no check whether it counts from the end
 _FREEDOM = ("contract", "nsz")  # in rounding: what `jit` allows
 
 
@@ -44,42 +59,49 @@ def chain(parents: NDArray[np.int64], angles: NDArray[np.int64], axes: Array, of
     return Chain(parents.astype(np.int64), angles.astype(np.int64), turns, turned, own)
 
 
-def place_bone(chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> None:
-    """Write the frame of the joint in which bone b ends, from that of the joint it starts from.
+def place_bone(chain: Any, b: Any, slots: Any, lanes: Any) -> None:
+    """Write the frame of the joint in which bone b ends, from that of the joint it starts from."""
+    parent, a, turn = chain.parents[b], chain.angles[b], chain.turns[b]
 
-    Each of `frames` (27, 4, 4) is three axes and an origin: three world coordinates, and a fourth number to fill up.
-    """
-    a, turn, offset = chain.angles[b], chain.turns[b], chain.offsets[b]
-    for i in range(_ROWS - 1):
-        u, v, w, place = (frames[chain.parents[b], k, i] for k in range(_COLUMNS))
+    def row(first: int, k: int) -> Any:
+        return lanes[first + LANES * k : first + LANES * (k + 1)]
+
+    for i in range(3):
+        frame = [row(_AXES, 9 * parent + 3 * k + i) for k in range(3)]
         if chain.turned[b]:
-            u, v, w = (u * turn[0, k] + v * turn[1, k] + w * turn[2, k] for k in range(3))
-        if a >= 0:  # Rz @ Ry @ Rx
-            u, v = u * cosines[a + 2] + v * sines[a + 2], v * cosines[a + 2] - u * sines[a + 2]
-            u, w = u * cosines[a + 1] - w * sines[a + 1], w * cosines[a + 1] + u * sines[a + 1]
-            v, w = v * cosines[a] + w * sines[a], w * cosines[a] - v * sines[a]
-        frames[b + 1, 0, i], frames[b + 1, 1, i], frames[b + 1, 2, i] = u, v, w
-        frames[b + 1, 3, i] = place + u * offset[0] + v * offset[1] + w * offset[2]
+            u, v, w = frame
+            frame = [u * turn[0, k] + v * turn[1, k] + w * turn[2, k] for k in range(3)]
+        for k in (2, 1, 0) if a >= 0 else ():  # Rz @ Ry @ Rx
+            if slots[a + k] != _STILL:
+                sine, cosine = row(_SINE, slots[a + k]), row(_COSINE, slots[a + k])
+                first, second = frame[(k + 1) % 3], frame[(k + 2) % 3]
+                frame[(k + 1) % 3] = first * cosine + second * sine
+                frame[(k + 2) % 3] = second * cosine - first * sine
+        place = row(X, _JOINTS * i + parent)
+        for k, axis in enumerate(frame):
+            row(_AXES, 9 * (b + 1) + 3 * k + i)[:] = axis
+            place = place + axis * row(_OFFSET, 3 * b + k)
+        row(X, _JOINTS * i + b + 1)[:] = place
 
 
 @intrinsic
-def _place_bone(typing_context: Any, chain: Any, b: Any, sines: Any, cosines: Any, frames: Any) -> Any:  # noqa: ARG001
-    return types.void(chain, types.int64, sines, cosines, frames), _build_bone
+def _place_bone(typing_context: Any, chain: Any, b: Any, slots: Any, lanes: Any) -> Any:  # noqa: ARG001
+    return types.void(chain, types.int64, slots, lanes), _build_bone
 
 
 @overload(place_bone, inline="always")
-def _place_bone_compiled(chain, b, sines, cosines, frames):  # noqa: ARG001
-    return lambda chain, b, sines, cosines, frames: _place_bone(chain, b, sines, cosines, frames)  # type: ignore[call-arg]
+def _place_bone_compiled(chain, b, slots, lanes):  # noqa: ARG001
+    return lambda chain, b, slots, lanes: _place_bone(chain, b, slots, lanes)  # type: ignore[call-arg]
 
 
 def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Write `place_bone` as instructions for the four rows of a column."""
+    """Write `place_bone` as instructions for all lanes at once."""
     number, index = ir.DoubleType(), ir.IntType(64)
-    column = ir.VectorType(number, _ROWS)
+    vector = ir.VectorType(number, LANES)
     chain, b, *others = arguments
     kinds = *signature.args[0].types, *signature.args[2:]
     arrays = zip(kinds, [*unpack_tuple(builder, chain), *others], strict=True)
-    parents, angles, turns, turned, offsets, sines, cosines, frames = (
+    parents, angles, turns, turned, _, slots, lanes = (
         context.make_array(kind)(context, builder, array).data for kind, array in arrays
     )
 
@@ -89,137 +111,203 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
     def times(size: int, value: Any) -> Any:
         return builder.mul(value, index(size))
 
-    def place_of(joint: Any, k: int) -> Any:
-        at = builder.add(times(_ROWS * _COLUMNS, joint), index(_ROWS * k))
-        return builder.bitcast(builder.gep(frames, [at]), column.as_pointer())
+    def row_of(first: int, value: Any) -> Any:
+        place = builder.gep(lanes, [builder.add(times(LANES, value), index(first))])
+        return builder.bitcast(place, vector.as_pointer())
 
-    def in_all_rows(value: Any) -> Any:
-        lane = builder.insert_element(ir.Constant(column, ir.Undefined), value, ir.IntType(32)(0))
-        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), _ROWS), [0] * _ROWS))
+    def row(first: int, value: Any) -> Any:
+        return builder.load(row_of(first, value), align=8)
+
+    def in_all_lanes(value: Any) -> Any:
+        lane = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.IntType(32)(0))
+        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
     product = partial(builder.fmul, flags=_FREEDOM)
     total = partial(builder.fadd, flags=_FREEDOM)
     difference = partial(builder.fsub, flags=_FREEDOM)
 
-    def changed_where(condition: Any, axes: Sequence[Any], change: Any) -> list[Any]:
+    def changed_where(condition: Any, frame: Sequence[Any], change: Any) -> list[Any]:
         before = builder.block
         with builder.if_then(condition):
-            others = change(*axes)
+            others = change(frame)
             within = builder.block
-        chosen = [builder.phi(column) for _ in axes]
-        for either, old, new in zip(chosen, axes, others, strict=True):
+        chosen = [builder.phi(vector) for _ in frame]
+        for either, old, new in zip(chosen, frame, others, strict=True):
             either.add_incoming(old, before)
             either.add_incoming(new, within)
         return chosen
 
-    def at_rest(u: Any, v: Any, w: Any) -> list[Any]:
-        p, q, r = ([in_all_rows(entry(turns, times(9, b), index(3 * row + k))) for k in range(3)] for row in range(3))
-        return [total(total(product(u, p[k]), product(v, q[k])), product(w, r[k])) for k in range(3)]
+    # a frame is nine vectors: the first coordinate of each axis, then the second, then the third
+    def at_rest(frame: Sequence[Any]) -> list[Any]:
+        turn = [in_all_lanes(entry(turns, times(9, b), index(k))) for k in range(9)]
+        return [
+            total(total(product(u, turn[k]), product(v, turn[3 + k])), product(w, turn[6 + k]))
+            for u, v, w in (frame[:3], frame[3:6], frame[6:])
+            for k in range(3)
+        ]
 
-    def rotated(u: Any, v: Any, w: Any) -> tuple[Any, Any, Any]:
-        sine, cosine = ([in_all_rows(entry(of, angle, index(k))) for k in range(3)] for of in (sines, cosines))
+    def rotated(frame: Sequence[Any]) -> Sequence[Any]:
+        for k in (2, 1, 0):
+            slot = entry(slots, angle, index(k))
+            frame = changed_where(builder.icmp_signed(">=", slot, index(0)), frame, partial(turned_by, k, slot))
+        return frame
 
-        def turned_by(k: int, first: Any, second: Any) -> tuple[Any, Any]:
-            return (
-                total(product(first, cosine[k]), product(second, sine[k])),
-                difference(product(second, cosine[k]), product(first, sine[k])),
-            )
+    def turned_by(k: int, slot: Any, frame: Sequence[Any]) -> list[Any]:
+        sine, cosine, changed = row(_SINE, slot), row(_COSINE, slot), list(frame)
+        for i in (0, 3, 6):
+            first, second = i + (k + 1) % 3, i + (k + 2) % 3
+            changed[first] = total(product(frame[first], cosine), product(frame[second], sine))
+            changed[second] = difference(product(frame[second], cosine), product(frame[first], sine))
+        return changed
 
-        u, v = turned_by(2, u, v)
-        w, u = turned_by(1, w, u)
-        v, w = turned_by(0, v, w)
-        return u, v, w
-
-    parent, own, angle = entry(parents, b), builder.add(b, index(1)), entry(angles, b)
-    axes = [builder.load(place_of(parent, k), align=8) for k in range(3)]
-    axes = changed_where(builder.trunc(entry(turned, b), ir.IntType(1)), axes, at_rest)
-    axes = changed_where(builder.icmp_signed(">=", angle, index(0)), axes, rotated)
-    origin = builder.load(place_of(parent, 3), align=8)
-    for k in range(3):
-        builder.store(axes[k], place_of(own, k), align=8)
-        origin = total(origin, product(axes[k], in_all_rows(entry(offsets, times(3, b), index(k)))))
-    builder.store(origin, place_of(own, 3), align=8)
+    parent, angle = entry(parents, b), entry(angles, b)
+    frame = [row(_AXES + LANES * (3 * k + i), times(9, parent)) for i in range(3) for k in range(3)]
+    frame = changed_where(builder.trunc(entry(turned, b), ir.IntType(1)), frame, at_rest)
+    frame = changed_where(builder.icmp_signed(">=", angle, index(0)), frame, rotated)
+    for i, first in enumerate((X, Y, Z)):
+        place = row(first, parent)
+        for k in range(3):
+            axis = frame[3 * i + k]
+            builder.store(axis, row_of(_AXES + LANES * (9 + 3 * k + i), times(9, b)), align=8)
+            place = total(place, product(axis, row(_OFFSET + LANES * k, times(3, b))))
+        builder.store(place, row_of(first + LANES, b), align=8)
     return context.get_dummy_value()
 
 
 @inlined
-def sines_cosines(angles, sines, cosines):
-    """Write the sine and cosine of each angle. A plain loop of polynomials, so that it runs in vector registers."""
-    for i in range(angles.size):
-        turns = np.floor(angles[i] * (1.0 / _PI_HIGH) + 0.5)
-        x = (angles[i] - turns * _PI_HIGH) - turns * _PI_LOW
-        sign = 1.0 - 2.0 * (turns - 2.0 * np.floor(0.5 * turns))
-        z = x * x
-        s = -1.0 / 1307674368000.0
-        s = s * z + 1.0 / 6227020800.0
-        s = s * z - 1.0 / 39916800.0
-        s = s * z + 1.0 / 362880.0
-        s = s * z - 1.0 / 5040.0
-        s = s * z + 1.0 / 120.0
-        s = s * z - 1.0 / 6.0
-        sines[i] = sign * (x + x * z * s)
-        c = 1.0 / 20922789888000.0
-        c = c * z - 1.0 / 87178291200.0
-        c = c * z + 1.0 / 479001600.0
-        c = c * z - 1.0 / 3628800.0
-        c = c * z + 1.0 / 40320.0
-        c = c * z - 1.0 / 720.0
-        c = c * z + 1.0 / 24.0
-        c = c * z - 0.5
-        cosines[i] = sign * (1.0 + z * c)
-
-
-@inlined
-def place_frames(chain, pose, translation, sines, cosines, frames):
-    """Write the frames (27, 4, 4) of the joints of one pose (66,): three axes and an origin, as `place_bone` has them.
-
-    `sines` and `cosines` (66,) are scratch.
-    """
-    sines_cosines(pose, sines, cosines)
-    sy, sp, sr = sines[0], sines[1], sines[2]
-    cy, cp, cr = cosines[0], cosines[1], cosines[2]
-    root = frames[0]
-    root[0, 0] = cy * cr + sy * sp * sr
-    root[1, 0] = sy * sp * cr - cy * sr
-    root[2, 0] = sy * cp
-    root[0, 1] = cp * sr
-    root[1, 1] = cp * cr
-    root[2, 1] = -sp
-    root[0, 2] = cy * sp * sr - sy * cr
-    root[1, 2] = cy * sp * cr + sy * sr
-    root[2, 2] = cy * cp
-    for i in range(3):
-        root[3, i] = translation[i]
-    for b in range(chain.parents.size):
-        place_bone(chain, b, sines, cosines, frames)
-
-
-@inlined
-def place_joints(chain, pose, translation, sines, cosines, frames, joints):
-    """Write the joints (27, 3) of one pose (66,), and what `place_frames` does."""
-    place_frames(chain, pose, translation, sines, cosines, frames)
-    for j in range(joints.shape[0]):
-        for i in range(3):
-            joints[j, i] = frames[j, 3, i]
-
-
-@inlined
-def empty_frames(joints):
-    """Return room for the frames of so many joints, no number of it undefined."""
-    frames = np.empty((joints, 4, 4))
-    for j in range(joints):
-        for k in range(4):
-            frames[j, k, 3] = 0.0
-    return frames
+def sine_cosine(angle):
+    """Return the sine and cosine of an angle. Polynomials, so that they run in vector registers."""
+    turns = np.floor(angle * (1.0 / _PI_HIGH) + 0.5)
+    x = (angle - turns * _PI_HIGH) - turns * _PI_LOW
+    sign = 1.0 - 2.0 * (turns - 2.0 * np.floor(0.5 * turns))
+    z = x * x
+    s = -1.0 / 1307674368000.0
+    s = s * z + 1.0 / 6227020800.0
+    s = s * z - 1.0 / 39916800.0
+    s = s * z + 1.0 / 362880.0
+    s = s * z - 1.0 / 5040.0
+    s = s * z + 1.0 / 120.0
+    s = s * z - 1.0 / 6.0
+    c = 1.0 / 20922789888000.0
+    c = c * z - 1.0 / 87178291200.0
+    c = c * z + 1.0 / 479001600.0
+    c = c * z - 1.0 / 3628800.0
+    c = c * z + 1.0 / 40320.0
+    c = c * z - 1.0 / 720.0
+    c = c * z + 1.0 / 24.0
+    c = c * z - 0.5
+    return sign * (x + x * z * s), sign * (1.0 + z * c)
 
 
 @jit
-def joint_positions(chain, poses, translations):
-    """Return the joints (n, 27, 3) of poses (n, 66) with their root at translations (n, 3)."""
-    n, count = poses.shape[0], chain.parents.size + 1
-    joints = np.empty((n, count, 3))
-    sines, cosines = np.empty(poses.shape[1]), np.empty(poses.shape[1])
-    frames = empty_frames(count)
-    for i in range(n):
-        place_joints(chain, poses[i], translations[i], sines, cosines, frames, joints[i])
+def empty_lanes():
+    """Return room for LANES poses in the world's frame: the slots of angles and the angles in them, and numbers."""
+    lanes = np.empty(_END)
+    for k in range(12 * LANES):
+        lanes[_VIEW + k] = 1.0 if k // LANES % 5 == 0 else 0.0
+    return np.empty(2 * _ANGLES, np.int64), lanes
+
+
+@inlined
+def set_view(lanes, first, stop, rotation, translation, focal, centre):
+    """Place the joints of some lanes in a camera's picture: x and y in pixels, times the depth, and the depth."""
+    for i in range(3):
+        for j in range(4):
+            own, depth = (rotation[i, j], rotation[2, j]) if j < 3 else (translation[i], translation[2])
+            value = focal[i] * own + centre[i] * depth if i < 2 else depth
+            for lane in range(first, stop):
+                lanes[_VIEW + LANES * (4 * i + j) + lane] = value
+
+
+@inlined
+def set_offsets(lanes, first, stop, offsets):
+    """Give some lanes the bones of a body (26, 3)."""
+    for b in range(_BONES):
+        for i in range(3):
+            for lane in range(first, stop):
+                lanes[_OFFSET + LANES * (3 * b + i) + lane] = offsets[b, i]
+
+
+@inlined
+def place_lanes(chain, poses, places, rows, slots, lanes):
+    """Write axes and joints of the poses (n, 66), their roots at places (n, 3), that are in these rows (LANES,)."""
+    bits = poses.view(np.int64)
+    for a in range(_ANGLES):
+        slots[a] = 0
+    for lane in range(LANES):
+        row = bits[rows[lane]]
+        for a in range(_ANGLES):
+            slots[a] |= row[a]
+    count = 0
+    for a in range(_ANGLES):
+        if slots[a] != 0 or a < 3:
+            slots[a], slots[_ANGLES + count] = count, a
+            count += 1
+        else:
+            slots[a] = _STILL
+    for lane in range(LANES):
+        pose, place = poses[rows[lane]], places[rows[lane]]
+        for k in range(count):
+            lanes[_ANGLE + LANES * k + lane] = pose[slots[_ANGLES + k] & NATURAL]
+        for i in range(3):
+            lanes[_PLACE + LANES * i + lane] = place[i]
+    for k in range(LANES * count):
+        lanes[_SINE + k], lanes[_COSINE + k] = sine_cosine(lanes[_ANGLE + k])
+    for k in range(LANES):
+        sy, sp, sr = lanes[_SINE + k], lanes[_SINE + LANES + k], lanes[_SINE + 2 * LANES + k]
+        cy, cp, cr = lanes[_COSINE + k], lanes[_COSINE + LANES + k], lanes[_COSINE + 2 * LANES + k]
+        ux, uy, uz = cy * cr + sy * sp * sr, cp * sr, cy * sp * sr - sy * cr
+        vx, vy, vz = sy * sp * cr - cy * sr, cp * cr, cy * sp * cr + sy * sr
+        wx, wy, wz = sy * cp, -sp, cy * cp
+        x, y, z = lanes[_PLACE + k], lanes[_PLACE + LANES + k], lanes[_PLACE + 2 * LANES + k]
+        for i in range(3):
+            at = _VIEW + 4 * LANES * i + k
+            a, b, c = lanes[at], lanes[at + LANES], lanes[at + 2 * LANES]
+            lanes[_AXES + LANES * i + k] = a * ux + b * uy + c * uz
+            lanes[_AXES + LANES * (3 + i) + k] = a * vx + b * vy + c * vz
+            lanes[_AXES + LANES * (6 + i) + k] = a * wx + b * wy + c * wz
+            lanes[X + LANES * _JOINTS * i + k] = a * x + b * y + c * z + lanes[at + 3 * LANES]
+    for b in range(_BONES):
+        place_bone(chain, b, slots, lanes)
+
+
+@jit
+def place_frames(chain, pose, place, sines, cosines, frames):
+    """Write the frames (27, 4, 3) of the joints of one pose (66,), its root at a place (3,): three axes and an origin.
+
+    And the sine and cosine (66,) of its angles.
+    """
+    slots, lanes = empty_lanes()
+    set_offsets(lanes, 0, LANES, chain.offsets)
+    place_lanes(chain, pose.reshape(1, -1), place.reshape(1, -1), np.zeros(LANES, np.int64), slots, lanes)
+    for a in range(_ANGLES):
+        moves, at = slots[a] != _STILL, LANES * (slots[a] & NATURAL)
+        sines[a], cosines[a] = lanes[_SINE + at] if moves else 0.0, lanes[_COSINE + at] if moves else 1.0
+    read_joints(lanes, 0, frames[:, 3])
+    for j in range(_JOINTS):
+        for k in range(3):
+            for i in range(3):
+                frames[j, k, i] = lanes[_AXES + LANES * (9 * j + 3 * k + i)]
+
+
+@inlined
+def read_joints(lanes, lane, joints):
+    """Write the joints (27, 3) of a lane."""
+    for j in range(_JOINTS):
+        for i in range(3):
+            joints[j, i] = lanes[X + LANES * (_JOINTS * i + j) + lane]
+
+
+@jit
+def joint_positions(chain, poses, places):
+    """Return the joints (n, 27, 3) of poses (n, 66) with their roots at places (n, 3)."""
+    n, rows = poses.shape[0], np.empty(LANES, np.int64)
+    joints, (slots, lanes) = np.empty((n, _JOINTS, 3)), empty_lanes()
+    set_offsets(lanes, 0, LANES, chain.offsets)
+    for first in range(0, n, LANES):
+        for lane in range(LANES):
+            rows[lane] = min(first + lane, n - 1)
+        place_lanes(chain, poses, places, rows, slots, lanes)
+        for lane in range(min(LANES, n - first)):
+            read_joints(lanes, lane, joints[first + lane])
     return joints

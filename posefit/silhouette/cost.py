@@ -13,7 +13,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
-from posefit.silhouette.rasteriser import View, draw_pose, scratch
+from posefit.silhouette.rasteriser import View, draw_pose
 from posefit.silhouette.sharing import parts_of, work_through
 
 SCALE = 100.0  # S
@@ -141,7 +141,6 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     drawn.count_poses(1)
-    chain, view = body.skeleton.chain, view_of(camera)
-    work = scratch(view, len(body.radii), ANGLES)
-    image, _ = draw_pose(chain, body.radii, view, writeable(pose), writeable(translation), work)
+    place = writeable(pose), writeable(translation)
+    image = draw_pose(body.skeleton.chain, body.radii, view_of(camera), *place)
     return unpack(image, camera.width, camera.height)

@@ -6,8 +6,17 @@ Bit images are as `rasteriser` makes them.
 import numpy as np
 
 from posefit.arrays import inlined, jit
-from posefit.geometry.kernels import Chain
-from posefit.silhouette.rasteriser import NONE, STRIP_PIXELS, View, draw_pose, popcount, scratch
+from posefit.geometry.kernels import LANES, Chain
+from posefit.silhouette.rasteriser import (
+    NONE,
+    STRIP_PIXELS,
+    View,
+    fill_pose,
+    outline_poses,
+    popcount,
+    scratch,
+    set_scene,
+)
 
 
 @inlined
@@ -73,14 +82,20 @@ def count_areas(
     """
     chain = Chain(parents, angles, turns, turned, offsets)
     view = View(rotation, translation, focal, centre, width, height)
-    work = scratch(view, parents.size, poses.shape[1])
-    silhouette = np.uint64(pixels)
-    for i in range(poses.shape[0]):
-        image, box = draw_pose(chain, radii, view, poses[i], translations[i], work)
-        body, overlap = count(image, observed, valid, box)
-        areas[i, 0] = silhouette - overlap
-        areas[i, 1] = body - overlap
-        areas[i, 2] = overlap
+    n, silhouette = poses.shape[0], np.uint64(pixels)
+    rows, work = np.empty(LANES, np.int64), scratch(width, height)
+    set_scene(work, 0, LANES, offsets, radii, view)
+    for first in range(0, n, LANES):
+        for lane in range(LANES):
+            rows[lane] = min(first + lane, n - 1)
+        outline_poses(chain, poses, translations, rows, width, height, work)
+        for lane in range(min(LANES, n - first)):
+            image, box = fill_pose(lane, work)
+            body, overlap = count(image, observed, valid, box)
+            i = first + lane
+            areas[i, 0] = silhouette - overlap
+            areas[i, 1] = body - overlap
+            areas[i, 2] = overlap
 
 
 @jit

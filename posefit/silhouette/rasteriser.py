@@ -20,33 +20,30 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 from posefit.arrays import Array, inlined, jit
-from posefit.geometry.kernels import empty_frames, place_frames
+from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, place_lanes, set_offsets, set_view
 
 STRIP_PIXELS = 32  # pixels: bits of a lane
 BLOCK = 8  # rows filled at a time
 LISTED = 16  # numbers of blocks that are written at a time
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
 NONE = np.uint64(0)
+_NOWHERE = 1 << 20  # a block or strip beyond every image
 _FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
 _ZERO, _ONE, _WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP_PIXELS)
 _HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
 
-# Scratch rows, each LANES long and one lane a bone, in one flat array: offsets known to the compiler are what lets
-# it see that the loops over bones may run in vector registers.
-LANES, CONES = 32, 28  # of a row, and of those that may be in use: a body's bones, in whole registers
-_U, _V, _METRE, _U0, _V0, _R0, _R1, _SEEN = (row * LANES for row in range(8))
-_SCRATCH_ENDS = 8 * LANES  # U, V and METRE, the pixels of a metre there, are by joint; the others by bone
-_BLOCK, _BLOCKS, _FIRST, _LAST, _COUNT, _ROW = (row * LANES for row in range(6))
-_SCRATCH_BOUNDS = 6 * LANES
-_X0, _Y0, _S0, _X1, _Y1, _S1 = (row * LANES for row in range(6))
-_XP, _MP, _PA, _PB, _XQ, _MQ, _QA, _QB = (row * LANES for row in range(6, 14))
-_COLUMN, _STOP = (row * LANES for row in range(14, 16))
-_SCRATCH_OUTLINE = 16 * LANES
+# Scratch rows of LANES poses, each with ROOM for what there is of them, in one flat array as in `geometry.kernels`.
+ROOM, CONES = 32 * LANES, 26 * LANES
+_U0, _V0, _D0, _U, _V, _D = (row * ROOM for row in range(6))  # where bones start, and joints: pixels, and 1 / depth
+_SCALED = 6 * ROOM  # radii in pixels, where the depth is 1, at the start of bones and at their end
+_BLOCK, _STOP_BLOCK, _FIRST, _LAST, _ROW = (row * ROOM for row in range(5))
+_X0, _Y0, _S0, _X1, _Y1, _S1 = (row * ROOM for row in range(6))
+_XP, _MP, _PA, _PB, _XQ, _MQ, _QA, _QB = (row * ROOM for row in range(6, 14))
+_COLUMN, _STOP = (row * ROOM for row in range(14, 16))
 
 # A block to fill is one number: its first word as uint32 in the upper half; in the lower its first row, counted from
-# BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone.
-_NEXT = (BLOCK << 32) + BLOCK * LANES  # from a cone's block to the next
-_NATURAL = 0x7FFFFFFF  # an index that is provably not negative needs no check whether it counts from the end
+# BLOCK rows above the cone's top so that none is negative, and in the lowest bits the cone's place in a scratch row.
+_NEXT = (BLOCK << 32) + BLOCK * ROOM  # from a cone's block to the next
 
 
 class View(NamedTuple):
@@ -178,24 +175,44 @@ def strips_and_words(width, height):
 
 
 @inlined
+def project(parents, lanes, ends):
+    """Write where joints are in the picture, and those that bones start at; 1 / depth is 0 where nothing is drawn."""
+    for k in range(CONES + LANES):
+        z = lanes[Z + k]
+        inside = (z >= NEAR) & (z <= FAR)  # false for nan as well
+        depth = 1.0 / (z if inside else 1.0)
+        u, v = lanes[X + k] * depth if inside else 0.0, lanes[Y + k] * depth if inside else 0.0
+        ends[_U + k], ends[_V + k], ends[_D + k] = u, v, depth if inside else 0.0
+    for k in range(CONES):  # most bones start where the one before ends
+        ends[_U0 + k], ends[_V0 + k], ends[_D0 + k] = ends[_U + k], ends[_V + k], ends[_D + k]
+    for b in range(parents.size):
+        if parents[b] != b:
+            at, start = LANES * b, LANES * (parents[b] & NATURAL)
+            for k in range(LANES):
+                ends[_U0 + at + k], ends[_V0 + at + k] = ends[_U + start + k], ends[_V + start + k]
+                ends[_D0 + at + k] = ends[_D + start + k]
+
+
+@inlined
 def outline(ends, lines, bounds, strips, width, height):
     """Write each cone's bounds, and the discs and tangent segments that border it, rows counted from its top.
 
-    The bounds are its first block of rows and how many they are, none where it is not visible, and its first and last
-    strip. Blocks begin at every eighth row of the image: two cones' blocks are then the same words or none in common,
-    and a processor that has just written one can read it again at once.
+    The bounds are its first block of rows and the one after its last, and its first and last strip: of what is not
+    visible none between them. Blocks begin at every eighth row of the image: two cones' blocks are then the same words
+    or none in common, and a processor that has just written one can read it again at once.
     """
     for k in range(CONES):
-        u0, v0, r0 = ends[_U0 + k], ends[_V0 + k], ends[_R0 + k]
-        u1, v1, r1 = ends[_U + 1 + k], ends[_V + 1 + k], ends[_R1 + k]
+        u0, v0, r0 = ends[_U0 + k], ends[_V0 + k], ends[_D0 + k] * ends[_SCALED + k]
+        u1, v1, r1 = ends[_U + LANES + k], ends[_V + LANES + k], ends[_D + LANES + k] * ends[_SCALED + ROOM + k]
         dx = u1 - u0
         dy = v1 - v0
         dr = r0 - r1
         dd = dx * dx + dy * dy
         gap = dd - dr * dr
         # the two unit normals n with n . (c1 - c0) = r0 - r1: along the axis, plus or minus across it
-        along = dr / max(dd, 1e-30)
-        across = math.sqrt(max(gap, 0.0)) / max(dd, 1e-30)
+        length = 1.0 / max(dd, 1e-30)
+        along = dr * length
+        across = math.sqrt(max(gap, 0.0)) * length
         px = along * dx - across * dy
         py = along * dy + across * dx
         qx = along * dx + across * dy
@@ -204,12 +221,12 @@ def outline(ends, lines, bounds, strips, width, height):
         bottom = max(min(np.floor(max(v0 + r0, v1 + r1)) + 1.0, height), 0.0)
         left = min(max(np.ceil(min(u0 - r0, u1 - r1)), 0.0), width)
         right = max(min(np.floor(max(u0 + r0, u1 + r1)) + 1.0, width), 0.0)
-        drawn = (top < bottom) & (left < right) & (ends[_SEEN + k] > 0.0)
+        drawn = (top < bottom) & (left < right) & (ends[_D0 + k] > 0.0) & (ends[_D + LANES + k] > 0.0)
         first = np.int32(top) // BLOCK
-        bounds[_BLOCK + k] = first
-        bounds[_BLOCKS + k] = (np.int32(bottom) + (BLOCK - 1)) // BLOCK - first if drawn else 0
-        bounds[_FIRST + k] = min(np.int32(left) // STRIP_PIXELS, strips - 2)
-        bounds[_LAST + k] = (np.int32(right) - 1) // STRIP_PIXELS
+        bounds[_BLOCK + k] = first if drawn else _NOWHERE
+        bounds[_STOP_BLOCK + k] = (np.int32(bottom) + (BLOCK - 1)) // BLOCK if drawn else 0
+        bounds[_FIRST + k] = min(np.int32(left) // STRIP_PIXELS, strips - 2) if drawn else _NOWHERE
+        bounds[_LAST + k] = (np.int32(right) - 1) // STRIP_PIXELS if drawn else -1
         bounds[_ROW + k] = BLOCK * (first + 1) - np.int32(top)
         lines[_X0 + k] = u0
         lines[_Y0 + k] = v0 - top
@@ -236,59 +253,62 @@ def outline(ends, lines, bounds, strips, width, height):
 
 
 @inlined
-def bounding_box(bounds, box):
-    """Write the pixels' bounding box in the bit image: its first and last + 1 word, its first and last strip."""
-    top, bottom, left, right = np.int32(1 << 24), np.int32(0), np.int32(1 << 24), np.int32(-1)
-    for k in range(CONES):
-        drawn = bounds[_BLOCKS + k] > 0
-        top = min(top, bounds[_BLOCK + k] if drawn else top)
-        bottom = max(bottom, bounds[_BLOCK + k] + bounds[_BLOCKS + k] if drawn else bottom)
-        left = min(left, bounds[_FIRST + k] if drawn else left)
-        right = max(right, bounds[_LAST + k] if drawn else right)
+def bounding_box(lane, bounds, box):
+    """Write a pose's bounding box in the bit image: its first and last + 1 word, its first and last strip.
+
+    Returns how many windows of two strips its widest cone has.
+    """
+    top, bottom, left, right, most = _NOWHERE, 0, _NOWHERE, -1, 0
+    for b in range(CONES // LANES):
+        k = (LANES * b + lane) & NATURAL
+        top = min(top, int(bounds[_BLOCK + k]))
+        bottom = max(bottom, int(bounds[_STOP_BLOCK + k]))
+        left = min(left, int(bounds[_FIRST + k]))
+        right = max(right, int(bounds[_LAST + k]))
+        most = max(most, int(bounds[_LAST + k]) - int(bounds[_FIRST + k]))
     box[0], box[1], box[2], box[3] = top * (BLOCK // 2), bottom * (BLOCK // 2), left, right
+    return most // 2 + 1
 
 
 @inlined
-def windows(step, bounds, lines, keys, strips, stride):
-    """Write where each cone's `step`-th window of two strips lies; return how many windows the widest cone has.
+def window(step, k, bounds, lines, keys, strips, stride):
+    """Write where the `step`-th window of two strips of the cone at place k of a scratch row lies, one that it has.
 
     Most cones are no wider than a window, so that their spans are computed once.
     """
-    most = np.int32(0)
-    for k in range(CONES):
-        wide = (bounds[_LAST + k] - bounds[_FIRST + k]) // 2 + 1 if bounds[_BLOCKS + k] > 0 else 0
-        strip = min(bounds[_FIRST + k] + 2 * step, strips - 2)
-        bounds[_COUNT + k] = bounds[_BLOCKS + k] if step < wide else 0
-        place = strip * stride + BLOCK * bounds[_BLOCK + k]
-        keys[k] = (np.int64(place) << 32) + np.int64(bounds[_ROW + k] * LANES + k)
-        column = np.float32(np.int32(STRIP_PIXELS * strip))
-        lines[_COLUMN + k] = column
-        lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, _WINDOW)
-        most = max(most, np.int32(wide))
-    return most
+    strip = min(bounds[_FIRST + k] + 2 * step, strips - 2)
+    place = strip * stride + BLOCK * bounds[_BLOCK + k]
+    keys[k] = (np.int64(place) << 32) + np.int64(bounds[_ROW + k] * ROOM + k)
+    column = np.float32(np.int32(STRIP_PIXELS * strip))
+    lines[_COLUMN + k] = column
+    lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, _WINDOW)
 
 
 @inlined
-def list_blocks(bones, bounds, keys, blocks):
-    """Write the blocks to fill, each one number of place, row and cone; return how many.
+def list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride):
+    """Write the blocks to fill of a pose, each one number of place, row and cone; return how many.
 
     They are listed so many at a time, whether or not a cone has them: a mispredicted branch costs as much as a block.
     """
     end = 0
-    for j in range(bones):
-        count = int(bounds[_COUNT + j])
-        for i in range(0, count, LISTED):
-            list_steps(blocks, end + i, keys[j] + i * _NEXT, _NEXT)
-        end += count
+    for b in range(CONES // LANES):
+        k = (LANES * b + lane) & NATURAL
+        if step == 0 or bounds[_FIRST + k] + 2 * step <= bounds[_LAST + k]:
+            if step:
+                window(step, k, bounds, lines, keys, strips, stride)
+            count = max(int(bounds[_STOP_BLOCK + k]) - int(bounds[_BLOCK + k]), 0)
+            for i in range(0, count, LISTED):
+                list_steps(blocks, end + i, keys[k] + i * _NEXT, _NEXT)
+            end += count
     return end
 
 
 @inlined
 def columns(spans, lines, j, row):
-    """Write the first column of cone j, and the one after its last, in a block's eight rows, `row` being the first.
+    """Write the first column of the cone at place j of a scratch row, and the one after its last, in a block's rows.
 
-    They are counted from the first pixel of the cone's window. Rows above and below the cone are empty: what a row
-    does not cross is nan, which min and max pass over.
+    `row` is the first of them. Columns are counted from the first pixel of the cone's window. Rows above and below the
+    cone are empty: what a row does not cross is nan, which min and max pass over.
     """
     column, stop = lines[_COLUMN + j], lines[_STOP + j]
     x0, y0, s0 = lines[_X0 + j], lines[_Y0 + j], lines[_S0 + j]
@@ -314,77 +334,76 @@ def columns(spans, lines, j, row):
         spans[k + BLOCK] = np.int32(min(high - column + _ONE, stop))
 
 
-@inlined
-def rasterise(chain, radii, view, frames, ends, lines, bounds, spans, keys, blocks, box, pixels, image):
-    """Set the pixels of every cone of one body in a clear bit image, and its bounding box."""
-    rotation = view.rotation
-    # read once: what is read within a loop that also writes keeps it out of vector registers
-    xa, xb, xc = rotation[0, 0], rotation[0, 1], rotation[0, 2]
-    ya, yb, yc = rotation[1, 0], rotation[1, 1], rotation[1, 2]
-    za, zb, zc = rotation[2, 0], rotation[2, 1], rotation[2, 2]
-    x0, y0, z0 = view.translation[0], view.translation[1], view.translation[2]
-    fu, fv, cu, cv = view.focal[0], view.focal[1], view.centre[0], view.centre[1]
-    scale = math.sqrt(view.focal[0] * view.focal[1])
-    for j in range(frames.shape[0]):
-        a, b, c = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
-        x = xa * a + xb * b + xc * c + x0
-        y = ya * a + yb * b + yc * c + y0
-        z = za * a + zb * b + zc * c + z0
-        inside = (z >= NEAR) & (z <= FAR)  # false for nan as well
-        depth = 1.0 / (z if inside else 1.0)
-        ends[_U + j] = cu + fu * x * depth - 0.5 if inside else 0.0
-        ends[_V + j] = cv + fv * y * depth - 0.5 if inside else 0.0
-        ends[_METRE + j] = scale * depth if inside else 0.0
-    for b in range(chain.parents.size):
-        p = chain.parents[b] & _NATURAL
-        ends[_U0 + b] = ends[_U + p]
-        ends[_V0 + b] = ends[_V + p]
-        ends[_R0 + b] = ends[_METRE + p] * radii[b, 0]
-        ends[_R1 + b] = ends[_METRE + 1 + b] * radii[b, 1]
-        ends[_SEEN + b] = min(ends[_METRE + p], ends[_METRE + 1 + b])
-    strips, stride = image.shape[0], 2 * image.shape[1]
-    outline(ends, lines, bounds, strips, float(view.width), float(view.height))
-    bounding_box(bounds, box)
-    step = most = 0
-    while step <= most:
-        most = windows(step, bounds, lines, keys, strips, stride) - 1
-        for i in range(list_blocks(chain.parents.size, bounds, keys, blocks)):
-            block = blocks[i]
-            columns(spans, lines, block & (LANES - 1), np.float32((block & 0xFFFFFFFF) // LANES))
-            set_spans(pixels, block >> 32, stride, spans)
-        step += 1
-
-
 @jit
-def scratch(view, bones, angles):
-    """Return the work arrays of one thread: for the kinematics, for the outlines, and a clear bit image."""
-    image = np.empty(strips_and_words(view.width, view.height), np.uint64)
+def scratch(width, height):
+    """Return the work arrays of one thread: for the kinematics, for outlines and filling, and a clear bit image."""
+    image = np.empty(strips_and_words(width, height), np.uint64)
     for strip in range(image.shape[0]):
         for i in range(image.shape[1]):
             image[strip, i] = NONE
-    pixels = image.reshape(-1).view(np.uint32)
-    listed = bones * (view.height // BLOCK + 1) + LISTED
-    kinematics = (np.empty((angles,)), np.empty((angles,)), empty_frames(bones + 1))
-    ends = np.empty((_SCRATCH_ENDS,))
-    for k in range(_SCRATCH_ENDS):
-        ends[k] = 0.0  # entries beyond the bones are never visible
-    outlines = (
-        ends,
-        np.empty((_SCRATCH_OUTLINE,), np.float32),
-        np.empty((_SCRATCH_BOUNDS,), np.int32),
-        np.empty((2 * BLOCK,), np.int32),
-        np.empty((LANES,), np.int64),
-        np.empty((listed,), np.int64),
-        np.empty((4,), np.int64),
-        pixels,
+    filling = (
+        np.empty(8 * ROOM),
+        np.empty(16 * ROOM, np.float32),
+        np.empty(5 * ROOM, np.int32),
+        np.empty(2 * BLOCK, np.int32),
+        np.empty(ROOM, np.int64),
+        np.empty((CONES // LANES) * (height // BLOCK + 1) + LISTED, np.int64),
+        np.empty(4, np.int64),
+        image.reshape(-1).view(np.uint32),
     )
-    return kinematics, outlines, image
+    return empty_lanes(), filling, image
+
+
+@inlined
+def set_scene(work, first, stop, offsets, radii, view):
+    """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
+    (_, lanes), (ends, _, _, _, _, _, _, _), _ = work
+    set_offsets(lanes, first, stop, offsets)
+    centre = view.centre[0] - 0.5, view.centre[1] - 0.5
+    set_view(lanes, first, stop, view.rotation, view.translation, view.focal, centre)
+    scale = math.sqrt(view.focal[0] * view.focal[1])
+    for b in range(radii.shape[0]):
+        for end in range(2):
+            for lane in range(first, stop):
+                ends[_SCALED + end * ROOM + LANES * b + lane] = scale * radii[b, end]
 
 
 @jit
-def draw_pose(chain, radii, view, pose, translation, work):
-    """Set the pixels of one body in the clear bit image of `work`, which `scratch` makes; return it and its box."""
-    (sines, cosines, frames), (ends, lines, bounds, spans, keys, blocks, box, pixels), image = work
-    place_frames(chain, pose, translation, sines, cosines, frames)
-    rasterise(chain, radii, view, frames, ends, lines, bounds, spans, keys, blocks, box, pixels, image)
+def outline_poses(chain, poses, places, rows, width, height, work):
+    """Outline the poses (n, 66) at places (n, 3) that are in these rows (LANES,), each in the scene of its lane.
+
+    `work` is what `scratch` makes and `set_scene` fills.
+    """
+    (slots, lanes), (ends, lines, bounds, _, keys, _, _, _), image = work
+    place_lanes(chain, poses, places, rows, slots, lanes)
+    project(chain.parents, lanes, ends)
+    strips, stride = image.shape[0], 2 * image.shape[1]
+    outline(ends, lines, bounds, strips, float(width), float(height))
+    for k in range(CONES):
+        window(0, k, bounds, lines, keys, strips, stride)
+
+
+@jit
+def fill_pose(lane, work):
+    """Set the pixels of an outlined pose in the clear bit image of `work`; return it and its bounding box.
+
+    The lane's outline is used up.
+    """
+    _, (_, lines, bounds, spans, keys, blocks, box, pixels), image = work
+    strips, stride = image.shape[0], 2 * image.shape[1]
+    for step in range(bounding_box(lane, bounds, box)):
+        for i in range(list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride)):
+            block = blocks[i]
+            columns(spans, lines, block & (ROOM - 1), np.float32((block & 0xFFFFFFFF) // ROOM))
+            set_spans(pixels, block >> 32, stride, spans)
     return image, box
+
+
+@jit
+def draw_pose(chain, radii, view, pose, place):
+    """Return the bit image of one body, pose (66,), root at a place (3,)."""
+    work = scratch(view.width, view.height)
+    set_scene(work, 0, LANES, chain.offsets, radii, view)
+    rows = np.zeros(LANES, np.int64)
+    outline_poses(chain, pose.reshape(1, -1), place.reshape(1, -1), rows, view.width, view.height, work)
+    return fill_pose(0, work)[0]

@@ -7,7 +7,7 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
-from posefit.geometry.kernels import sines_cosines
+from posefit.geometry.kernels import sine_cosine
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import (
     ANGLES,
@@ -32,8 +32,7 @@ from tests.geometry.turns import about, chained
 
 def test_polynomial_sines_are_numpys_over_many_turns() -> None:
     x = np.linspace(-50.0, 50.0, 100_001)
-    s, c = np.empty_like(x), np.empty_like(x)
-    sines_cosines(x, s, c)
+    s, c = np.transpose([sine_cosine(angle) for angle in x])
     np.testing.assert_allclose(s, np.sin(x), rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(c, np.cos(x), rtol=0.0, atol=1e-10)
 
