@@ -23,6 +23,7 @@ HELD_OUT_PEOPLE = ("16", "49", "135")
 TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
 STEP = 1e-4  # radians, and what a stored component is a whole multiple of
 SIZES = (6, 7, 13, 17, 21, 37)  # components of the boxes of 9, 10, 16, 20, 24 and 40 dimensions
+SHOW_NOTHING = (49, 61)  # joint angles that turn a hand about its forearm, unless fingers move as well
 HELD_OUT_GROUP = "held out"  # the name of the box learned from all people for training
 
 
@@ -87,7 +88,8 @@ class AngleBox:
     """Latents are joint angles themselves, those that move the most; the others stay at their mean."""
 
     def __init__(self, learned: Learned, count: int) -> None:
-        self.angles = np.sort(learned.order[:count])
+        order = learned.order if count == len(learned.order) else learned.order[~np.isin(learned.order, SHOW_NOTHING)]
+        self.angles = np.sort(order[:count])
         self.mean, self.low, self.high = learned.mean, learned.low[self.angles], learned.high[self.angles]
         self.reach = 0.5 * (self.high - self.low)
 
