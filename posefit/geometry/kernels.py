@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
 
-LANES = 8  # poses side by side: two vector registers of AVX2, one of AVX-512
+LANES = 4  # poses side by side: one vector register of AVX2; with more, a call for one pose takes longer
 
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.

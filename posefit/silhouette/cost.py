@@ -10,10 +10,11 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.kernels import LANES
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
-from posefit.silhouette.rasteriser import View, draw_pose
+from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
 from posefit.silhouette.sharing import parts_of, work_through
 
 SCALE = 100.0  # S
@@ -141,6 +142,8 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     drawn.count_poses(1)
-    place = writeable(pose), writeable(translation)
-    image = draw_pose(body.skeleton.chain, body.radii, view_of(camera), *place)
-    return unpack(image, camera.width, camera.height)
+    chain, (width, height) = body.skeleton.chain, (camera.width, camera.height)
+    work, rows = scratch(width, height), np.zeros(LANES, dtype=np.int64)
+    set_scene(work, 0, LANES, chain.offsets, body.radii, view_of(camera))
+    outline_poses(chain, writeable(pose)[None], writeable(translation)[None], rows, width, height, work)
+    return unpack(fill_pose(0, work)[0], width, height)

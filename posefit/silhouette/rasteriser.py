@@ -354,7 +354,7 @@ def scratch(width, height):
     return empty_lanes(), filling, image
 
 
-@inlined
+@jit
 def set_scene(work, first, stop, offsets, radii, view):
     """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
     (_, lanes), (ends, _, _, _, _, _, _, _), _ = work
@@ -397,13 +397,3 @@ def fill_pose(lane, work):
             columns(spans, lines, block & (ROOM - 1), np.float32((block & 0xFFFFFFFF) // ROOM))
             set_spans(pixels, block >> 32, stride, spans)
     return image, box
-
-
-@jit
-def draw_pose(chain, radii, view, pose, place):
-    """Return the bit image of one body, pose (66,), root at a place (3,)."""
-    work = scratch(view.width, view.height)
-    set_scene(work, 0, LANES, chain.offsets, radii, view)
-    rows = np.zeros(LANES, np.int64)
-    outline_poses(chain, pose.reshape(1, -1), place.reshape(1, -1), rows, view.width, view.height, work)
-    return fill_pose(0, work)[0]
