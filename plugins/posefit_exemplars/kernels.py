@@ -34,31 +34,31 @@ def cheapest_steps(ahead, ways, totals, rows, near, codes, bounds, scale, limit,
     infinity; it gets the totals below `limit`, `owners` (K,) whose they are, and `touched` (K,) which poses they are.
     """
     count = 0
-    squares = np.empty((len(ahead), np.diff(bounds).max()), dtype=np.float32)
+    longest = np.diff(bounds).max()
+    away, nearest = np.empty(longest, dtype=np.float32), np.empty(longest, dtype=np.float32)
     for r in rows:
+        if totals[r] >= limit:
+            continue
+        enough = np.float32((limit - totals[r]) / scale)
         for g in near[r]:
             first, stop = bounds[g], bounds[g + 1]
+            size = stop - first
+            nearest[:size] = enough
             for s in range(len(ahead)):
-                if totals[r] + ways[s, r] < limit:
-                    away = squares[s, : stop - first]
-                    away[:] = 0.0
-                    for d in range(len(codes)):  # the inner loop takes many poses at once
-                        values, middle = codes[d, first:stop], ahead[s, r, d]
-                        for k in range(len(away)):
-                            step = values[k] - middle
-                            away[k] += step * step
-            for k in range(first, stop):
-                best = min(least[k], limit)
-                cheaper = False
-                for s in range(len(ahead)):
-                    before = totals[r] + ways[s, r]
-                    if before < best:
-                        away_by = squares[s, k - first]
-                        if away_by < np.float32((best - before) / scale):
-                            best, cheaper = before + scale * away_by, True
-                if cheaper:
-                    if least[k] == np.inf:
-                        touched[count] = k
-                        count += 1
-                    least[k], owners[k] = best, r
+                away[:size] = ways[s, r] / scale
+                for d in range(len(codes)):  # the inner loops take many poses at once
+                    values, middle = codes[d, first:stop], ahead[s, r, d]
+                    for k in range(size):
+                        step = values[k] - middle
+                        away[k] += step * step
+                for k in range(size):
+                    nearest[k] = min(nearest[k], away[k])
+            for k in range(size):
+                if nearest[k] < enough:
+                    total, pose = totals[r] + scale * nearest[k], first + k
+                    if total < least[pose]:
+                        if least[pose] == np.inf:
+                            touched[count] = pose
+                            count += 1
+                        least[pose], owners[pose] = total, r
     return count
