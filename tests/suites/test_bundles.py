@@ -175,7 +175,7 @@ def no_dimension(contents: Contents, rng: np.random.Generator) -> None:
     entry, place = contents["manifest"]["runs"][k], of_run(contents, k)[1]
     longer = np.pad(contents["points"][place].reshape(-1, entry["dimension"]), ((0, 0), (0, 1))).ravel()
     contents["points"] = np.concatenate([contents["points"][: place.start], longer, contents["points"][place.stop :]])
-    entry["dimension"] += 1
+    entry["dimension"] += 2
 
 
 def another_dimension(contents: Contents, rng: np.random.Generator) -> None:
