@@ -173,7 +173,7 @@ def no_function(contents: Contents, rng: np.random.Generator) -> None:
 def no_dimension(contents: Contents, rng: np.random.Generator) -> None:
     k = any_run(contents, rng)
     entry, place = contents["manifest"]["runs"][k], of_run(contents, k)[1]
-    longer = np.pad(contents["points"][place].reshape(-1, entry["dimension"]), ((0, 0), (0, 1))).ravel()
+    longer = np.pad(contents["points"][place].reshape(-1, entry["dimension"]), ((0, 0), (0, 2))).ravel()
     contents["points"] = np.concatenate([contents["points"][: place.start], longer, contents["points"][place.stop :]])
     entry["dimension"] += 2
 
