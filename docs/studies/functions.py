@@ -109,7 +109,7 @@ def correlation(first: Array, second: Array) -> float:
 
 
 def features(cost: Cost, known: Array, rng: np.random.Generator) -> tuple[dict[str, float], list[tuple[float, Array]]]:
-    """Return the features of a function, and the best cost and point of each basin found, the optimum's first.
+    """Return the features of a function, and the best cost and point of each basin, the optimum's first.
 
     `known` (d,) is the optimum, or a point near it.
     """
@@ -161,8 +161,8 @@ def bbob(number: int, dimension: int, instance: int) -> dict[str, float]:
     def cost(points: Array) -> Array:
         return np.array([problem(point) for point in 5.0 * points])  # its box is [-5, 5]^d
 
-    found, _ = features(cost, np.array(problem.optimum.x) / 5.0, np.random.default_rng([instance, number]))
-    return {**found, "infeasible": 0.0}
+    row, _ = features(cost, np.array(problem.optimum.x) / 5.0, np.random.default_rng([instance, number]))
+    return {**row, "infeasible": 0.0}
 
 
 def measured(
@@ -173,8 +173,8 @@ def measured(
     Each budget is a search of its own, as some methods plan ahead; what has reached the last target is not repeated.
     """
     problem, rng = suite(SUITE, number, instance, dimension), np.random.default_rng([instance, number])
-    found, basins = features(problem.evaluate, np.array(problem.made.truth), rng)
-    found["infeasible"] = float(1.0 - problem.space.feasible(rng.uniform(-1.0, 1.0, (POINTS, dimension))).mean())
+    row, basins = features(problem.evaluate, np.array(problem.made.truth), rng)
+    row["infeasible"] = float(1.0 - problem.space.feasible(rng.uniform(-1.0, 1.0, (POINTS, dimension))).mean())
     reached: dict[str, list[float]] = {name: [] for name in METHODS}
     for method, costs in reached.items():
         problem.reset()
@@ -183,7 +183,7 @@ def measured(
                 problem.reset()
                 run_on(problem, method, evaluations=budget * dimension)
             costs.append(problem.best_observed_fvalue1)
-    return found, problem.targets, reached, sliced(problem.evaluate, basins, rng, f"{number} {problem.function.name}")
+    return row, problem.targets, reached, sliced(problem.evaluate, basins, rng, f"{number} {problem.function.name}")
 
 
 def sliced(cost: Cost, basins: list[tuple[float, Array]], rng: np.random.Generator, title: str) -> Array:
@@ -232,12 +232,12 @@ def compared(rows: Sequence[Mapping[str, float]]) -> Array:
 
 def nearest(keys: Sequence[Key], rows: Sequence[Mapping[str, float]], suites: Sequence[str]) -> dict[Key, Key]:
     """Return of each function, or instance, the nearest other of some suites in as many dimensions, if any."""
-    values, found = compared(rows), {}
+    values, neighbours = compared(rows), {}
     for key, value in zip(keys, values, strict=True):
         others = [n for n, one in enumerate(keys) if one != key and one[0] in suites and one[2] == key[2]]
         if others:
-            found[key] = keys[min(others, key=lambda n: float(np.linalg.norm(values[n] - value)))]
-    return found
+            neighbours[key] = keys[min(others, key=lambda n: float(np.linalg.norm(values[n] - value)))]
+    return neighbours
 
 
 def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
@@ -252,9 +252,9 @@ def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
 
 
 def share_lines(shares: Mapping[int, Sequence[Shares]]) -> Iterator[str]:
-    """Yield the tables of targets reached, and of how alike methods are ordered on two functions.
+    """Yield the tables of targets reached, and of how similarly two functions order methods.
 
-    `shares` are by function those of all its instances, and of two halves of them, which are how alike one function is.
+    `shares` are by function those of all its instances, and of two halves of them: no order is more similar.
     """
     cells = []
     for number, (table, *_) in shares.items():
@@ -282,23 +282,28 @@ def main(
 ) -> None:
     if picture is not None:
         check_new(picture)
+    chosen = [suite_function(number) for number in functions] or FUNCTIONS
     sizes = {
         one.number: dimension or one.dimensions[0]
-        for one in FUNCTIONS
-        if one.number in (functions or [one.number]) and (dimension or one.dimensions[0]) in one.dimensions
+        for one in chosen
+        if (dimension or one.dimensions[0]) in one.dimensions
     }
+    if not sizes:
+        raise click.UsageError(f"dimension must be one that a chosen function has, got {dimension}")
     problems = [(SUITE, number, d, instance) for number, d in sizes.items() for instance in HELD_OUT[:instances]]
     others = [("bbob", number, d, 1) for d in dict.fromkeys(sizes.values()) for number in BBOB if find_spec("ioh")]
     jobs: dict[Key, Any] = {key: partial(measured, *key[1:]) for key in problems}
     results = each(jobs | {key: partial(bbob, *key[1:]) for key in others}, workers or 1, bar)
-    found = {key: results[key][0] for key in problems}
-    rows = {(SUITE, n, d, 0): medians([found[key] for key in problems if key[1] == n]) for n, d in sizes.items()}
+    own_features = {key: results[key][0] for key in problems}
+    rows = {(SUITE, n, d, 0): medians([own_features[key] for key in problems if key[1] == n]) for n, d in sizes.items()}
     click.echo("\n".join(feature_lines(rows | {key: medians([results[key]]) for key in others})))
-    near = nearest(problems, list(found.values()), [SUITE])
+    near = nearest(problems, list(own_features.values()), [SUITE])
     own = {number: sum(key[1] == number == other[1] for key, other in near.items()) for number in sizes}
     texts = [f"{count} of function {number}" for number, count in own.items()]
     click.echo(f"\nInstances nearest to one of their own function, of {instances} each: {', '.join(texts)}")
-    click.echo(f"Points that cost something else when asked again: {max(row['noise'] for row in found.values()):.0%}\n")
+    click.echo(
+        f"Points that cost something else when asked again: {max(row['noise'] for row in own_features.values()):.0%}\n"
+    )
     shares = {}
     for number in sizes:
         mine = [results[key] for key in problems if key[1] == number]

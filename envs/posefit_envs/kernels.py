@@ -13,7 +13,7 @@ from posefit.fitting.kernels import move_to_borders, unpack_proposals
 from posefit.geometry.kernels import LANES, empty_lanes, place_lanes, read_joints, set_offsets
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
-from posefit_swarm.kernels import remember, step
+from posefit_swarm.kernels import step, update_best
 
 
 class Scenes(NamedTuple):
@@ -147,7 +147,7 @@ def teach_swarms(rows, chosen, moved, costs, swarms):
         for k in range(particles):
             for j in range(d):
                 swarms.positions[i, s, k, j] = moved[i, k, j]
-            leader = remember(k, moved[i, k], costs[i, k], bests, best_costs, leader)
+            leader = update_best(k, moved[i, k], costs[i, k], bests, best_costs, leader)
         spread = 0.0
         for j in range(d):
             mean, square = 0.0, 0.0

@@ -99,7 +99,7 @@ def move(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_bes
 
 
 @jit
-def remember(i, position, cost, best, best_costs, leader):
+def update_best(i, position, cost, best, best_costs, leader):
     """Make a position (d,) that costs less the best of particle i; return the row of the best of all."""
     if cost < best_costs[i]:  # SAPSO A1.2b
         for j in range(position.size):
@@ -129,7 +129,7 @@ def accept(moved, costs, chances, temperature, kept, swarm, accepted):
                 velocity[i, j] *= kept
         if accepted[i]:
             position_costs[i] = costs[i]
-        leader = remember(i, position[i], position_costs[i], best, best_costs, leader)
+        leader = update_best(i, position[i], position_costs[i], best, best_costs, leader)
     return leader
 
 

@@ -54,7 +54,7 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
         bundles[name] = bundle
         notes += [f"Seeds of {name} are not checked. {reason}." for reason in bundle.unrepeatable]
     if len(bundles) == 1 and not unranked:
-        say("no bundle was found: the board shows posefit's own methods alone")
+        say("expected bundles to rank, got none: the board shows posefit's own methods alone")
     ranked = []
     for name, bundle in bundles.items():
         for of_method in _by_method(bundle.runs):

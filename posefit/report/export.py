@@ -157,8 +157,8 @@ def _write_problem(folder: Path, name: str, number: int, algorithm: Mapping[str,
 def write_coco(runs: Iterable[SuiteRun], path: str | Path) -> None:
     """Write a new folder `path` with a folder a method, as COCO's logger of bbob has them; its reader is cocopp.
 
-    Costs are above the true pose's, and at least 0. A run's way with infeasible proposals and its budget are not told
-    apart. Raises ValueError where the folder exists or cannot be written.
+    Costs are above the true pose's, and at least 0. A run's way with infeasible proposals and its budget are not
+    distinguished. Raises ValueError where the folder exists or cannot be written.
     """
     groups: dict[str, list[SuiteRun]] = {}
     for run in sorted(runs, key=lambda run: (run.function, run.dimension, run.instance, run.seed)):

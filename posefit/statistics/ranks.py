@@ -20,7 +20,7 @@ from posefit.errors import InputError
 from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
-FEW = 13  # blocks, for which scipy has exact p-values with ties, too, and goes through all signs one by one
+MAX_EXACT_TIES = 13  # blocks, for which scipy has exact p-values with ties, too, and goes through all signs one by one
 LETTERS = ascii_letters  # of as many groups at most
 _SHAPE = ("methods", "instances", "seeds")
 
@@ -109,7 +109,7 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
 def _signed_rank(differences: Array) -> float:
     if not differences.any():
         return 1.0
-    if len(differences) > FEW:
+    if len(differences) > MAX_EXACT_TIES:
         return float(stats.wilcoxon(differences, zero_method="pratt").pvalue)
     ranks = np.rint(2.0 * stats.rankdata(np.abs(differences))).astype(np.int64)  # whole numbers, though ties share one
     positive = int(ranks[differences > 0.0].sum())

@@ -212,18 +212,18 @@ def test_features_of_functions_that_are_known(monkeypatch: pytest.MonkeyPatch) -
     scales = 100.0 ** np.linspace(0.0, 1.0, 3)  # a quadratic whose Hessian has a condition number of 100
     quadratic, rng = (lambda points: (scales * points**2).sum(axis=1)), np.random.default_rng(1)
     for cost in (quadratic, lambda points: np.sqrt(quadratic(points))):
-        found, basins = functions.features(cost, np.full(3, 0.001), rng)
-        assert found["conditioning"] == pytest.approx(100.0, rel=0.1)
-        assert (found["elsewhere"], found["basins"], found["rises"], found["flat"], found["noise"]) == (0, 1, 0, 0, 0)
+        row, basins = functions.features(cost, np.full(3, 0.001), rng)
+        assert row["conditioning"] == pytest.approx(100.0, rel=0.1)
+        assert (row["elsewhere"], row["basins"], row["rises"], row["flat"], row["noise"]) == (0, 1, 0, 0, 0)
         assert len(basins) == 1
         assert np.abs(basins[0][1]).max() < 1e-3
-    found, _ = functions.features(quadratic, np.zeros(3), rng)
-    assert found["interaction"] < 1e-9
+    row, _ = functions.features(quadratic, np.zeros(3), rng)
+    assert row["interaction"] < 1e-9
     # two wells, at 0.5 and -0.5 along each coordinate; the second costs 0.1 at its bottom
     wells = lambda points: np.minimum(((points - 0.5) ** 2).sum(axis=1), ((points + 0.5) ** 2).sum(axis=1) + 0.1)  # noqa: E731
-    found, basins = functions.features(wells, np.full(3, 0.5), rng)
-    assert found["basins"] == 2
-    assert 0.0 < found["elsewhere"] < 1.0
+    row, basins = functions.features(wells, np.full(3, 0.5), rng)
+    assert row["basins"] == 2
+    assert 0.0 < row["elsewhere"] < 1.0
     assert [np.round(point, 2).tolist() for _, point in basins] == [[0.5] * 3, [-0.5] * 3]
     assert functions.sliced(wells, basins, rng, "wells").shape == (functions.TILE + 26, functions.TILE + 4, 3)
 
@@ -240,8 +240,8 @@ def test_shares_are_of_problems_and_targets_and_the_best_of_all_is_so_on_each_pr
 def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"BUDGETS": (6, 7), "DESCENTS": 2, "LONGEST": 20}.items():
         monkeypatch.setattr(functions, name, value)
-    found, targets, costs, picture = functions.measured(2, 9, 10_000)
-    rows = {(functions.SUITE, 2, 9, 0): functions.medians([found])}
+    row, targets, costs, picture = functions.measured(2, 9, 10_000)
+    rows = {(functions.SUITE, 2, 9, 0): functions.medians([row])}
     rows |= {("bbob", number, 9, 1): {**rows[functions.SUITE, 2, 9, 0], "rises": 0.1 * number} for number in (1, 3)}
     lines = list(functions.feature_lines(rows))
     assert lines[2].startswith("| 2 next frame | 9 |")

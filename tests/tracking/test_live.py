@@ -128,10 +128,10 @@ class Marked:
 
 
 def test_a_method_gets_the_landmarks_of_a_segmenter_also_through_a_lens(monkeypatch, every_frame, walk):
-    seen, follow = [], SynthesisTracker.track
+    observed, follow = [], SynthesisTracker.track
 
     def noted(observation):
-        seen.append(observation.landmarks)
+        observed.append(observation.landmarks)
         return observation
 
     monkeypatch.setattr(Extraction, "segmenter", lambda _how, _film: Marked())
@@ -142,10 +142,10 @@ def test_a_method_gets_the_landmarks_of_a_segmenter_also_through_a_lens(monkeypa
     lens = Calibration("lens", (160, 120), pinhole, np.array([-0.2, 0.0, 0.0, 0.0]), None, None)
     for camera in ((), (lens,)):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(ppm)))
-        seen.clear()
+        observed.clear()
         assert len(list(track_live(**QUICK, extraction=Extraction("mixture"), camera=camera))) == len(walk)
         point = [[5.0, 7.0, 0.5]] if not camera else lens.straightened(np.array([[5.0, 7.0, 0.5]]), (160, 120))
-        for landmarks in seen:
+        for landmarks in observed:
             np.testing.assert_allclose(landmarks[0, :1], point)
             assert not landmarks[0, 1:, 2].any()
 
