@@ -3,7 +3,7 @@
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.landmarks import landmark_costs
+from posefit.fitting.landmarks import GROUPS, landmark_likelihoods
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
@@ -55,11 +55,11 @@ class FrameCosts:
         """Return the costs (n,) of poses."""
         return pose_costs(*self._scene, poses, places, threads=self._task.threads)[0]
 
-    def of_landmarks(self, poses: Array, places: Array) -> Array:
-        """Return the `landmark_costs` (n,) of poses: 0 where the frame has no landmarks."""
+    def landmarks(self, poses: Array, places: Array) -> Array:
+        """Return the `landmark_likelihoods` (n, K, 2) of poses: 0 where the frame has no landmarks."""
         if self._observation.landmarks is None:
-            return np.zeros(len(poses))
-        return landmark_costs(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
+            return np.zeros((len(poses), len(GROUPS) * len(self._task.cameras), 2))
+        return landmark_likelihoods(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
 
     def contours(self, place: Array) -> FrameContours:
         """Return the contours of the masks, of a person whose root is about at `place` (3,)."""

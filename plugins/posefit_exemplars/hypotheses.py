@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.landmarks import EXCHANGED, exchanged_given, exchanged_next, landmark_costs
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
@@ -78,6 +79,7 @@ class Hypotheses:
     turns: Array = field(repr=False)  # (n, 66) radians since the frame before; 0 for fresh ones, as both that follow
     shifts: Array = field(repr=False)  # (n, 3) metres
     rates: Array = field(repr=False)  # (n, 27, 3) metres
+    exchanged: Array = field(repr=False)  # (n, K) how likely left and right of groups of landmarks are exchanged
     parents: Rows = field(repr=False)
     totals: Array = field(repr=False)
 
@@ -202,20 +204,25 @@ class HypothesisFilter:
             on, since = origins >= 0, origins[origins >= 0]
             turns[on], shifts[on] = wrapped(poses[on] - latest.poses[since]), places[on] - latest.places[since]
             rates[on] = joints[on] - latest.joints[since]
-        hypotheses = Hypotheses(poses, places, joints, turns, shifts, rates, origins, np.zeros(len(poses)))
-        fits, steps = np.zeros(len(poses)), None
+        likelihoods = look.landmarks(poses, places)
+        exchanged = np.full((1, likelihoods.shape[1]), EXCHANGED) if latest is None else exchanged_next(latest.exchanged)
+        landmarks = landmark_costs(likelihoods, exchanged[:, None])
+        hypotheses = Hypotheses(poses, places, joints, turns, shifts, rates, exchanged, origins, np.zeros(len(poses)))
+        fits, steps = landmarks.min(axis=0), None
         if look.usable:
             _, squares = self._exemplars.similar(poses, 1, SIMILAR)
             costs = look.full(poses, places)
             self._costs.append(float(costs.min()))
-            fits = costs / (noise * self._temperature) + look.of_landmarks(poses, places)
+            fits += costs / (noise * self._temperature)
             fits += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if latest is not None:
-            steps = step_costs(self._spread, latest, hypotheses)
+            steps = step_costs(self._spread, latest, hypotheses) + landmarks - landmarks.min(axis=0)
             if look.root is None:
                 expected = latest.places + latest.shifts
                 steps += root_deviation_costs(places, expected[:, None], look.eye, self._steps)
-        return frame_states(hypotheses, fits, before, steps), used
+        states = frame_states(hypotheses, fits, before, steps)
+        exchanged = exchanged_given(likelihoods, exchanged[states.beam.parents if latest is not None else 0])
+        return replace(states, beam=replace(states.beam, exchanged=exchanged)), used
 
     def _noise(self, look: FrameCosts, poses: Array, places: Array) -> float:
         """Return how many times less precise masks are than clean ones, 1 or more, by the best frames so far.

@@ -15,6 +15,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
+from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
 from posefit.tracking.method import Method, prepare
@@ -225,7 +226,7 @@ class ExemplarTracker:
         best = diverse_best(self.exemplars, beam, totals, full)
         beam = beam.chosen(best)
         poses = self._poses(beam)
-        fits = away[best] + look.full(poses, beam.places) / self.temperature + look.of_landmarks(poses, beam.places)
+        fits = away[best] + look.full(poses, beam.places) / self.temperature + landmark_costs(look.landmarks(poses, beam.places))
         used += len(beam)
         best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used

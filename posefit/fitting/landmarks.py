@@ -15,27 +15,49 @@ GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
 DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
 EXCHANGED = 0.25  # share of the frames in which left and right of a group are exchanged
+PERSISTENCE = 0.5  # correlation of that from one frame to the next, a thirtieth of a second later
 
 
-def landmark_costs(
+def landmark_likelihoods(
     skeleton: Skeleton, cameras: Sequence[Camera], landmarks: Array, poses: Array, places: Array
 ) -> Array:
-    """Return how unlikely poses (n, 66) at places (n, 3) make landmarks (V, 27, 3): negative log-likelihoods (n,).
+    """Return how likely poses (n, 66) at places (n, 3) make landmarks (V, 27, 3): logarithms (n, K, 2).
 
-    Landmarks are those of an `Observation`. A joint counts by its confidence; distances have a Cauchy distribution.
+    K are the groups of each view; each is as it is, or has left and right exchanged. Landmarks are those of an
+    `Observation`. A joint counts by its confidence; distances have a Cauchy distribution.
     """
-    joints, total = skeleton.joints(poses, places), np.zeros(len(poses))
+    joints, found = skeleton.joints(poses, places), []
     for camera, view in zip(cameras, landmarks, strict=True):
         pixels, depths = camera.project(joints)
         metres = np.maximum(depths, NEAR) / np.sqrt(camera.focal.prod())  # of a pixel
         for group in GROUPS:
-            direct, exchanged = (
+            both = [
                 np.log1p(0.5 * (_distances(pixels[:, group], view[same]) * metres[:, group] / DEVIATION) ** 2)
                 @ view[same, 2]
                 for same in (group, MIRRORED[group])
-            )
-            total -= np.logaddexp(np.log(1.0 - EXCHANGED) - direct, np.log(EXCHANGED) - exchanged)
-    return total
+            ]
+            found.append(-np.stack(both, axis=-1))
+    return np.stack(found, axis=1)
+
+
+def landmark_costs(likelihoods: Array, exchanged: Array | float = EXCHANGED) -> Array:
+    """Return the negative logarithms (...) of `landmark_likelihoods` (..., K, 2).
+
+    `exchanged` (..., K) is how likely each group is exchanged.
+    """
+    direct, other = likelihoods[..., 0], likelihoods[..., 1]
+    return np.asarray(-np.logaddexp(np.log1p(-exchanged) + direct, np.log(exchanged) + other).sum(axis=-1))
+
+
+def exchanged_next(exchanged: Array) -> Array:
+    """Return how likely groups are exchanged in the next frame, where they are in this one with a probability."""
+    return EXCHANGED + PERSISTENCE * (exchanged - EXCHANGED)
+
+
+def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
+    """Return how likely groups (..., K) are exchanged, given `landmark_likelihoods`, and how likely they were before."""
+    odds = np.log1p(-exchanged) - np.log(exchanged) + likelihoods[..., 0] - likelihoods[..., 1]
+    return np.asarray(1.0 / (1.0 + np.exp(np.clip(odds, -30.0, 30.0))))
 
 
 def _distances(pixels: Array, landmarks: Array) -> Array:
