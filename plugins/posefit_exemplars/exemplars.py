@@ -17,6 +17,7 @@ from posefit.errors import InputError
 from posefit.geometry import symmetry
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, Skeleton
+from posefit.motion.built_in import average_skeleton
 from posefit.motion.motion import Motion
 from posefit_exemplars import kernels
 
@@ -222,10 +223,13 @@ _latest: tuple[bytes, Exemplars] | None = None
 
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
-    """Return the states of motions; the latest are kept for the same motions and skeleton."""
+    """Return the states of motions; the latest are kept for the same motions, and for all lengths of bones.
+
+    Poses are compared by the joints of a person of average lengths, so a build that is fitted learns nothing again.
+    """
     global _latest
     digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
-    arrays = [skeleton.offsets.round(9), skeleton.axes]  # metres: one build comes about in several ways
+    arrays = [skeleton.axes]
     for motion in motions:
         arrays += [motion.skeleton.axes, motion.poses, motion.translations]
     for array in arrays:
@@ -233,7 +237,8 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
     key = digest.digest()
     latest = _latest  # read once: another thread may replace it at any time
     if latest is None or latest[0] != key:
-        latest = _latest = key, Exemplars.of(motions, skeleton, mirrored=mirrored)
+        average = replace(skeleton, offsets=average_skeleton().offsets)
+        latest = _latest = key, Exemplars.of(motions, average, mirrored=mirrored)
     return latest[1]
 
 

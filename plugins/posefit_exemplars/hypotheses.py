@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.landmarks import EXCHANGED, exchanged_given, exchanged_next, landmark_costs
+from posefit.fitting.landmarks import exchanged_given, exchanged_next, landmark_costs, usually_exchanged
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
@@ -205,7 +205,9 @@ class HypothesisFilter:
             turns[on], shifts[on] = wrapped(poses[on] - latest.poses[since]), places[on] - latest.places[since]
             rates[on] = joints[on] - latest.joints[since]
         likelihoods = look.landmarks(poses, places)
-        exchanged = np.full((1, likelihoods.shape[1]), EXCHANGED) if latest is None else exchanged_next(latest.exchanged)
+        exchanged = usually_exchanged(likelihoods)[None]
+        if latest is not None:
+            exchanged = exchanged_next(latest.exchanged, 1.0 / task.fps)
         landmarks = landmark_costs(likelihoods, exchanged[:, None])
         hypotheses = Hypotheses(poses, places, joints, turns, shifts, rates, exchanged, origins, np.zeros(len(poses)))
         fits, steps = landmarks.min(axis=0), None

@@ -37,6 +37,8 @@ ARRAYS = ("slopes", "joint_spreads", "angle_spreads", "joint_factors", "angle_fa
 MIN_COST = 0.1  # per cent
 MIN_SPREAD = 0.002  # metres
 MAX_LOG_ODDS = 30.0  # logarithm
+LANDMARK_SECONDS = 0.5  # that the mean of what landmarks tell of arms reaches back
+MIN_ARMS_ODDS = 0.6  # the least mean logarithm of their odds at which left and right are known
 
 
 def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int) -> Array:
@@ -234,7 +236,7 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
     Their `details` hold the evidence and the probability of exchanged sides. Frames without sampled tracks stay as
     they are.
     """
-    memory = EvidenceMeans(task.fps)
+    memory, arms, keep = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         if frame.posterior is None:
@@ -246,7 +248,11 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         features = memory.features(evidence)
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
-        second_side = float(exchanged < classifier.unknown)
+        known = exchanged < classifier.unknown
+        if (odds := frame.details.get("arms")) is not None:  # landmarks know better
+            arms = keep * arms + [odds, 1.0]
+            known = bool(arms[0] >= MIN_ARMS_ODDS * arms[1])
+        second_side = float(known)
         recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=second_side)
         yield replace(
             frame,

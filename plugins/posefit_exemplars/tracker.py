@@ -205,13 +205,14 @@ class ExemplarTracker:
                 beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
             return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
         last = 3 + look.cameras  # the reported pose, its twins, and what is left of a small picture's share
+        evaluations = self.evaluations
+        if latest is not None and self.hypotheses is not None:
+            evaluations = max(evaluations / look.cameras, (1.0 - FITTED) * MIN_EVALUATIONS)  # several leave less open
         # no more states than have a cost in a small picture
-        full = int(min(FULL * self.evaluations, (self.evaluations - last) / (1.0 + look.share)))
-        small = int((self.evaluations - full - last) / look.share)
+        full = int(min(FULL * evaluations, (evaluations - last) / (1.0 + look.share)))
+        small = int((evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
         search = small - around
-        if latest is not None and self.hypotheses is not None:
-            search //= look.cameras  # several leave less open
         elsewhere, looked = self._elsewhere(look, latest, search, rng)
         beams = [elsewhere]
         if latest is not None:
@@ -226,7 +227,11 @@ class ExemplarTracker:
         best = diverse_best(self.exemplars, beam, totals, full)
         beam = beam.chosen(best)
         poses = self._poses(beam)
-        fits = away[best] + look.full(poses, beam.places) / self.temperature + landmark_costs(look.landmarks(poses, beam.places))
+        fits = (
+            away[best]
+            + look.full(poses, beam.places) / self.temperature
+            + landmark_costs(look.landmarks(poses, beam.places))
+        )
         used += len(beam)
         best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
         return self._joined(beam.chosen(best), fits[best], before, look), used

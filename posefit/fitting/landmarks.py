@@ -11,11 +11,12 @@ from posefit.silhouette.rasteriser import NEAR
 
 # joints whose left and right a detector exchanges together or not at all
 _TOGETHER = (("femur", "tibia", "toes"), ("humerus", "radius"), ("clavicle", "hipjoint"))
+ARMS = 1  # number of a group, of which most is known
 GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones]) for bones in _TOGETHER]
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
 DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
-EXCHANGED = 0.25  # share of the frames in which left and right of a group are exchanged
-PERSISTENCE = 0.5  # correlation of that from one frame to the next, a thirtieth of a second later
+EXCHANGED = np.array([0.3, 0.13, 0.35])  # share of the frames in which left and right of each group are exchanged
+PERSISTENCE = 0.5  # correlation of that a thirtieth of a second later
 
 
 def landmark_likelihoods(
@@ -40,24 +41,42 @@ def landmark_likelihoods(
     return np.stack(found, axis=1)
 
 
-def landmark_costs(likelihoods: Array, exchanged: Array | float = EXCHANGED) -> Array:
+def usually_exchanged(likelihoods: Array) -> Array:
+    """Return how often the groups (K,) of `landmark_likelihoods` (..., K, 2) are exchanged."""
+    return np.tile(EXCHANGED, likelihoods.shape[-2] // len(GROUPS))
+
+
+def landmark_costs(likelihoods: Array, exchanged: Array | None = None) -> Array:
     """Return the negative logarithms (...) of `landmark_likelihoods` (..., K, 2).
 
-    `exchanged` (..., K) is how likely each group is exchanged.
+    `exchanged` (..., K) is how likely each group is exchanged; as often as any frame's, where nothing is known.
     """
     direct, other = likelihoods[..., 0], likelihoods[..., 1]
+    if exchanged is None:
+        exchanged = usually_exchanged(likelihoods)
     return np.asarray(-np.logaddexp(np.log1p(-exchanged) + direct, np.log(exchanged) + other).sum(axis=-1))
 
 
-def exchanged_next(exchanged: Array) -> Array:
-    """Return how likely groups are exchanged in the next frame, where they are in this one with a probability."""
-    return EXCHANGED + PERSISTENCE * (exchanged - EXCHANGED)
+def exchanged_next(exchanged: Array, seconds: float) -> Array:
+    """Return how likely groups (..., K) are exchanged `seconds` later, where they are now with a probability."""
+    usual = np.tile(EXCHANGED, exchanged.shape[-1] // len(GROUPS))
+    return np.asarray(usual + PERSISTENCE ** (30.0 * seconds) * (exchanged - usual))
 
 
 def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
-    """Return how likely groups (..., K) are exchanged, given `landmark_likelihoods`, and how likely they were before."""
+    """Return how likely groups (..., K) are exchanged, by `landmark_likelihoods` and how likely they were before."""
     odds = np.log1p(-exchanged) - np.log(exchanged) + likelihoods[..., 0] - likelihoods[..., 1]
     return np.asarray(1.0 / (1.0 + np.exp(np.clip(odds, -30.0, 30.0))))
+
+
+def side_odds(likelihoods: Array, group: int) -> float:
+    """Return the logarithm of the odds that a group's sides are as in a pose, of its `landmark_likelihoods` (K, 2).
+
+    It is 0 where no view shows them, and each view adds at most those of the group's share of exchanges.
+    """
+    rare, views = EXCHANGED[group], likelihoods[group :: len(GROUPS)]
+    exchanged = landmark_costs(views[:, None, ::-1], np.array([rare]))
+    return float((exchanged - landmark_costs(views[:, None], np.array([rare]))).sum())
 
 
 def _distances(pixels: Array, landmarks: Array) -> Array:

@@ -23,7 +23,7 @@ def one(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
     joints, rates = np.zeros((2, 1, len(JOINTS), 3))
     joints[0, JOINTS.index(joint), 1], rates[0, JOINTS.index(joint), 1] = np.sqrt(len(JOINTS)) * np.array([code, rate])
     still, nothing = np.zeros((1, 66)), np.zeros((1, 3))
-    return Hypotheses(still, nothing, joints, still, nothing, rates, np.array([-1]), np.zeros(1))
+    return Hypotheses(still, nothing, joints, still, nothing, rates, np.zeros((1, 3)), np.array([-1]), np.zeros(1))
 
 
 def test_every_joint_is_in_one_part() -> None:

@@ -8,7 +8,18 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.landmarks import DEVIATION, EXCHANGED, GROUPS, landmark_costs
+from posefit.fitting.landmarks import (
+    ARMS,
+    DEVIATION,
+    EXCHANGED,
+    PERSISTENCE,
+    exchanged_given,
+    exchanged_next,
+    landmark_costs,
+    landmark_likelihoods,
+    side_odds,
+    usually_exchanged,
+)
 from posefit.footage.masks import Views
 from posefit.footage.readers import read_masks
 from posefit.geometry.calibration import Calibration
@@ -28,7 +39,12 @@ def landmarks_of(confidence: float, joints: tuple[str, ...] = JOINTS) -> Array:
 
 
 def costs(landmarks: Array, poses: Array) -> Array:
-    return landmark_costs(WALK.skeleton, [CAMERA], landmarks, poses, np.repeat(WALK.translations[3:4], len(poses), 0))
+    return landmark_costs(likelihoods(landmarks, poses))
+
+
+def likelihoods(landmarks: Array, poses: Array) -> Array:
+    places = np.repeat(WALK.translations[3:4], len(poses), 0)
+    return landmark_likelihoods(WALK.skeleton, [CAMERA], landmarks, poses, places)
 
 
 def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_sure() -> None:
@@ -37,7 +53,7 @@ def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_sur
     poses[0] = WALK.poses[3]
     found = costs(landmarks_of(1.0), poses)
     assert found.argmin() == 0
-    assert -1e-9 <= found[0] <= -len(GROUPS) * np.log(1.0 - EXCHANGED) + 1e-9
+    assert -1e-9 <= found[0] <= -np.log(1.0 - EXCHANGED).sum() + 1e-9
 
 
 def test_one_joint_off_by_hand() -> None:
@@ -48,7 +64,8 @@ def test_one_joint_off_by_hand() -> None:
     metre = np.sqrt(CAMERA.focal.prod()) / depths
     landmarks[0, wrist, 0] += 3.0 * DEVIATION * metre[wrist]  # three deviations to the side
     other = np.linalg.norm(landmarks[0, wrist, :2] - pixels[MIRROR[wrist]]) / metre[MIRROR[wrist]] / DEVIATION
-    arms = (1.0 - EXCHANGED) * (1.0 + 4.5) ** -0.5 + EXCHANGED * (1.0 + 0.5 * other**2) ** -0.5
+    rare = EXCHANGED[ARMS]
+    arms = (1.0 - rare) * (1.0 + 4.5) ** -0.5 + rare * (1.0 + 0.5 * other**2) ** -0.5
     # the groups that nothing is seen of cost nothing
     np.testing.assert_allclose(costs(landmarks, WALK.poses[3:4]), [-np.log(arms)], rtol=1e-9)
 
@@ -58,8 +75,32 @@ def test_exchanged_sides_cost_what_their_share_says() -> None:
         costs(landmarks_of(1.0), WALK.poses[3:4]),
         costs(landmarks_of(1.0)[:, list(MIRROR)], WALK.poses[3:4]),
     )
-    most = len(GROUPS) * np.log((1.0 - EXCHANGED) / EXCHANGED)
+    most = np.log((1.0 - EXCHANGED) / EXCHANGED).sum()
     assert 0.3 * most < exchanged[0] - direct[0] <= most + 1e-9
+
+
+def test_exchanged_landmarks_are_expected_to_stay_so() -> None:
+    # two frames by hand, summed over all four cases of a chain that is exchanged as often as usual in the long run
+    first, second = (likelihoods(landmarks_of(0.5), WALK.poses[[3, frame]]) for frame in (5, 1))
+    usual = usually_exchanged(first)
+    before = exchanged_given(first, usual[None])
+    twice = landmark_costs(first) + landmark_costs(second, exchanged_next(before, 1.0 / 30.0))
+    total = np.zeros(first.shape[:2])
+    for one, rare in enumerate((1.0 - usual, usual)):
+        for other, expected in enumerate((1.0 - usual, usual)):
+            step = PERSISTENCE * (one == other) + (1.0 - PERSISTENCE) * expected
+            total += rare * np.exp(first[..., one]) * step * np.exp(second[..., other])
+    np.testing.assert_allclose(twice, -np.log(total).sum(axis=1), rtol=1e-9)
+
+
+def test_the_odds_of_arms_are_at_most_those_of_the_usual_share() -> None:
+    most = np.log((1.0 - EXCHANGED[ARMS]) / EXCHANGED[ARMS])
+    right, wrong = (
+        likelihoods(marks, WALK.poses[3:4])[0] for marks in (landmarks_of(1.0), landmarks_of(1.0)[:, list(MIRROR)])
+    )
+    assert 0.3 * most < side_odds(right, ARMS) <= most
+    np.testing.assert_allclose(side_odds(wrong, ARMS), -side_odds(right, ARMS), rtol=1e-9)
+    assert side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0], ARMS) == 0.0
 
 
 def test_landmarks_are_read_with_their_masks(tmp_path: Path) -> None:
