@@ -37,8 +37,8 @@ ARRAYS = ("slopes", "joint_spreads", "angle_spreads", "joint_factors", "angle_fa
 MIN_COST = 0.1  # per cent
 MIN_SPREAD = 0.002  # metres
 MAX_LOG_ODDS = 30.0  # logarithm
-LANDMARK_SECONDS = 0.5  # that the mean of what landmarks tell of arms reaches back
-MIN_ARMS_ODDS = 0.6  # the least mean logarithm of their odds at which left and right are known
+LANDMARK_SECONDS = 0.25  # that the mean of what landmarks tell of arms reaches back
+MIN_ARMS_ODDS = 0.5  # the least mean logarithm of their odds at which left and right are known
 
 
 def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int) -> Array:
