@@ -16,7 +16,7 @@ from posefit.tracking.options import text_range
 if TYPE_CHECKING:
     from posefit.suites.running import SuiteRun
 
-NAME = "posefit-2026.2"
+NAME = "posefit-2026.3"
 
 
 @click.group(cls=Group, invoke_without_command=True)
