@@ -185,7 +185,7 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
 def _still(draft: _Draft, pose: Array) -> Array:
     """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
     offs = draft.rng.uniform(-0.5, 0.5, 66)
-    if isinstance(draft.box, ComponentBox):
+    if not isinstance(draft.box, AngleBox | RotatedBox):
         return pose
     moved = pose.copy()
     still = 3 + draft.box.angles[np.abs(draft.box.reach - np.radians(10.0)) < 1e-3]
