@@ -99,42 +99,24 @@ class ComponentBox(Components):
 
 
 @final
-class AngleBox:
-    """Latents are joint angles themselves, those that move the most; the others stay at their mean."""
+class AngleBox(Components):
+    """Latents of -1 to 1 are joint angles themselves, those that move the most; the others stay at their mean.
 
-    def __init__(self, learned: Learned, count: int) -> None:
+    With `rng` they are rotated at random, and each moves all of these joint angles.
+    """
+
+    def __init__(self, learned: Learned, count: int, rng: np.random.Generator | None = None) -> None:
         order = learned.order if count == len(learned.order) else learned.order[~np.isin(learned.order, SHOW_NOTHING)]
         self.angles = np.sort(order[:count])
-        self.mean, self.low, self.high = learned.mean, learned.low[self.angles], learned.high[self.angles]
-        self.reach = 0.5 * (self.high - self.low)
-
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray(angles, dtype=np.float64)[:, self.angles]
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m)."""
-        angles = np.tile(self.mean, (len(latents), 1))
-        angles[:, self.angles] = latents
-        return angles
-
-    def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are poses (n,)."""
-        return np.ones(len(latents), dtype=bool)
-
-
-@final
-class RotatedBox(Components):
-    """The latents of an `AngleBox`, scaled to -1 to 1 and rotated: each moves all of its joint angles."""
-
-    def __init__(self, learned: Learned, count: int, rng: np.random.Generator) -> None:
-        plain = AngleBox(learned, count)
-        self.angles, self.reach = plain.angles, plain.reach
-        rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))
-        self._rotation = np.round(rotation * np.sign(np.diag(signs)) / STEP) * STEP
+        low, high = learned.low[self.angles], learned.high[self.angles]
+        self.reach = 0.5 * (high - low)
+        self._rotation = np.eye(count)
+        if rng is not None:
+            rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))
+            self._rotation = np.round(rotation * np.sign(np.diag(signs)) / STEP) * STEP
         mean, components = learned.mean.copy(), np.zeros((count, len(learned.mean)))
-        mean[plain.angles] = 0.5 * (plain.low + plain.high)
-        components[:, plain.angles] = self._rotation * plain.reach
+        mean[self.angles] = 0.5 * (low + high)
+        components[:, self.angles] = self._rotation * self.reach
         super().__init__(mean, components, -np.ones(count), np.ones(count))
 
     def transform(self, angles: Array) -> Array:
@@ -167,7 +149,7 @@ class SequenceBox(Components):
         return np.asarray((self._waves * latents).sum(axis=0) / (self._waves**2).sum(axis=0))[None]
 
 
-SuiteBox = ComponentBox | AngleBox | RotatedBox | SequenceBox
+SuiteBox = ComponentBox | AngleBox | SequenceBox
 
 
 def is_upright(pose: Array) -> bool:

@@ -28,7 +28,6 @@ from posefit.suites.boxes import (
     TRAINING_PEOPLE,
     AngleBox,
     ComponentBox,
-    RotatedBox,
     SequenceBox,
     SuiteBox,
     is_upright,
@@ -101,10 +100,9 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     box: SuiteBox
     if function == 5:
         box = SequenceBox(learned, count)
-    elif function == 7:
-        box = AngleBox(learned, count)
-    elif function == 9:
-        box = RotatedBox(learned, count, np.random.default_rng([RNG_STREAM, function, number, dimension]))
+    elif function in (7, 9):
+        rotated = np.random.default_rng([RNG_STREAM, function, number, dimension]) if function == 9 else None
+        box = AngleBox(learned, count, rotated)
     else:
         box = ComponentBox(learned, count, mixed=function == 6)
     return _MAKERS[function](_Draft(function, number, subject, box, rng))
@@ -185,7 +183,7 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
 def _still(draft: _Draft, pose: Array) -> Array:
     """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
     offs = draft.rng.uniform(-0.5, 0.5, 66)
-    if not isinstance(draft.box, AngleBox | RotatedBox):
+    if not isinstance(draft.box, AngleBox):
         return pose
     moved = pose.copy()
     still = 3 + draft.box.angles[np.abs(draft.box.reach - np.radians(10.0)) < 1e-3]

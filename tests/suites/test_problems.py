@@ -220,7 +220,7 @@ def test_a_rotated_box_has_the_size_of_the_plain_one_and_no_coordinate_is_a_join
     """A rotation keeps lengths; rounded to four digits it does so to about one in a thousand."""
     plain, rotated = (problem(number, 10_000, 66).made.box for number in (7, 9))
     latents = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 63))
-    away = (rotated.inverse_transform(latents) - 0.5 * (plain.low + plain.high)) / plain.reach
+    away = (rotated.inverse_transform(latents) - plain.mean) / plain.reach
     assert np.linalg.norm(away, axis=1) == pytest.approx(np.linalg.norm(latents, axis=1), rel=2e-3)
     assert np.abs(rotated.components / plain.reach).max() < 0.8
     assert rotated.transform(rotated.inverse_transform(latents)) == pytest.approx(latents, abs=1e-2)
