@@ -1,8 +1,10 @@
 """What are the functions of the suite? Their features, beside bbob's; slices; which methods reach which targets.
 
-Features ask a function for costs alone, in the box [-1, 1]^d. Its optimum is the lowest cost of what is known and of
-where the descents end; they are CMA-ES from a random point, without a restart. What is near costs at most the *level*,
-the median of points `NEAR` half-sides a coordinate off the optimum, so that no scale of costs matters.
+Features ask a function for costs alone, in the box [-1, 1]^d. Points are drawn as a first population is: feasible, and
+around the start where there is one. The optimum is the lowest cost of what is known and of where the descents end; they
+are CMA-ES from a drawn point, without a restart. What is near costs at most the *level*, the median of points `NEAR`
+half-sides a coordinate off the optimum, so that no scale of costs matters. Noise is in all features but in
+conditioning, and in what decides where a descent has ended.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,6 +20,7 @@ from scipy.stats import rankdata
 from posefit.arrays import Array
 from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.files import check_new
+from posefit.fitting.box import draw_population
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, suite_function
 from posefit.suites.problem import suite
 from posefit.suites.running import run_on
@@ -48,9 +51,10 @@ HEADS = {  # of the features, with how they are written
     "rises": ("rises", "{:.1%}"),
     "flat": ("flat", "{:.0%}"),
     "distance": ("distance", "{:.2f}"),
+    "noise": ("noise", "{:.2f}"),
     "effort": ("to arrive", "{:,.0f} d"),
 }
-COMPARED = ("conditioning", "elsewhere", "interaction", "ruggedness", "rises", "distance")
+COMPARED = ("conditioning", "elsewhere", "interaction", "ruggedness", "rises", "distance", "noise")
 
 
 def descent(cost: Cost, start: Array, step: float, rng: np.random.Generator) -> tuple[float, Array, int]:
@@ -108,24 +112,26 @@ def correlation(first: Array, second: Array) -> float:
     return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])
 
 
-def features(cost: Cost, known: Array, rng: np.random.Generator) -> tuple[dict[str, float], list[tuple[float, Array]]]:
+def features(
+    cost: Cost, noise_free: Cost, known: Array, points: Array, rng: np.random.Generator
+) -> tuple[dict[str, float], list[tuple[float, Array]]]:
     """Return the features of a function, and the best cost and point of each basin, the optimum's first.
 
-    `known` (d,) is the optimum, or a point near it.
+    `known` (d,) is the optimum, or a point near it; `points` (n, d) are drawn at random.
     """
     d = len(known)
-    points = rng.uniform(-1.0, 1.0, (POINTS, d))
     costs = cost(points)
     ends = [descent(cost, start, DESCENT, rng) for start in points[:DESCENTS]]
-    near = descent(cost, known, NEAR, rng)
-    least, best, _ = min((float(cost(known[None])[0]), known, 0), near, *ends, key=lambda end: end[0])
+    near = descent(noise_free, known, NEAR, rng)
+    placed = [(float(noise_free(point[None])[0]), point) for point in (known, near[1], *(end[1] for end in ends))]
+    least, best = min(placed, key=lambda end: end[0])
     off = rng.standard_normal((POINTS, d))
     off *= np.sqrt(d) / np.linalg.norm(off, axis=1, keepdims=True)
-    level = float(np.median(cost(best + NEAR * off)))
+    level = float(np.median(noise_free(best + NEAR * off)))
     basins = [(least, best)]
     arrived = 0
-    for value, point, _ in sorted(ends, key=lambda end: end[0]):
-        tops = [float(cost(place + WAY * (point - place)).max()) for _, place in basins]  # on the straight way to each
+    for value, point in sorted(placed[2:], key=lambda end: end[0]):
+        tops = [float(noise_free(place + WAY * (point - place)).max()) for _, place in basins]  # on the way to each
         free = [top <= max(value, below) + level - least for top, (below, _) in zip(tops, basins, strict=True)]
         arrived += free[0] and value <= level
         if not any(free):
@@ -136,10 +142,11 @@ def features(cost: Cost, known: Array, rng: np.random.Generator) -> tuple[dict[s
         moved[k, rows, coordinate] += way
         moved[2, rows, coordinate] += way
     one, other, both = cost(moved.reshape(-1, d)).reshape(3, POINTS) - costs
+    again = cost(np.tile(best, (POINTS, 1)))
     way = np.diff(cost((points[:200, None] + WAY * (best - points[:200, None])).reshape(-1, d)).reshape(200, -1))
     return {
         "dimension": d,
-        "conditioning": conditioning(cost, best, level, rng),
+        "conditioning": conditioning(noise_free, best, level, rng),
         "elsewhere": 1.0 - arrived / DESCENTS,
         "basins": len(basins),
         "interaction": float(np.abs(both - one - other).sum() / (np.abs(one) + np.abs(other)).sum()),
@@ -148,7 +155,7 @@ def features(cost: Cost, known: Array, rng: np.random.Generator) -> tuple[dict[s
         "flat": float((cost(points + FINE * off) == costs).mean()),
         "distance": correlation(costs, np.linalg.norm(points - best, axis=1)),
         "evaluations": float(np.mean([used for *_, used in ends])) / d,
-        "noise": float((cost(points) != costs).mean()),
+        "noise": float((again - again[0]).std() / costs.std()),
     }, basins
 
 
@@ -161,7 +168,9 @@ def bbob(number: int, dimension: int, instance: int) -> dict[str, float]:
     def cost(points: Array) -> Array:
         return np.array([problem(point) for point in 5.0 * points])  # its box is [-5, 5]^d
 
-    row, _ = features(cost, np.array(problem.optimum.x) / 5.0, np.random.default_rng([instance, number]))
+    rng = np.random.default_rng([instance, number])
+    points = rng.uniform(-1.0, 1.0, (POINTS, dimension))
+    row, _ = features(cost, cost, np.array(problem.optimum.x) / 5.0, points, rng)
     return {**row, "infeasible": 0.0}
 
 
@@ -173,7 +182,8 @@ def measured(
     Each budget is a search of its own, as some methods plan ahead; what has reached the last target is not repeated.
     """
     problem, rng = suite(SUITE, number, instance, dimension), np.random.default_rng([instance, number])
-    row, basins = features(problem.evaluate, np.array(problem.made.truth), rng)
+    points, truth = draw_population(problem.space, rng, POINTS), np.array(problem.made.truth)
+    row, basins = features(problem.evaluate, problem.noise_free, truth, points, rng)
     row["infeasible"] = float(1.0 - problem.space.feasible(rng.uniform(-1.0, 1.0, (POINTS, dimension))).mean())
     reached: dict[str, list[float]] = {name: [] for name in METHODS}
     for method, costs in reached.items():
@@ -183,7 +193,7 @@ def measured(
                 problem.reset()
                 run_on(problem, method, evaluations=budget * dimension)
             costs.append(problem.best_observed_fvalue1)
-    return row, problem.targets, reached, sliced(problem.evaluate, basins, rng, f"{number} {problem.function.name}")
+    return row, problem.targets, reached, sliced(problem.noise_free, basins, rng, f"{number} {problem.function.name}")
 
 
 def sliced(cost: Cost, basins: list[tuple[float, Array]], rng: np.random.Generator, title: str) -> Array:
@@ -254,7 +264,8 @@ def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
 def share_lines(shares: Mapping[int, Sequence[Shares]]) -> Iterator[str]:
     """Yield the tables of targets reached, and of how similarly two functions order methods.
 
-    `shares` are by function those of all its instances, and of two halves of them: no order is more similar.
+    `shares` are by function those of all its instances, and of two halves of them. A half of one function is compared
+    with the other half of the same, or of another one.
     """
     cells = []
     for number, (table, *_) in shares.items():
@@ -263,18 +274,19 @@ def share_lines(shares: Mapping[int, Sequence[Shares]]) -> Iterator[str]:
         cells.append([f"{number} {suite_function(number).name}", ", ".join(dict.fromkeys(wins)), *texts])
     yield from markdown(["function", "leads", *METHODS, "best of all"], cells, 2)
     yield ""
-    ranks = {n: [rankdata([one[name] for name in METHODS], axis=0).ravel() for one in shares[n]] for n in shares}
+    ranks = {n: [rankdata([one[name] for name in METHODS], axis=0).ravel() for one in shares[n][1:]] for n in shares}
     cells = []
-    for n in shares:
-        pairs = [ranks[n][1:] if n == other else (ranks[n][0], ranks[other][0]) for other in shares]
-        cells.append([f"{n} {suite_function(n).name}", *(f"{np.corrcoef(*pair)[0, 1]:.2f}" for pair in pairs)])
+    for n, (first, second) in ranks.items():
+        pairs = [((first, other[1]), (second, other[0])) for other in ranks.values()]
+        texts = [f"{np.mean([np.corrcoef(*pair)[0, 1] for pair in both]):.2f}" for both in pairs]
+        cells.append([f"{n} {suite_function(n).name}", *texts])
     yield from markdown(["methods' order", *map(str, shares)], cells)
 
 
 @click.command(help=__doc__)
 @click.option("--function", "functions", type=int, multiple=True, help="Its number; repeatable, by default each.")
 @click.option("--dimension", type=int, help="Of all functions; by default the lowest of each.")
-@click.option("--instances", type=click.IntRange(1), default=4, show_default=True, help="Of each, held out ones.")
+@click.option("--instances", type=click.IntRange(1), default=8, show_default=True, help="Of each, held out ones.")
 @click.option("--picture", metavar="FILE", help="New .jpg of slices.")
 @WORKERS
 def main(
@@ -301,9 +313,6 @@ def main(
     own = {number: sum(key[1] == number == other[1] for key, other in near.items()) for number in sizes}
     texts = [f"{count} of function {number}" for number, count in own.items()]
     click.echo(f"\nInstances nearest to one of their own function, of {instances} each: {', '.join(texts)}")
-    click.echo(
-        f"Points that cost something else when asked again: {max(row['noise'] for row in own_features.values()):.0%}\n"
-    )
     shares = {}
     for number in sizes:
         mine = [results[key] for key in problems if key[1] == number]

@@ -46,7 +46,7 @@ def compact(run: SuiteRun, problem: Problem) -> SuiteRun:
 def rounded(problem: Problem, point: np.ndarray, cost: float) -> np.ndarray:
     """Return the point of the fewest digits, near to another one, that has its cost."""
     near = np.concatenate([np.rint(point * DIGITS) / DIGITS, point[None]])
-    return near[problem.space.feasible(near) & (problem.evaluate(near) == cost)][0]
+    return near[problem.space.feasible(near) & (problem.noise_free(near) == cost)][0]
 
 
 def searched(address: tuple[str, int, int, int]) -> SuiteRun:

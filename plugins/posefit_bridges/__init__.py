@@ -16,6 +16,6 @@ IOHexperimenter's is `problem.ioh()` of any problem of a suite.
 
 >>> import posefit
 >>> from posefit_bridges.pymoo import Problem
->>> Problem(posefit.suite("posefit-2026.2", function=1, instance=10_000, dimension=9)).n_var
+>>> Problem(posefit.suite("posefit-2026.3", function=1, instance=10_000, dimension=9)).n_var
 9
 """

@@ -19,7 +19,7 @@ from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.problem import EVALUATIONS, TARGETS, suite
 
 Address = tuple[int, int, int]  # function, instance and dimension
-EXACT = [one.number for one in FUNCTIONS if one.exact and 9 in one.dimensions]
+EXACT = [one.number for one in FUNCTIONS if one.exact and not one.noisy and 9 in one.dimensions]
 
 TASK = """
 You are a Python expert who designs a new optimisation algorithm. You can use numpy v2 and the standard library.

@@ -71,13 +71,14 @@ class Dataset(torch.utils.data.Dataset[list[Problem]]):
     ) -> "tuple[Dataset, Dataset]":
         """Return the data sets to train and to test on, of as many training and held-out instances.
 
-        "easy" functions are those whose optimum is known, "difficult" ones the others; the lists are of the numbers of
-        functions instead. Functions without the dimension are left out.
+        "easy" functions are those without noise whose optimum is known, "difficult" ones the others; the lists are of
+        the numbers of functions instead. Functions without the dimension are left out.
         """
         one_of("version", version, ("numpy", "torch"))
         one_of("difficulty", difficulty, ("easy", "difficult", "all"))
         kind = Problem if version == "numpy" else TorchProblem
-        usual = [one for one in FUNCTIONS if difficulty == "all" or one.exact == (difficulty == "easy")]
+        easy = {one: one.exact and not one.noisy for one in FUNCTIONS}
+        usual = [one for one in FUNCTIONS if difficulty == "all" or easy[one] == (difficulty == "easy")]
         numbers = [one.number for one in usual if dimension in one.dimensions]
         train, test = (
             [kind(suites.suite(SUITE, number, one, dimension)) for number in own or numbers for one in part[:instances]]

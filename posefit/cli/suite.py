@@ -16,8 +16,6 @@ from posefit.tracking.options import text_range
 if TYPE_CHECKING:
     from posefit.suites.running import SuiteRun
 
-NAME = "posefit-2026.2"
-
 
 @click.group(cls=Group, invoke_without_command=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
@@ -54,7 +52,6 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
 @click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
-@click.option("--name", default=NAME, show_default=True, help="Of the suite.")
 @click.option("--out", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--bundle", metavar="FILE", help="New .zip for a leaderboard, as `suite submit` writes it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
@@ -67,7 +64,6 @@ def suite_run(
     seed: int,
     texts: tuple[str, ...],
     infeasible: Any,
-    name: str,
     out: str | None,
     bundle: str | None,
     as_json: bool,
@@ -88,7 +84,7 @@ def suite_run(
         numbers = _numbers(*instances)
         chosen_functions, chosen_dimensions = functions or None, dimensions or (9,)
         problems = Suite(
-            name, functions=chosen_functions, dimensions=chosen_dimensions, instances=numbers, infeasible=infeasible
+            functions=chosen_functions, dimensions=chosen_dimensions, instances=numbers, infeasible=infeasible
         )
         for one in problems.passed_over:
             listed = ", ".join(map(str, one.dimensions))

@@ -37,14 +37,11 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
     whole("repeat", repeat, 0)
     with as_file(files("posefit.suites") / OWN) as own:
         bundles = {ITSELF: verified(own)}
-    suite = bundles[ITSELF].suite
     budgets = {_problem(run): run.budget for run in bundles[ITSELF].runs}
     unranked, notes = [], []
     for path in _listed(paths):
         try:
             bundle = verified(path, repeat, lambda text: say(f"repeats {text}"))
-            if bundle.suite != suite:
-                raise InputError(f"{path}: suite must be {suite}, got {bundle.suite}")
             if twice := [name for name, known in bundles.items() if known.digest == bundle.digest]:
                 raise InputError(f"{path}: expected each bundle once, got {twice[0]} again")
         except (InputError, OSError) as error:
@@ -65,7 +62,7 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
     for reason in unranked:
         say(f"not ranked: {reason}")
     runs = runs_of_searches(ranked)
-    data = search_data(runs, f"Leaderboard of {suite}", time.strftime("%d %B %Y"))
+    data = search_data(runs, f"Leaderboard of {bundles[ITSELF].suite}", time.strftime("%d %B %Y"))
     for method in data["methods"]:
         method["settings"] = "; ".join(filter(None, [method["settings"], method["bundle"]]))
     points = sum(bundle.evaluated for bundle in bundles.values())

@@ -2,7 +2,7 @@
 
     import posefit
 
-    problem = posefit.suite("posefit-2026.2", function=1, instance=10_000, dimension=9)
+    problem = posefit.suite("posefit-2026.3", function=1, instance=10_000, dimension=9)
     print(problem([0.0] * 9), problem.evaluations, problem.targets[-1])
 
 | looking for | file |

@@ -24,6 +24,8 @@ TRAINING_PEOPLE = ("02", "05", "09", "14", "17", "29", "127")
 STEP = 1e-4  # radians, and what a stored component is a whole multiple of
 SIZES = (6, 7, 13, 17, 21, 37)  # components of the boxes of 9, 10, 16, 20, 24 and 40 dimensions
 SHOW_NOTHING = (49, 61)  # joint angles that turn a hand about its forearm, unless fingers move as well
+FRAMES = 8  # of a sequence
+VALUES = (2, 4, 8, 16)  # how many each of four mixed latents may have; each fifth one has any
 HELD_OUT_GROUP = "held out"  # the name of the box learned from all people for training
 
 
@@ -59,12 +61,25 @@ def learned_without(subject: str) -> Learned:
 
 @final
 class ComponentBox(Components):
-    """Principal components; latents are poses within an ellipsoid that holds 98 % of the poses learned."""
+    """Principal components; latents are poses within an ellipsoid that holds 98 % of the poses learned.
 
-    def __init__(self, learned: Learned, count: int) -> None:
+    Where they are mixed, most count as the middle of the part of their range that they are in: of `VALUES` equal ones.
+    """
+
+    def __init__(self, learned: Learned, count: int, mixed: bool = False) -> None:
         half = learned.half[:count]
         super().__init__(learned.mean, learned.components[:count], -half, half)
         self._spread, self._reach = learned.spread[:count], float(learned.reach[SIZES.index(count)])
+        self._stepped = np.flatnonzero(np.arange(count) % 5 < 4) if mixed else np.arange(0)
+        self._parts = 0.5 * np.resize(VALUES, len(self._stepped))  # to either side of the middle
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m)."""
+        if len(self._stepped):
+            latents, half, parts = latents.copy(), self.high[self._stepped], self._parts
+            part = np.minimum(np.floor(latents[:, self._stepped] / half * parts), parts - 1.0)
+            latents[:, self._stepped] = (part + 0.5) / parts * half
+        return super().inverse_transform(latents)
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are within the ellipsoid (n,)."""
@@ -84,58 +99,57 @@ class ComponentBox(Components):
 
 
 @final
-class AngleBox:
-    """Latents are joint angles themselves, those that move the most; the others stay at their mean."""
+class AngleBox(Components):
+    """Latents of -1 to 1 are joint angles themselves, those that move the most; the others stay at their mean.
 
-    def __init__(self, learned: Learned, count: int) -> None:
+    With `rng` they are rotated at random, and each moves all of these joint angles.
+    """
+
+    def __init__(self, learned: Learned, count: int, rng: np.random.Generator | None = None) -> None:
         order = learned.order if count == len(learned.order) else learned.order[~np.isin(learned.order, SHOW_NOTHING)]
         self.angles = np.sort(order[:count])
-        self.mean, self.low, self.high = learned.mean, learned.low[self.angles], learned.high[self.angles]
-        self.reach = 0.5 * (self.high - self.low)
-
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray(angles, dtype=np.float64)[:, self.angles]
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m)."""
-        angles = np.tile(self.mean, (len(latents), 1))
-        angles[:, self.angles] = latents
-        return angles
-
-    def feasible(self, latents: Array) -> NDArray[np.bool_]:
-        """Return that all latents (n, m) are poses (n,)."""
-        return np.ones(len(latents), dtype=bool)
-
-    def within_reach(self, latents: Array) -> Array:
-        """Return the latents (n, m) as they are."""
-        return np.asarray(latents)
-
-
-@final
-class RotatedBox(Components):
-    """The latents of an `AngleBox`, scaled to -1 to 1 and rotated: each moves all of its joint angles."""
-
-    def __init__(self, learned: Learned, count: int, rng: np.random.Generator) -> None:
-        plain = AngleBox(learned, count)
-        self.angles, self.reach = plain.angles, plain.reach
-        rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))
-        self._rotation = np.round(rotation * np.sign(np.diag(signs)) / STEP) * STEP
+        low, high = learned.low[self.angles], learned.high[self.angles]
+        self.reach = 0.5 * (high - low)
+        self._rotation = np.eye(count)
+        if rng is not None:
+            rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))
+            self._rotation = np.round(rotation * np.sign(np.diag(signs)) / STEP) * STEP
         mean, components = learned.mean.copy(), np.zeros((count, len(learned.mean)))
-        mean[plain.angles] = 0.5 * (plain.low + plain.high)
-        components[:, plain.angles] = self._rotation * plain.reach
+        mean[self.angles] = 0.5 * (low + high)
+        components[:, self.angles] = self._rotation * self.reach
         super().__init__(mean, components, -np.ones(count), np.ones(count))
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
         return np.asarray((angles - self.mean)[:, self.angles] / self.reach @ self._rotation.T)
 
-    def within_reach(self, latents: Array) -> Array:
-        """Return the latents (n, m) as they are."""
-        return np.asarray(latents)
+
+@final
+class SequenceBox(Components):
+    """Latents are cosines in time, of a motion of `FRAMES` frames, along the leading components.
+
+    They are those with the least product of the component's and the cosine's number, from 1 on. Each of `frames` is the
+    prior of one frame with the same latents, and the box itself that of the first.
+    """
+
+    def __init__(self, learned: Learned, count: int) -> None:
+        order = sorted(np.ndindex(count, FRAMES), key=lambda term: ((term[0] + 1) * (term[1] + 1), term))
+        components, halves = np.array(order[:count]).T  # how many half waves a cosine has in the motion
+        times = (np.arange(FRAMES)[:, None] + 0.5) / FRAMES
+        self._waves = np.round(np.cos(np.pi * halves * times) / STEP) * STEP  # (frames, m)
+        self._directions = learned.components[components]
+        half = learned.half[components] / ((halves + 1) * np.sqrt(halves + 1))
+        rows = self._waves[:, :, None] * self._directions
+        super().__init__(learned.mean, rows[0], -half, half)
+        self.frames = [Components(learned.mean, row, -half, half) for row in rows]
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (1, m) nearest to the joint angles (frames, 63) of a motion."""
+        latents = (angles - self.mean) @ self._directions.T
+        return np.asarray((self._waves * latents).sum(axis=0) / (self._waves**2).sum(axis=0))[None]
 
 
-SuiteBox = ComponentBox | AngleBox | RotatedBox
+SuiteBox = ComponentBox | AngleBox | SequenceBox
 
 
 def is_upright(pose: Array) -> bool:

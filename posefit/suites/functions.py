@@ -6,7 +6,7 @@ from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
 from posefit.reading import quoted
 
-SUITE = "posefit-2026.2"
+SUITE = "posefit-2026.3"
 SUITES = (SUITE,)
 TRAINING = range(10_000)  # instances to learn from and to tune on
 HELD_OUT = range(10_000, 20_000)  # instances of other people
@@ -24,15 +24,16 @@ class SuiteFunction:
     summary: str
     exact: bool  # whether the box holds a proposal of cost 0, as the silhouette is of one of its poses
     dimensions: tuple[int, ...] = (9, 10, 16, 20, 24, 40)
+    noisy: bool = False  # whether a proposal costs something else when it is evaluated again
 
 
 FUNCTIONS = (
     SuiteFunction(1, "single image", "one silhouette, the yaw known to within 20 degrees", True),
-    SuiteFunction(2, "next frame", "a tenth of a second after two poses of a track; starts at a prediction", True),
+    SuiteFunction(2, "next frame", "a fifth of a second after two poses of a track; starts at a prediction", True),
     SuiteFunction(3, "two views", "as 1, seen by two cameras at right angles", True),
-    SuiteFunction(4, "corrupted", "as 1, the silhouette spoilt in two ways", False),
-    SuiteFunction(5, "mismatched body", "as 1, bones and radii up to 8 % off the person's", False),
-    SuiteFunction(6, "ambiguous", "seen from the side and afar: the mirrored stride is nearly as good", True),
+    SuiteFunction(4, "noisy", "as 1, the silhouette damaged again at each evaluation", True, noisy=True),
+    SuiteFunction(5, "sequence", "eight frames of 1.4 seconds at once: components, each over time", True),
+    SuiteFunction(6, "mixed", "as 1, most components have 2, 4, 8 or 16 values", True),
     SuiteFunction(7, "high-dimensional", "as 1, joint angles themselves instead of components", True, ANGLES),
     SuiteFunction(8, "aligned translation", "as 1, the place unknown and taken from the silhouette's borders", False),
     SuiteFunction(

@@ -1,11 +1,10 @@
 """Numbered instances: a person of the library, a pose, cameras, and their silhouettes.
 
-A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose; only the
-ambiguous one draws until a pose's mirror image is near enough. Instances below 10,000 are of seven people, the others
-of three who are in no training data.
+A number is the same person, pose and view in every dimension of a function, as far as its box holds the pose.
+Instances below 10,000 are of seven people, the others of three who are in no training data.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 
@@ -15,21 +14,21 @@ from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.geometry.body import Body, varied
+from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
-from posefit.geometry.symmetry import facing, reflected_poses
 from posefit.motion import recorded
 from posefit.silhouette.corruption import corrupted
-from posefit.silhouette.cost import project
+from posefit.silhouette.cost import mean_over_views, project
 from posefit.silhouette.mask import Silhouette
 from posefit.suites.boxes import (
+    FRAMES,
     HELD_OUT_PEOPLE,
     TRAINING_PEOPLE,
     AngleBox,
     ComponentBox,
-    RotatedBox,
+    SequenceBox,
     SuiteBox,
     is_upright,
     learned_without,
@@ -39,16 +38,15 @@ from posefit.suites.functions import TRAINING
 RNG_STREAM = 2026  # part of the seed of every instance
 SIZE = (120, 160)  # pixels
 PLACE = np.array([0.0, 0.9, 0.0])  # metres: where the root is, and cameras aim
-NEAR = (3.5, np.radians(40.0))  # metres to a camera; radians it sees across the larger side
-FAR = (40.0, 0.0637)  # as large in the picture, but depth does not show
+AWAY, FIELD = 3.5, np.radians(40.0)  # metres to a camera; radians it sees across the larger side
 ROOT_RANGE = np.radians([45.0, 20.0, 20.0])  # radians to either side: yaw, pitch, roll
 YAW_OFF = np.radians(20.0)  # from the box's middle to the true yaw, at most
-STEP = 3  # frames, at 30 a second, from one pose of a track to the next
-SPREAD = 0.02  # of a start, beside how far the last two poses are apart: in half-sides of the box
-MISMATCH_PERCENT = 8.0
-DAMAGES, STRENGTHS = ("blobs", "holes", "occluder", "shadow"), (0.3, 0.6)  # two of these; how strong each is
+STEP = 6  # frames, at 30 a second, from one pose of a track to the next
+SPREAD = 0.05  # of a start, beside how far the last two poses are apart: in half-sides of the box
+DAMAGES, STRENGTH = ("blobs", "holes"), 0.6  # of each silhouette of a noisy instance; how strong they are at most
+POOL = 32  # how many of these an instance has
+ORDER = np.random.default_rng(RNG_STREAM).integers(POOL, size=10_007)  # they come in, again and again; a prime
 ANCHOR_OFF = 0.3  # metres along each axis that the anchor of an alignment is off
-DECOY_COST, APART_MM, ATTEMPTS = 4.0, 60.0, 20  # of an ambiguous instance: see `_ambiguous`
 DIGITS = 4  # of a truth in the box, so that every machine has the same one
 
 
@@ -59,19 +57,36 @@ class SuiteInstance:
     function: int
     number: int
     subject: str
-    posed: PoseProblem = field(repr=False)
+    frames: Sequence[PoseProblem] = field(repr=False)  # one, or those of a sequence: they have a box in common
     box: SuiteBox = field(repr=False)
     truth: Array = field(repr=False)  # (d,) the proposal of the true pose, for tests: a search that reads it cheats
     truth_cost: float  # of that proposal; 0 where the function is exact
-    decoy: Array | None = field(default=None, repr=False)  # (d,) of function 6, the mirrored pose
+    noisy: Sequence[PoseProblem] = field(default=(), repr=False)  # of function 4: each with a damaged silhouette
+
+    @property
+    def space(self) -> SearchSpace:
+        """The box, as optimisers take it."""
+        return self.frames[0].space
+
+    def evaluate(self, proposals: Array) -> Array:
+        """Return the costs (n,) of feasible proposals (n, d) without noise: the means over the frames."""
+        return mean_over_views([frame.evaluate(proposals) for frame in self.frames])
+
+    def evaluate_noisy(self, proposals: Array, first: int) -> Array:
+        """Return the costs (n,) of feasible proposals (n, d) with noise: the evaluations from number `first` on."""
+        costs, drawn = np.empty(len(proposals)), ORDER[(first + np.arange(len(proposals))) % len(ORDER)]
+        for k in np.unique(drawn):
+            costs[drawn == k] = self.noisy[k].evaluate(proposals[drawn == k])
+        return costs
 
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those that are not feasible moved: into the box, then towards its middle."""
-        space = self.posed.space
+        space = self.space
         allowed = space.feasible(proposals)
         inside = np.clip(proposals, -1.0, 1.0)
-        latents = space.centre[3:] + space.half[3:] * inside[:, 3:]
-        inside[:, 3:] = np.clip((self.box.within_reach(latents) - space.centre[3:]) / space.half[3:], -1.0, 1.0)
+        if isinstance(self.box, ComponentBox):
+            latents = space.centre[3:] + space.half[3:] * inside[:, 3:]
+            inside[:, 3:] = np.clip((self.box.within_reach(latents) - space.centre[3:]) / space.half[3:], -1.0, 1.0)
         return np.where(allowed[:, None], proposals, inside)
 
 
@@ -83,12 +98,13 @@ def suite_instance(function: int, number: int, dimension: int) -> SuiteInstance:
     subject = people[int(rng.integers(len(people)))]
     learned, count = learned_without(subject), dimension - 3  # the root has three
     box: SuiteBox
-    if function == 7:
-        box = AngleBox(learned, count)
-    elif function == 9:
-        box = RotatedBox(learned, count, np.random.default_rng([RNG_STREAM, function, number, dimension]))
+    if function == 5:
+        box = SequenceBox(learned, count)
+    elif function in (7, 9):
+        rotated = np.random.default_rng([RNG_STREAM, function, number, dimension]) if function == 9 else None
+        box = AngleBox(learned, count, rotated)
     else:
-        box = ComponentBox(learned, count)
+        box = ComponentBox(learned, count, mixed=function == 6)
     return _MAKERS[function](_Draft(function, number, subject, box, rng))
 
 
@@ -119,9 +135,11 @@ class _Draft:
         return SearchSpace(self.box, np.array([yaw, 0.0, 0.0]), ROOT_RANGE, PLACE)
 
     def nearest(self, space: SearchSpace, poses: Array) -> Array:
-        """Return the proposals (n, d) nearest to poses (n, 66), feasible, of few digits."""
-        latents = self.box.within_reach(self.box.transform(poses[:, 3:]))
-        proposals = np.round(space.proposals(np.column_stack([poses[:, :3], latents])), DIGITS)
+        """Return the proposals (n, d) nearest to poses (n, 66), feasible, of few digits; of a sequence it is one."""
+        latents = self.box.transform(poses[:, 3:])
+        if isinstance(self.box, ComponentBox):
+            latents = self.box.within_reach(latents)
+        proposals = np.round(space.proposals(np.column_stack([poses[: len(latents), :3], latents])), DIGITS)
         bad = ~space.feasible(proposals)
         proposals[bad] = np.round(0.999 * proposals[bad], DIGITS)  # rounding moved it out of the ellipsoid
         return np.asarray(proposals)
@@ -131,17 +149,17 @@ class _Draft:
         """The person's true body."""
         return _body(recorded.clips([self.subject])[0].skeleton)
 
-    def camera(self, azimuth: float, away: tuple[float, float] = NEAR) -> Camera:
-        return Camera.around(PLACE, azimuth, away[0], SIZE, away[1])
+    def camera(self, azimuth: float) -> Camera:
+        return Camera.around(PLACE, azimuth, AWAY, SIZE, FIELD)
 
     def silhouette(self, camera: Camera, pose: Array) -> Silhouette:
         return Silhouette.of(project(self.body, camera, pose, PLACE))
 
-    def made(self, problem: PoseProblem, truth: Array, decoy: Array | None = None) -> SuiteInstance:
-        cost = float(problem.evaluate(truth[None])[0])
+    def made(self, truth: Array, *frames: PoseProblem) -> SuiteInstance:
         truth = truth.copy()
         truth.setflags(write=False)
-        return SuiteInstance(self.function, self.number, self.subject, problem, self.box, truth, cost, decoy)
+        made = SuiteInstance(self.function, self.number, self.subject, frames, self.box, truth, 0.0)
+        return replace(made, truth_cost=float(made.evaluate(truth[None])[0]))
 
 
 @lru_cache(maxsize=16)
@@ -159,13 +177,13 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
     cameras = [draft.camera(azimuth + 0.5 * np.pi * k) for k in range(views)]
     pose = space.decode(truth[None])[0][0]
     silhouettes = [draft.silhouette(camera, pose) for camera in cameras]
-    return draft.made(PoseProblem(draft.body, cameras, silhouettes, space), truth)
+    return draft.made(truth, PoseProblem(draft.body, cameras, silhouettes, space))
 
 
 def _still(draft: _Draft, pose: Array) -> Array:
     """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
     offs = draft.rng.uniform(-0.5, 0.5, 66)
-    if isinstance(draft.box, ComponentBox):
+    if not isinstance(draft.box, AngleBox):
         return pose
     moved = pose.copy()
     still = 3 + draft.box.angles[np.abs(draft.box.reach - np.radians(10.0)) < 1e-3]
@@ -182,64 +200,46 @@ def _next_frame(draft: _Draft) -> SuiteInstance:
     step, pose = last - before, space.decode(truth[None])[0][0]
     mean = draft.nearest(space, space.decode(np.clip(last + step, -1.0, 1.0)[None])[0])[0]
     space = replace(space, start=Start(mean, np.abs(step) + SPREAD, step))
-    return draft.made(PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space), truth)
+    return draft.made(truth, PoseProblem(draft.body, [camera], [draft.silhouette(camera, pose)], space))
 
 
-def _corrupted(draft: _Draft) -> SuiteInstance:
+def _noisy(draft: _Draft) -> SuiteInstance:
+    """Return a pose of the box whose silhouette is damaged again at each evaluation."""
     made, rng = _single(draft), draft.rng
-    kinds = rng.choice(len(DAMAGES), 2, replace=False)
-    noise = {DAMAGES[k]: float(rng.uniform(*STRENGTHS)) for k in kinds}
-    spoilt = corrupted(made.posed.silhouettes[0].mask, noise, rng)
-    return draft.made(replace(made.posed, silhouettes=[Silhouette.of(spoilt)]), made.truth)
+    mask, noisy = made.frames[0].silhouettes[0].mask, []
+    for _ in range(POOL):
+        damaged = corrupted(mask, dict(zip(DAMAGES, rng.uniform(0.0, STRENGTH, len(DAMAGES)), strict=True)), rng)
+        noisy.append(replace(made.frames[0], silhouettes=[Silhouette.of(damaged)]))
+    return replace(made, noisy=noisy)
 
 
-def _mismatched(draft: _Draft) -> SuiteInstance:
-    made = _single(draft)
-    return draft.made(replace(made.posed, body=varied(made.posed.body, MISMATCH_PERCENT, draft.rng)), made.truth)
-
-
-def _ambiguous(draft: _Draft) -> SuiteInstance:
-    """Return a pose of the box whose mirror image, `APART_MM` away, costs `DECOY_COST` or less.
-
-    Where no draw has one, it is the draw whose mirror image costs the least.
-    """
-    best, least = None, np.inf
-    for _ in range(ATTEMPTS):
-        pose, body, rng = draft.poses()[0], draft.body, draft.rng
-        space = draft.space(pose[0] + 0.5 * YAW_OFF * rng.uniform(-1.0, 1.0))
-        side = rng.choice([-1.0, 1.0]) * 0.5 * np.pi + np.radians(10.0) * rng.uniform(-1.0, 1.0)
-        camera = draft.camera(pose[0] + side, FAR)
-        truth = draft.nearest(space, pose[None])
-        true_pose = space.decode(truth)[0]
-        problem = PoseProblem(body, [camera], [draft.silhouette(camera, true_pose[0])], space)
-        decoy = draft.nearest(space, wrapped(reflected_poses(body.skeleton, true_pose, facing(camera, PLACE))))
-        joints = body.skeleton.joints(np.concatenate([true_pose, space.decode(decoy)[0]]), np.zeros((2, 3)))
-        cost = float(problem.evaluate(decoy)[0])
-        apart = 1e3 * float(np.linalg.norm(joints[0] - joints[1], axis=-1).mean()) >= APART_MM
-        if best is None or cost + 100.0 * (not apart) < least:
-            best, least = (problem, truth[0], decoy[0]), cost + 100.0 * (not apart)
-        if least <= DECOY_COST:
-            break
-    assert best is not None
-    return draft.made(*best)
+def _sequence(draft: _Draft) -> SuiteInstance:
+    """Return `FRAMES` poses of a motion as the box holds them, seen by one camera; the root turns in none of them."""
+    poses, rng, box = draft.poses(FRAMES), draft.rng, draft.box
+    assert isinstance(box, SequenceBox)
+    space = draft.space(float(poses[0, 0]) + YAW_OFF * rng.uniform(-1.0, 1.0))
+    camera, truth = draft.camera(rng.uniform(-np.pi, np.pi)), draft.nearest(space, poses)
+    spaces = [replace(space, prior=frame) for frame in box.frames]
+    silhouettes = [draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces]
+    problems = [PoseProblem(draft.body, [camera], [one], frame) for one, frame in zip(silhouettes, spaces, strict=True)]
+    return draft.made(truth[0], *problems)
 
 
 def _aligned(draft: _Draft) -> SuiteInstance:
     """Return a pose of the box whose place is taken from the silhouette's borders."""
     made = _single(draft)
     anchor = PLACE + ANCHOR_OFF * draft.rng.uniform(-1.0, 1.0, 3)
-    return draft.made(
-        replace(made.posed, space=replace(made.posed.space, anchor=anchor, translation="aligned")), made.truth
-    )
+    space = replace(made.space, anchor=anchor, translation="aligned")
+    return draft.made(made.truth, replace(made.frames[0], space=space))
 
 
 _MAKERS: dict[int, Callable[[_Draft], SuiteInstance]] = {
     1: _single,
     2: _next_frame,
     3: partial(_single, views=2),
-    4: _corrupted,
-    5: _mismatched,
-    6: _ambiguous,
+    4: _noisy,
+    5: _sequence,
+    6: _single,
     7: _single,
     8: _aligned,
     9: _single,

@@ -15,7 +15,7 @@ from posefit.arrays import Array
 if TYPE_CHECKING:
     from posefit.suites.problem import Problem
 
-FIRST_ID = 26_100  # function 1 of posefit-2026.2 is 26101: none of IOHexperimenter's own has such a number
+FIRST_ID = 26_300  # function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
 
 
 @final

@@ -59,6 +59,9 @@ class Problem:
     "reject" its cost is infinite; with "penalise" it is the cost of the repaired one, and 100 for each half-side of the
     box between the two.
 
+    Where the function is noisy, calls return costs with noise: the same at the k-th evaluation of every run. As in COCO
+    the best cost, the trace and the targets reached are without it.
+
     `budget` is the largest number of evaluations, and `seconds` the time after the first in which a call may begin:
     what goes beyond raises BudgetSpentError and is not evaluated. Without them there is no end.
     """
@@ -89,10 +92,10 @@ class Problem:
         self.id_function = function.number
         self.instance = self.id_instance = made.number
         self.dimension = self.number_of_variables = d = len(made.truth)
-        # without blanks, as in posefit-2026.2_f001_i00017_d09; and in words
+        # without blanks, as in posefit-2026.3_f001_i00017_d09; and in words
         self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
         self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
-        self.space: Space = made.posed.space  # as posefit's own optimisers take it: `factory(problem.space, rng)`
+        self.space: Space = made.space  # as posefit's own optimisers take it: `factory(problem.space, rng)`
         self.start = self.space.start  # the predicted start of the search, with its spread; None without a prediction
         # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
         self.optimum = 0.0 if function.exact else None
@@ -121,6 +124,10 @@ class Problem:
         """Return the costs (n,) of proposals (n, d), as `posefit.minimise` asks for them."""
         values, back = exchanged("proposals", proposals)
         return back(self._counted(self._checked(values).reshape(-1, self.dimension)))
+
+    def noise_free(self, proposals: object) -> Array:
+        """Return the costs (n,) of proposals (n, d), without noise and uncounted: a search that calls this cheats."""
+        return self._noise_free(self._checked(proposals).reshape(-1, self.dimension))[0]
 
     def ioh(self) -> "IOHProblem":
         """Return the problem as one of IOHexperimenter's: its count is this one's, and its `reset` resets both.
@@ -242,20 +249,26 @@ class Problem:
             )
         if self._limit is not None and self.elapsed > self._limit:
             raise BudgetSpentError(f"{self.id}: its {self._limit:g} seconds are over")
-        allowed = self.space.feasible(checked)
-        repaired = checked if allowed.all() else self.made.repaired(checked)
-        costs: Array = self.made.posed.evaluate(repaired)
-        if self.infeasible == "reject":
-            costs[~allowed] = np.inf
-        elif self.infeasible == "penalise":
-            costs[~allowed] += PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
+        costs, repaired, penalties = self._noise_free(checked)
+        measured = self.made.evaluate_noisy(repaired, self.evaluations) + penalties if self.function.noisy else costs
         points = checked if self.infeasible == "penalise" else repaired
         for k in np.flatnonzero(costs < self.best_observed_fvalue1):
             if costs[k] < self.best_observed_fvalue1:
                 self.best_observed_fvalue1 = float(costs[k])
                 self._steps.append((self.evaluations + int(k) + 1, self.best_observed_fvalue1, points[k].copy()))
         self.evaluations += len(checked)
-        return costs
+        return measured
+
+    def _noise_free(self, checked: Array) -> tuple[Array, Array, Array]:
+        """Return the costs (n,) of checked proposals (n, d), their repaired ones (n, d), and the penalties (n,)."""
+        allowed = self.space.feasible(checked)
+        repaired = checked if allowed.all() else self.made.repaired(checked)
+        penalties = np.zeros(len(checked))
+        if self.infeasible == "reject":
+            penalties[~allowed] = np.inf
+        elif self.infeasible == "penalise":
+            penalties[~allowed] = PENALTY * np.linalg.norm(checked - repaired, axis=1)[~allowed]
+        return self.made.evaluate(repaired) + penalties, repaired, penalties
 
 
 def suite(

@@ -21,7 +21,7 @@ An entry of a list of the product is the value of a cell's field, or a table of 
 
 A plan that names a suite is one of single searches, of every combination of its lists:
 
-    suite = "posefit-2026.2"
+    suite = "posefit-2026.3"
     methods = ["sapso", "cma", { method = "pso", settings = { population_size = 20 } }]
     functions = [1, 5]                          # numbers; by default each
     dimensions = [9, 24]                        # by default 9

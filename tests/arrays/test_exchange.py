@@ -30,7 +30,7 @@ def test_costs_come_back_in_the_callers_library_and_type_with_numpys_bits(name: 
     library = import_module(name)
     given = library.asarray(DRAWN.astype(kind))
     seen, back = posefit.suite(), posefit.suite()
-    for evaluate in (lambda one: one.evaluate, lambda one: one, lambda one: one.made.posed.evaluate):
+    for evaluate in (lambda one: one.evaluate, lambda one: one, lambda one: one.made.frames[0].evaluate):
         costs, expected = evaluate(back)(given), evaluate(seen)(DRAWN.astype(kind))
         assert type(costs) is type(given)
         assert costs.dtype == given.dtype

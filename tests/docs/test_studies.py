@@ -211,17 +211,22 @@ def test_features_of_functions_that_are_known(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(functions, "LONGEST", 200)
     scales = 100.0 ** np.linspace(0.0, 1.0, 3)  # a quadratic whose Hessian has a condition number of 100
     quadratic, rng = (lambda points: (scales * points**2).sum(axis=1)), np.random.default_rng(1)
+    drawn = rng.uniform(-1.0, 1.0, (functions.POINTS, 3))
     for cost in (quadratic, lambda points: np.sqrt(quadratic(points))):
-        row, basins = functions.features(cost, np.full(3, 0.001), rng)
+        row, basins = functions.features(cost, cost, np.full(3, 0.001), drawn, rng)
         assert row["conditioning"] == pytest.approx(100.0, rel=0.1)
         assert (row["elsewhere"], row["basins"], row["rises"], row["flat"], row["noise"]) == (0, 1, 0, 0, 0)
         assert len(basins) == 1
         assert np.abs(basins[0][1]).max() < 1e-3
-    row, _ = functions.features(quadratic, np.zeros(3), rng)
+    row, _ = functions.features(quadratic, quadratic, np.zeros(3), drawn, rng)
     assert row["interaction"] < 1e-9
+    noisy = lambda points: quadratic(points) + 100.0 * rng.standard_normal(len(points))  # noqa: E731
+    row, _ = functions.features(noisy, quadratic, np.zeros(3), drawn, rng)
+    assert row["noise"] > 0.5
+    assert row["conditioning"] == pytest.approx(100.0, rel=0.1)
     # two wells, at 0.5 and -0.5 along each coordinate; the second costs 0.1 at its bottom
     wells = lambda points: np.minimum(((points - 0.5) ** 2).sum(axis=1), ((points + 0.5) ** 2).sum(axis=1) + 0.1)  # noqa: E731
-    row, basins = functions.features(wells, np.full(3, 0.5), rng)
+    row, basins = functions.features(wells, wells, np.full(3, 0.5), drawn, rng)
     assert row["basins"] == 2
     assert 0.0 < row["elsewhere"] < 1.0
     assert [np.round(point, 2).tolist() for _, point in basins] == [[0.5] * 3, [-0.5] * 3]

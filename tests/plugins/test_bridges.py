@@ -31,7 +31,7 @@ class RandomSearch:
 
 
 def problem(function: int = 1, **more: object) -> Problem:
-    return posefit.suite("posefit-2026.2", function, 10_000, 9, **more)  # type: ignore[arg-type]
+    return posefit.suite("posefit-2026.3", function, 10_000, 9, **more)  # type: ignore[arg-type]
 
 
 def check(searched: Problem, proposals: Iterable[object], costs: Iterable[float], precision: type = np.float64) -> None:
@@ -79,7 +79,7 @@ def test_pymoo_minimises_with_the_trace_of_a_plain_loop() -> None:
     check(posed.problem, np.concatenate([x for x, _ in seen]), np.concatenate([f for _, f in seen]))
     assert result.F[0] == posed.problem.best_observed_fvalue1
     assert np.array_equal(posed.pareto_front(), [[0.0]])
-    assert Problem(problem(4)).pareto_front() is None
+    assert Problem(problem(8)).pareto_front() is None
 
 
 def test_an_optimiser_of_nevergrad_has_the_trace_of_a_plain_loop() -> None:
@@ -137,7 +137,7 @@ def test_iohblade_scores_code_by_the_area_over_its_trace(monkeypatch: pytest.Mon
     iohblade = pytest.importorskip("iohblade")
     from posefit_bridges.blade import Problem
 
-    posed = Problem(training_instances=[(1, 10_000, 9)], test_instances=[(1, 10_000, 9), (4, 3, 9)], budget_factor=20)
+    posed = Problem(training_instances=[(1, 10_000, 9)], test_instances=[(1, 10_000, 9), (8, 3, 9)], budget_factor=20)
     solution = posed.evaluate(iohblade.Solution(code=RANDOM_SEARCH, name="RandomSearch"))
     plain = problem()
     costs = plain(np.random.default_rng(0).uniform(-1.0, 1.0, (180, 9)))
@@ -171,9 +171,9 @@ def test_metaboxs_own_episode_has_the_trace_of_a_plain_loop(version: str) -> Non
     from posefit_bridges.metabox import Dataset
 
     train, test = Dataset.get_datasets(version, instances=2, test_batch_size=3)  # type: ignore[arg-type]
-    assert [one.problem.instance for one in train.data] == [0, 1] * 4
-    assert [len(batch) for batch in test] == [3, 3, 2]
-    assert len(train + test) == 16
+    assert [one.problem.instance for one in train.data] == [0, 1] * 5
+    assert [len(batch) for batch in test] == [3, 3, 3, 1]
+    assert len(train + test) == 20
     posed = test[0][0]
     settings = SimpleNamespace(maxFEs=300, n_logpoint=5, log_interval=60, full_meta_data=True, device="cpu")
     optimiser = Random_search(settings)
@@ -181,5 +181,5 @@ def test_metaboxs_own_episode_has_the_trace_of_a_plain_loop(version: str) -> Non
     if version == "torch":  # MetaBox's optimisers of numpy give arrays
         posed.eval = lambda x, own=posed.eval: own(torch.as_tensor(x)).numpy()
     episode = BBO_TestUnit(optimiser, posed, 1).run_batch_episode()
-    assert (episode["problem_name"], episode["fes"]) == ("posefit-2026.2_f001_i10000_d09", 300)
+    assert (episode["problem_name"], episode["fes"]) == ("posefit-2026.3_f001_i10000_d09", 300)
     check(posed.problem, np.concatenate(episode["metadata"]["X"]), np.concatenate(episode["metadata"]["Cost"]))

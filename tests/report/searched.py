@@ -11,7 +11,7 @@ BUDGET = 100  # evaluations for each dimension
 
 
 def cell(method: str, function: int = 1, dimension: int = 9, instance: int = 10_000, **more: Any) -> SearchCell:
-    suite = "posefit-2026.2"
+    suite = "posefit-2026.3"
     return SearchCell(method, suite, function, dimension, instance, more.pop("budget", BUDGET) * dimension, **more)
 
 

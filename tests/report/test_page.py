@@ -265,14 +265,14 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         assert page.locator("#charts .curve").count() == 6 * 3
         rows = page.locator("#ert tbody tr")
         assert rows.count() == 6 * 2 * 2
-        page.locator("#of-function").select_option(label="5 mismatched body")
+        page.locator("#of-function").select_option(label="5 sequence")
         page.locator("#of-dimension").select_option(label="24")
         assert rows.count() == 6
         assert "cma" in rows.first.inner_text()
         assert rows.first.locator("strong").count() == 2  # to 16 and to 4 above, as soon as others
         assert "–" in rows.last.inner_text()
         page.locator("#lost button").last.click()
-        assert 'suite = "posefit-2026.2"' in page.inner_text("#command")
+        assert 'suite = "posefit-2026.3"' in page.inner_text("#command")
 
 
 def test_a_leaderboard_opens_and_names_what_is_not_ranked(chromium: Any, tmp_path: Path) -> None:

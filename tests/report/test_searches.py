@@ -84,14 +84,14 @@ def test_instances_that_one_method_lacks_are_named(tmp_path: Path) -> None:
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
     results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))  # 9 + 2 and 9; 9 and 9 + 1
     data = data_of(results, runs_of(results), print)
-    assert [chart["title"] for chart in data["charts"]] == ["All functions", "1 single image", "5 mismatched body"]
+    assert [chart["title"] for chart in data["charts"]] == ["All functions", "1 single image", "5 sequence"]
     together, first, _ = (chart["series"][0]["values"] for chart in data["charts"])
     assert (data["evaluations"][0], data["evaluations"][-1]) == pytest.approx((1.0, 100.0))
     assert together[0] == 0.0  # the first target falls at the tenth evaluation, 1.1 for each dimension
     assert together[-1] == pytest.approx(39.0 / (4.0 * 29.0))
     assert first[-1] == pytest.approx(20.0 / (2.0 * 29.0))
     shares = [(part["name"], part["rows"][0]["reached"]) for part in data["by_function"]]
-    assert shares == [("1 single image", pytest.approx(2000 / 58)), ("5 mismatched body", pytest.approx(1900 / 58))]
+    assert shares == [("1 single image", pytest.approx(2000 / 58)), ("5 sequence", pytest.approx(1900 / 58))]
     half = int(np.searchsorted(data["evaluations"], 5.0))
     assert together[half] == pytest.approx(min(int(data["evaluations"][half] * 9.0 / 10.0), 9) / 29.0)
     last = data["charts"][0]["series"][0]

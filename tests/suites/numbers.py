@@ -20,16 +20,17 @@ def fixed_proposals(dimension: int) -> np.ndarray:
 
 
 def areas_of(function: int, instance: int, dimension: int) -> list[list[list[int]]]:
-    """Return R, B, Y of each of the fixed proposals, repaired, in each view: whole numbers of pixels."""
+    """Return R, B, Y of each of the fixed proposals, repaired, in each frame and view: whole numbers of pixels."""
     made = suite_instance(function, instance, dimension)
-    poses, translations = made.posed.decode(made.repaired(fixed_proposals(dimension)))
-    return [view.tolist() for view in made.posed.areas(poses, translations)]
+    proposals = made.repaired(fixed_proposals(dimension))
+    return [view.tolist() for frame in made.frames for view in frame.areas(*frame.decode(proposals))]
 
 
 def mask_of(function: int, instance: int, dimension: int) -> str:
-    """Return the beginning of the SHA-256 of what the cameras saw."""
+    """Return the beginning of the SHA-256 of what the cameras saw, damaged or not."""
     made = suite_instance(function, instance, dimension)
-    return hashlib.sha256(b"".join(np.packbits(one.mask).tobytes() for one in made.posed.silhouettes)).hexdigest()[:16]
+    masks = [one.mask for frame in (*made.frames, *made.noisy) for one in frame.silhouettes]
+    return hashlib.sha256(b"".join(np.packbits(mask).tobytes() for mask in masks)).hexdigest()[:16]
 
 
 def addresses() -> list[tuple[int, int, int]]:

@@ -20,7 +20,7 @@ from tests.cases import each
 from tests.commands import run
 
 PLAN = """
-suite = "posefit-2026.2"
+suite = "posefit-2026.3"
 methods = ["random", { method = "pso", settings = { population_size = 20 } }]
 functions = [1, 7]
 dimensions = [9, 24]
@@ -94,7 +94,7 @@ def test_scores_follow_from_the_traces() -> None:
 
 def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together(tmp_path: Path) -> None:
     plan = """
-suite = "posefit-2026.2"
+suite = "posefit-2026.3"
 methods = ["random"]
 functions = [1]
 instances = [3, 4]
@@ -133,7 +133,7 @@ def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not
 def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_path: Path) -> None:
     runs = {(run.method, run.function, run.dimension, run.instance): run for run in search_runs(Ledger(results))}
     assert len(runs) == 12
-    problem = posefit.suite("posefit-2026.2", 1, 3, 9)
+    problem = posefit.suite("posefit-2026.3", 1, 3, 9)
     expected = run_on(problem, "pso", {"population_size": 20}, evaluations=90)
     mine = runs["pso", 1, 9, 3]
     assert np.array_equal(mine.evaluations, expected.evaluations)
@@ -212,7 +212,7 @@ def test_a_mistake_is_one_line_and_status_2(
 )
 def test_a_mistake_in_a_plan_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        Plan.of({"suite": "posefit-2026.2", "methods": ["sapso"], "functions": [1], **change})
+        Plan.of({"suite": "posefit-2026.3", "methods": ["sapso"], "functions": [1], **change})
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

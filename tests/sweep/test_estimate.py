@@ -43,7 +43,7 @@ def tracks() -> Sequence[Cell]:
 
 
 def searches(**more: Any) -> Sequence[Cell]:
-    plan = {"suite": "posefit-2026.2", "methods": ["random"], "functions": [1], "instances": 2, **more}
+    plan = {"suite": "posefit-2026.3", "methods": ["random"], "functions": [1], "instances": 2, **more}
     return search_cells(plan)
 
 
