@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import re
 from pathlib import Path
 
 import click
@@ -11,6 +12,7 @@ from click.testing import CliRunner
 
 import functions
 import posefit
+import suite_claims
 from make_boxes import learned_from, upright_poses
 from make_bundles import compact
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
@@ -195,7 +197,7 @@ def test_the_calibration_error_is_the_mean_gap_of_the_bins() -> None:
 
 
 def test_a_run_made_compact_scores_as_before_and_claims_no_more(tmp_path: Path) -> None:
-    problems = [posefit.suite(function=function, instance=10_000) for function in (1, 2, 5)]
+    problems = [posefit.suite(function=function, instance=10_000) for function in (1, 2, 4)]
     runs = [run_on(problem, "pso", evaluations=300) for problem in problems]
     small = [compact(run, posefit.suite(function=run.function, instance=run.instance)) for run in runs]
     assert suite_scores(small) == suite_scores(runs)
@@ -240,6 +242,12 @@ def test_shares_are_of_problems_and_targets_and_the_best_of_all_is_so_on_each_pr
     assert shares["random"] == [0.25, 0.25]
     assert shares["cma"] == [0.0, 0.75]
     assert shares["best of all"] == [0.25, 0.75]
+
+
+def test_a_share_of_targets_has_its_interval() -> None:
+    text = suite_claims.share_text(8, "random", range(10_000, 10_004))
+    value, low, high = map(int, re.fullmatch(r"(\d+) \((-?\d+) to (\d+)\)", text).groups())  # type: ignore[union-attr]
+    assert low < value < high < 100
 
 
 def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
