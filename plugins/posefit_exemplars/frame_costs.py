@@ -62,8 +62,11 @@ class FrameCosts:
         return landmark_likelihoods(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
 
     def side_odds(self, pose: Array, place: Array) -> float | None:
-        """Return the logarithm of the odds that left and right are as in a pose (66,); None without landmarks."""
-        if self._observation.landmarks is None or not self._observation.landmarks[..., 2].any():
+        """Return the logarithm of the odds that left and right are as in a pose (66,).
+
+        None without landmarks, and with several cameras, whose silhouettes know better.
+        """
+        if self.cameras > 1 or self._observation.landmarks is None or not self._observation.landmarks[..., 2].any():
             return None
         return side_odds(self.landmarks(pose[None], place[None])[0])
 
