@@ -3,7 +3,7 @@
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.landmarks import ARMS, GROUPS, landmark_likelihoods, side_odds
+from posefit.fitting.landmarks import GROUPS, landmark_likelihoods, side_odds
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
@@ -61,11 +61,14 @@ class FrameCosts:
             return np.zeros((len(poses), len(GROUPS) * len(self._task.cameras), 2))
         return landmark_likelihoods(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
 
-    def arms_odds(self, pose: Array, place: Array) -> float | None:
-        """Return the logarithm of the odds that left and right arms are as in a pose (66,); None without landmarks."""
-        if self._observation.landmarks is None or not self._observation.landmarks[..., 2].any():
+    def side_odds(self, pose: Array, place: Array) -> float | None:
+        """Return the logarithm of the odds that left and right are as in a pose (66,).
+
+        None without landmarks, and with several cameras, whose silhouettes know better.
+        """
+        if self.cameras > 1 or self._observation.landmarks is None or not self._observation.landmarks[..., 2].any():
             return None
-        return side_odds(self.landmarks(pose[None], place[None])[0], ARMS)
+        return side_odds(self.landmarks(pose[None], place[None])[0])
 
     def contours(self, place: Array) -> FrameContours:
         """Return the contours of the masks, of a person whose root is about at `place` (3,)."""

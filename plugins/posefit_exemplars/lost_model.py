@@ -37,8 +37,8 @@ ARRAYS = ("slopes", "joint_spreads", "angle_spreads", "joint_factors", "angle_fa
 MIN_COST = 0.1  # per cent
 MIN_SPREAD = 0.002  # metres
 MAX_LOG_ODDS = 30.0  # logarithm
-LANDMARK_SECONDS = 0.25  # that the mean of what landmarks tell of arms reaches back
-MIN_ARMS_ODDS = 0.5  # the least mean logarithm of their odds at which left and right are known
+LANDMARK_SECONDS = 0.5  # that the mean of what landmarks tell of sides reaches back
+MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known
 
 
 def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float, cameras: int) -> Array:
@@ -236,7 +236,7 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
     Their `details` hold the evidence and the probability of exchanged sides. Frames without sampled tracks stay as
     they are.
     """
-    memory, arms, keep = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
+    memory, sides, keep = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         if frame.posterior is None:
@@ -249,9 +249,9 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
         known = exchanged < classifier.unknown
-        if (odds := frame.details.get("arms")) is not None:  # landmarks know better
-            arms = keep * arms + [odds, 1.0]
-            known = bool(arms[0] >= MIN_ARMS_ODDS * arms[1])
+        if (odds := frame.details.get("sides")) is not None:  # landmarks know better
+            sides = keep * sides + [odds, 1.0]
+            known = bool(sides[0] >= MIN_SIDE_ODDS * sides[1])
         second_side = float(known)
         recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=second_side)
         yield replace(

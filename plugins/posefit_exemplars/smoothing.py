@@ -82,7 +82,7 @@ def _frame(recent: Sequence[Estimate], here: int, spread: float) -> Frame:
     details: dict[str, Any] = {"usable": look.usable}
     posterior, used = None, int(np.ceil(estimate.evaluations)) + 1
     if estimate.paths is not None:
-        details["arms"] = look.arms_odds(pose, place)
+        details["sides"] = look.side_odds(pose, place)
         details["twins"] = look.twins(pose, place) if look.usable else np.empty(0)
         used += len(details["twins"])
         posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, look)

@@ -11,7 +11,7 @@ from posefit.silhouette.rasteriser import NEAR
 
 # joints whose left and right a detector exchanges together or not at all
 _TOGETHER = (("femur", "tibia", "toes"), ("humerus", "radius"), ("clavicle", "hipjoint"))
-ARMS = 1  # number of a group, of which most is known
+LEGS, ARMS = 0, 1  # numbers of groups
 GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones]) for bones in _TOGETHER]
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
 DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
@@ -69,14 +69,15 @@ def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
     return np.asarray(1.0 / (1.0 + np.exp(np.clip(odds, -30.0, 30.0))))
 
 
-def side_odds(likelihoods: Array, group: int) -> float:
-    """Return the logarithm of the odds that a group's sides are as in a pose, of its `landmark_likelihoods` (K, 2).
+def side_odds(likelihoods: Array) -> float:
+    """Return the logarithm of the odds that legs and arms are on the sides of a pose, not on the other ones.
 
-    It is 0 where no view shows them, and each view adds at most those of the group's share of exchanges.
+    Of its `landmark_likelihoods` (K, 2). What says nothing adds 0, and each limb of each view at most the odds of its
+    usual share of exchanges.
     """
-    rare, views = EXCHANGED[group], likelihoods[group :: len(GROUPS)]
-    exchanged = landmark_costs(views[:, None, ::-1], np.array([rare]))
-    return float((exchanged - landmark_costs(views[:, None], np.array([rare]))).sum())
+    limbs = np.arange(len(likelihoods)) % len(GROUPS) <= ARMS
+    usual, own = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
+    return float(landmark_costs(own[:, ::-1], usual) - landmark_costs(own, usual))
 
 
 def _distances(pixels: Array, landmarks: Array) -> Array:

@@ -12,6 +12,7 @@ from posefit.fitting.landmarks import (
     ARMS,
     DEVIATION,
     EXCHANGED,
+    LEGS,
     PERSISTENCE,
     exchanged_given,
     exchanged_next,
@@ -93,14 +94,14 @@ def test_exchanged_landmarks_are_expected_to_stay_so() -> None:
     np.testing.assert_allclose(twice, -np.log(total).sum(axis=1), rtol=1e-9)
 
 
-def test_the_odds_of_arms_are_at_most_those_of_the_usual_share() -> None:
-    most = np.log((1.0 - EXCHANGED[ARMS]) / EXCHANGED[ARMS])
-    right, wrong = (
-        likelihoods(marks, WALK.poses[3:4])[0] for marks in (landmarks_of(1.0), landmarks_of(1.0)[:, list(MIRROR)])
-    )
-    assert 0.3 * most < side_odds(right, ARMS) <= most
-    np.testing.assert_allclose(side_odds(wrong, ARMS), -side_odds(right, ARMS), rtol=1e-9)
-    assert side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0], ARMS) == 0.0
+def test_the_odds_of_sides_are_at_most_those_of_the_usual_shares() -> None:
+    usual = EXCHANGED[[LEGS, ARMS]]
+    most = np.log((1.0 - usual) / usual).sum()
+    marks = landmarks_of(1.0)
+    right, wrong = (likelihoods(one, WALK.poses[3:4])[0] for one in (marks, marks[:, list(MIRROR)]))
+    assert 0.3 * most < side_odds(right) <= most
+    np.testing.assert_allclose(side_odds(wrong), -side_odds(right), rtol=1e-9)
+    assert side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0]) == 0.0
 
 
 def test_landmarks_are_read_with_their_masks(tmp_path: Path) -> None:
