@@ -55,12 +55,10 @@ def close(centres, latents, i, reach):
 
 
 @jit
-def near(centres, latents, reach):
-    """Return which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
-    allowed = np.empty(latents.shape[0], dtype=np.bool_)
+def near(latents, centres, reach, allowed):
+    """Write which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
     for i in range(latents.shape[0]):
         allowed[i] = close(centres, latents, i, reach[()])
-    return allowed
 
 
 @jit
