@@ -48,5 +48,6 @@ def _build_call(context: Any, builder: Any, signature: Any, arguments: Any) -> A
     kinds, convention = signature.args[1].types, context.call_conv
     pointer = convention.get_function_type(types.none, kinds).as_pointer()
     function = builder.inttoptr(arguments[0], pointer)
-    convention.call_function(builder, function, types.none, kinds, unpack_tuple(builder, arguments[1]))
+    values: Any = unpack_tuple(builder, arguments[1])  # type: ignore[no-untyped-call]
+    convention.call_function(builder, function, types.none, kinds, values)
     return context.get_dummy_value()

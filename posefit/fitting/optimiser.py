@@ -5,7 +5,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +81,8 @@ NOTHING_SEARCHED = np.empty((0, 0, 0)), np.empty((0, 0))  # what `compiled_searc
 
 def finite_costs(costs: Array) -> Array:
     """Return costs (n,) that any library can work with: at most 1e15 to either side, nan the worst of all."""
-    return np.clip(np.where(np.isnan(costs), WORST, costs), -WORST, WORST)
+    finite: Array = np.fmax(np.fmin(costs, WORST), -WORST)
+    return finite
 
 
 class Adapter(ABC):
@@ -162,7 +163,8 @@ def _chained(
     optimiser: Optimiser, evaluate: Callable[[Array], Array], evaluations: int
 ) -> Iterator[tuple[Array, Array]]:
     """Yield the first populations with their costs, as many as both sides have a compiled form for."""
-    problem, search = getattr(evaluate, "__self__", None), getattr(optimiser, "compiled_search", None)
+    problem: Any = getattr(evaluate, "__self__", None)
+    search = getattr(optimiser, "compiled_search", None)
     if search is None or not hasattr(problem, "compiled") or evaluate != problem.evaluate:
         return
     while len((searched := search(problem, min(evaluations, PIECE)))[1]):
