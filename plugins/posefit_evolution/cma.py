@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.evolution.strategy import LAG, Strategy, default_population_size
-from posefit.fitting.box import REPAIR_STEPS, Space, displacement, draw_population, repair, wrap
+from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.optimiser import NOTHING_SEARCHED, WORST, finite_costs
 from posefit.fitting.problem import PoseProblem
@@ -102,7 +102,7 @@ class CMAES:
         if objective is None:
             return NOTHING_SEARCHED
         searched = np.empty((evaluations // n, n, d)), np.empty((evaluations // n, n))
-        draws = self._rng, self._space.periodic, (self._redraws, REPAIR_STEPS, *strategy.settings), self._home
+        draws = self._rng, self._space.periodic, (self._redraws, *strategy.settings), self._home
         now = strategy.generation, strategy.sigma, strategy.ending, strategy.state
         done, strategy.sigma, ended = search(objective, *draws, *now, WORST, searched)
         strategy.generation += done

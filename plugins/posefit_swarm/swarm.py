@@ -64,7 +64,7 @@ class SwarmState:
         self._space, self._rng, self._limits, self._clamped = space, rng, limits, clamped
         self._redraws, self._scalar = redraws, rand == "scalar"
         self._coordinate_redraws = 0 if self._scalar else redraws  # of a coordinate by itself
-        self._spare, self._used = np.empty(0), 0  # random numbers for those redraws
+        self._spare, self.used = np.empty(0), 0  # random numbers for those redraws
         self._all_rows = np.arange(population_size)
         self.moved = draw_population(space, rng, population_size)
         self.velocity = self._first_velocities()
@@ -82,7 +82,7 @@ class SwarmState:
         """
         costs, accepted = self._checked(proposals, costs), np.empty(len(self.moved), dtype=bool)
         chances = self._rng.random(len(costs))
-        return accepted, accept(self.moved, costs, chances, temperature, kept, self._arrays(), accepted)
+        return accepted, accept(self.moved, costs, chances, temperature, kept, self.arrays(), accepted)
 
     def move(self, omega: float, acceleration: float, swarm_best: Array) -> None:
         """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Interpretation S7."""
@@ -94,7 +94,7 @@ class SwarmState:
         """Accept or refuse, then move towards the best, with one block of draws; return which were accepted (n,)."""
         costs, accepted = self._checked(proposals, costs), np.empty(len(self.moved), dtype=bool)
         rand = self._draws(len(costs), len(costs))
-        leader = accept(self.moved, costs, rand, temperature, kept, self._arrays(), accepted)
+        leader = accept(self.moved, costs, rand, temperature, kept, self.arrays(), accepted)
         self._finish(rand, (omega, acceleration, self.best[leader]))
         return accepted
 
@@ -112,14 +112,11 @@ class SwarmState:
         objective = problem.compiled() if count and self._clamped and not self._scalar else None
         if objective is None:
             return NOTHING_SEARCHED, temperature
-        most = 2 * self._coordinate_redraws * d + SPARE
-        if len(self._spare) != most:  # nothing has been drawn yet
-            self._spare, self._used = np.empty(most), most
         searched = np.empty((count, n, d)), np.empty((count, n))
         redraws, moves = (self._redraws, self._coordinate_redraws), (self._next_velocity, self.moved, self._stopped)
-        draws = redraws, self._all_rows, self._spare, self._used
-        done, self._used, temperature = search(
-            objective, self._rng, schedule, temperature, annealing, *draws, self._arrays(), moves, searched
+        draws = redraws, self._all_rows, *self.draws()
+        done, self.used, temperature = search(
+            objective, self._rng, schedule, temperature, annealing, *draws, self.arrays(), moves, searched
         )
         return (searched[0][:done], searched[1][:done]), temperature
 
@@ -136,9 +133,16 @@ class SwarmState:
         """Take back what `subset` returned for these rows, as it is now."""
         for name in _EACH:
             getattr(self, name)[rows] = getattr(part, name)
-        self._spare, self._used = part._spare, part._used
+        self._spare, self.used = part._spare, part.used
 
-    def _arrays(self) -> tuple[Any, ...]:
+    def draws(self) -> tuple[Array, int]:
+        """Return the random numbers for redraws, which compiled loops write to, and how many of them are `used`."""
+        most = 2 * self._coordinate_redraws * self.moved.shape[1] + SPARE
+        if len(self._spare) != most:  # nothing has been drawn yet
+            self._spare, self.used = np.empty(most), most
+        return self._spare, self.used
+
+    def arrays(self) -> tuple[Any, ...]:
         """Return the arrays that the compiled loops take."""
         known = self.position, self.cost, self.best, self.best_cost, self.velocity
         return *known, *self._limits, self._space.periodic, self._clamped
@@ -159,8 +163,8 @@ class SwarmState:
     def _restock(self) -> None:
         """Draw more numbers for redraws, where another particle might need more than there are."""
         most = 2 * self._coordinate_redraws * self.moved.shape[1]
-        if self._used + most > len(self._spare):
-            self._spare, self._used = self._rng.random(most + SPARE), 0
+        if self.used + most > len(self._spare):
+            self._spare, self.used = self._rng.random(most + SPARE), 0
 
     def _finish(self, rand: Array, pull: Pull) -> None:
         """Move all particles, and then see to constraint 2."""
@@ -172,11 +176,11 @@ class SwarmState:
 
     def _move(self, rows: NDArray[np.int64], rand: Array, pull: Pull, moves: tuple[Any, ...]) -> None:
         """Write the moves of particles (k,): velocities, positions and which are stopped."""
-        swarm, reached = self._arrays(), 0
+        swarm, reached = self.arrays(), 0
         while reached < len(rows):
             self._restock()
-            reached, self._used = move(
-                rows, reached, rand, self._spare, self._used, self._coordinate_redraws, *pull, swarm, *moves
+            reached, self.used = move(
+                rows, reached, rand, self._spare, self.used, self._coordinate_redraws, *pull, swarm, *moves
             )
 
     def _redraw(self, broken: NDArray[np.int64], pull: Pull) -> None:

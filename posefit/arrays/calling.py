@@ -40,7 +40,7 @@ def _call(typing_context: Any, address: Any, arguments: Any) -> Any:  # noqa: AR
 
 
 @overload(call, inline="always")
-def _call_compiled(address, arguments):  # noqa: ARG001
+def _call_compiled(address, arguments):  # type: ignore[no-untyped-def]  # noqa: ARG001
     return lambda address, arguments: _call(address, arguments)  # type: ignore[call-arg]
 
 

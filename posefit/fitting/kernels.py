@@ -6,6 +6,7 @@ import numpy as np
 
 from posefit.arrays import jit
 from posefit.arrays.calling import call
+from posefit.fitting.box import REPAIR_STEPS
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.kernels import add_mismatch
 
@@ -62,6 +63,57 @@ def feasible(objective, proposals, allowed):
         allowed[i] &= inside[i]
         everyone &= allowed[i]
     return everyone
+
+
+@jit
+def wrap(periodic, proposals):
+    """Bring the periodic coordinates of proposals (n, d) into [-1, 1)."""
+    for j in range(periodic.size):
+        if periodic[j]:
+            for k in range(proposals.shape[0]):
+                proposals[k, j] = (proposals[k, j] + 1.0) % 2.0 - 1.0
+
+
+@jit
+def repair(objective, periodic, proposals, rows, homes):
+    """Move proposals (n, d) in some rows (k,) into the box, and towards homes (k or 1, d), as `box.repair` does it."""
+    d = proposals.shape[1]
+    inside, allowed = np.empty((rows.size, d)), np.empty(rows.size, np.bool_)
+    for k in range(rows.size):
+        for j in range(d):
+            inside[k, j] = proposals[rows[k], j]
+    wrap(periodic, inside)
+    for k in range(rows.size):
+        for j in range(d):
+            x = inside[k, j]
+            inside[k, j] = homes[k % homes.shape[0], j] if np.isnan(x) else min(max(x, -1.0), 1.0)
+    feasible(objective, inside, allowed)
+    way, line, works = np.empty((1, d)), np.empty((REPAIR_STEPS - 1, d)), np.empty(REPAIR_STEPS - 1, np.bool_)
+    for k in range(rows.size):
+        home = homes[k % homes.shape[0]]
+        if not allowed[k]:
+            for j in range(d):
+                way[0, j] = inside[k, j] - home[j]
+            wrap(periodic, way)
+            for s in range(REPAIR_STEPS - 1):
+                for j in range(d):
+                    line[s, j] = (REPAIR_STEPS - 1 - s) / REPAIR_STEPS * way[0, j]
+            for s in range(REPAIR_STEPS - 1):  # by itself: the product is rounded before the sum, as NumPy does it
+                for j in range(d):
+                    line[s, j] += home[j]
+            wrap(periodic, line)
+            for s in range(REPAIR_STEPS - 1):
+                for j in range(d):
+                    line[s, j] = min(max(line[s, j], -1.0), 1.0)
+            feasible(objective, line, works)
+            for j in range(d):
+                inside[k, j] = home[j]
+            for s in range(REPAIR_STEPS - 2, -1, -1):
+                if works[s]:
+                    for j in range(d):
+                        inside[k, j] = line[s, j]
+        for j in range(d):
+            proposals[rows[k], j] = inside[k, j]
 
 
 @jit
