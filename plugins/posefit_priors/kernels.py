@@ -31,20 +31,8 @@ def recover(latents, components, mean, angles):
 
 
 @jit
-def distance(centres, latent):
-    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre, the L1 distance over m."""
-    nearest = np.inf
-    for c in range(centres.shape[0]):
-        total = 0.0
-        for j in range(centres.shape[1]):
-            total += abs(centres[c, j] - latent[j])
-        nearest = min(nearest, total / centres.shape[1])
-    return nearest
-
-
-@jit
 def close(centres, latents, i, reach):
-    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`, by distance D."""
+    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`, by distance D: the L1 distance over m."""
     for c in range(centres.shape[0]):
         total = 0.0
         for j in range(centres.shape[1]):
