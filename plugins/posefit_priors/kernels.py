@@ -32,7 +32,10 @@ def recover(latents, components, mean, angles):
 
 @jit
 def close(centres, latents, i, reach):
-    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`, by distance D: the L1 distance over m."""
+    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`.
+
+    By distance D: the mean absolute difference, the L1 distance over m.
+    """
     for c in range(centres.shape[0]):
         total = 0.0
         for j in range(centres.shape[1]):

@@ -164,28 +164,38 @@ def redraw(objective, rng, allowed, attempts, redraws, pull, spare, used, swarm,
     """
     velocities, moved, stopped = moves
     omega, acceleration, swarm_best = pull
-    d, position = moved.shape[1], swarm[0]
-    broken = np.flatnonzero(~allowed & ~stopped)
-    left, many = attempts, FIRST_REDRAWS
+    (n, d), position = moved.shape, swarm[0]
+    broken, count = np.empty(n, np.int64), 0
+    for i in range(n):
+        if not (allowed[i] or stopped[i]):
+            broken[count] = i
+            count += 1
+    broken, left, many = broken[:count], attempts, FIRST_REDRAWS
     while left > 0 and broken.size:
         many = min(left, many)
-        rows, works = np.repeat(broken, many), np.empty(broken.size * many, np.bool_)
-        again = np.empty((rows.size, d)), np.empty((rows.size, d)), np.empty(rows.size, np.bool_)
-        rand = rng.random(2 * rows.size * d)
+        rows, rand = np.empty(broken.size * many, np.int64), np.empty(2 * broken.size * many * d)
+        for k in range(rows.size):
+            rows[k] = broken[k // many]
+        for k in range(rand.size):
+            rand[k] = rng.random()
+        works, stops = np.empty(rows.size, np.bool_), np.empty(rows.size, np.bool_)
+        again = np.empty((rows.size, d)), np.empty((rows.size, d)), stops
         used = move_all(rng, rows, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, again)
         feasible(objective, again[1], works)
         broken = repair(broken, works, again[0], again[1], velocities, moved)
         left, many = left - many, attempts
-    ended = np.concatenate((np.flatnonzero(~allowed & stopped), broken))
-    clipped, works = np.empty((ended.size, d)), np.empty(ended.size, np.bool_)
-    for k in range(ended.size):
+    ends, works, clipped = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty((n, d))
+    for i in range(n):
+        ends[i] = stopped[i] and not allowed[i]
         for j in range(d):
-            clipped[k, j] = min(max(moved[ended[k], j], -1.0), 1.0)
+            clipped[i, j] = min(max(moved[i, j], -1.0), 1.0)
+    for k in range(broken.size):
+        ends[broken[k]] = True
     feasible(objective, clipped, works)
-    for k in range(ended.size):
-        for j in range(d):
-            moved[ended[k], j] = clipped[k, j] if works[k] else position[ended[k], j]
-            velocities[ended[k], j] = 0.0
+    for i in range(n):
+        for j in range(d if ends[i] else 0):
+            moved[i, j] = clipped[i, j] if works[i] else position[i, j]
+            velocities[i, j] = 0.0
     return used
 
 
@@ -241,7 +251,10 @@ def search(objective, rng, schedule, temperature, annealing, redraws, rows, spar
         for k in range(rand.size):
             rand[k] = rng.random()
         leader = accept(moved, costs[g], rand, temperature, kept, swarm, accepted)
-        temperature *= schedule[g, 2] ** (np.count_nonzero(accepted) if each else 1)
+        moves_accepted = 0
+        for i in range(n):
+            moves_accepted += accepted[i]
+        temperature *= schedule[g, 2] ** (moves_accepted if each else 1)
         pull = schedule[g, 0], schedule[g, 1], swarm[2][leader]
         used = move_all(rng, rows, rand, spare, used, redraws[1], pull[0], pull[1], pull[2], swarm, moves)
         if not feasible(objective, moved, allowed):

@@ -159,12 +159,23 @@ def populations(
         raise BudgetError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
 
 
+def compiled_search_of(optimiser: Optimiser) -> Callable[["PoseProblem", int], tuple[Array, Array]] | None:
+    """Return an optimiser's method `compiled_search`; None where it has none, or a subclass has another ask or tell."""
+
+    def owner(name: str) -> type:
+        return next((kind for kind in type(optimiser).__mro__ if name in vars(kind)), object)
+
+    search = owner("compiled_search")
+    own = search is not object and issubclass(search, owner("ask")) and issubclass(search, owner("tell"))
+    return optimiser.compiled_search if own else None  # type: ignore[attr-defined, no-any-return]
+
+
 def _chained(
     optimiser: Optimiser, evaluate: Callable[[Array], Array], evaluations: int
 ) -> Iterator[tuple[Array, Array]]:
     """Yield the first populations with their costs, as many as both sides have a compiled form for."""
     problem: Any = getattr(evaluate, "__self__", None)
-    search = getattr(optimiser, "compiled_search", None)
+    search = compiled_search_of(optimiser)
     if search is None or not hasattr(problem, "compiled") or evaluate != problem.evaluate:
         return
     while len((searched := search(problem, min(evaluations, PIECE)))[1]):

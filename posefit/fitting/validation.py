@@ -18,7 +18,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import NOTHING_SEARCHED, BudgetError, Optimiser
+from posefit.fitting.optimiser import NOTHING_SEARCHED, BudgetError, Optimiser, compiled_search_of
 from posefit.fitting.prior import Prior
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
@@ -91,7 +91,7 @@ class CheckedOptimiser:
 
     def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
         """Return the optimiser's next populations and their costs; none where it has no compiled form."""
-        search = getattr(self._optimiser, "compiled_search", None)
+        search = compiled_search_of(self._optimiser)
         if search is None:
             return NOTHING_SEARCHED
         with self._called("compiled_search"):
