@@ -2,19 +2,23 @@
 
 Each round is a fresh process of each checkout, one after the other. A figure is the fastest of several runs in CPU
 time, on one thread, and the median over the rounds, so that others on the machine count for little. `OpenCV` is the
-cost as it is usually written; the stages of a pose are the last checkout's.
+cost as it is usually written; two threads are compared with one by the clock. Commands are run once each, with a
+compilation cache that is empty and then with what they have left in it; their CPU time is that of all their processes.
+The stages of a pose are the last checkout's.
 """
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import median
-from time import process_time
+from time import perf_counter, process_time
 
 import click
 
@@ -22,7 +26,9 @@ PLACES = ("", "plugins", "envs")
 FIRST_PICTURE = "from posefit_reproduce.bench.kernel import bench_problem; bench_problem()"
 
 
-def fastest_of(jobs: dict[str, Callable[[], object]], seconds: float) -> dict[str, float]:
+def fastest_of(
+    jobs: dict[str, Callable[[], object]], seconds: float, clock: Callable[[], float] = process_time
+) -> dict[str, float]:
     """Return the fastest run of each job in CPU seconds, all in turns for so many seconds each."""
     best, used = {}, {}
     for name, job in jobs.items():
@@ -30,9 +36,9 @@ def fastest_of(jobs: dict[str, Callable[[], object]], seconds: float) -> dict[st
         best[name], used[name] = float("inf"), 0.0
     while min(used.values()) < seconds:
         for name in (name for name in jobs if used[name] < seconds):
-            began = process_time()
+            began = clock()
             jobs[name]()
-            took = process_time() - began
+            took = clock() - began
             best[name], used[name] = min(best[name], took), used[name] + took
     return best
 
@@ -41,6 +47,7 @@ def measured() -> dict[str, float]:
     """Return the figures of the checkout that this process imports."""
     import numpy as np
 
+    import posefit
     from posefit.fitting.box import draw_population
     from posefit.fitting.optimiser import minimise
     from posefit.silhouette.cost import areas
@@ -67,6 +74,10 @@ def measured() -> dict[str, float]:
     sizes = {f"evaluate {n}": n for n in some} | {"OpenCV": 40} | dict.fromkeys(("decode", "joints", "areas"), 200)
     figures = {f"{name}, us": 1e6 * took / sizes.get(name, 200) for name, took in fastest_of(jobs, 0.3).items()}
 
+    threads = {k: partial(replace(problem, threads=k).evaluate, some[4000]) for k in (1, 2)}
+    by_clock = fastest_of({str(k): job for k, job in threads.items()}, 3.0, perf_counter)
+    figures["two threads, times one"] = by_clock["1"] / by_clock["2"]
+
     def frame(make: Callable[..., object], seed: int) -> None:
         minimise(problem.evaluate, make(space, np.random.default_rng(seed)), evaluations, budget_known=True)
 
@@ -78,10 +89,11 @@ def measured() -> dict[str, float]:
     took = fastest_of(
         {f"{name} {k}": partial(frame, make, k) for name, make in searches.items() for k in range(4)}, 0.4
     )
+    least = min(figures[f"evaluate {n}, us"] for n in (200, 1000, 4000))
     for name in searches:
         whole = sum(took[f"{name} {k}"] for k in range(4)) / 4
         figures[f"{name} frame, ms"] = 1e3 * whole
-        figures[f"{name} overhead"] = 1e6 * whole / evaluations / figures["evaluate 1000, us"]
+        figures[f"{name} overhead"] = 1e6 * whole / evaluations / least
     for name in ("fit_each", "race_each", "configure_each"):
         envs = _pair(*CASES[name])
         native = envs["native"].unwrapped
@@ -89,6 +101,9 @@ def measured() -> dict[str, float]:
         took = fastest_of({kind: _steps(env, 1) for kind, env in envs.items()}, 0.5)
         figures |= {f"{name} {kind}, us": 1e6 * took[kind] / count for kind in took}
         figures[f"{name} over Sync"] = took["sync"] / took["native"]
+    for method in ("sapso", "cma", "exemplars"):
+        tracks = [posefit.track("walk", method=method, frames=(0, 20)) for _ in range(3)]
+        figures[f"track, a frame of {method}, ms"] = 1e3 * min(each.summary["cpu_seconds_per_frame"] for each in tracks)
     return figures
 
 
@@ -137,8 +152,18 @@ def ran(checkout: Path, what: str, **variables: str) -> str:
     """Return the output of a fresh process of a checkout."""
     path = os.pathsep.join(str(checkout / place) for place in PLACES)
     environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"} | variables
+    environment |= {"PYTHONDONTWRITEBYTECODE": ""}  # modules are read from bytecode, as installed ones are
     command = [sys.executable, "-W", "ignore", *(["-c", what] if " " in what else [__file__, "--child", what])]
     return subprocess.run(command, env=environment, cwd=checkout, capture_output=True, text=True, check=True).stdout
+
+
+def cpu_seconds(checkout: Path, arguments: list[str], cache: str) -> float:
+    """Return the CPU seconds of a command line of posefit with all its processes."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    code = f"import sys; sys.argv[1:] = {arguments}; from posefit.cli import run; run()"
+    ran(checkout, code, NUMBA_CACHE_DIR=cache)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def started(checkout: Path) -> dict[str, float]:
@@ -150,7 +175,23 @@ def started(checkout: Path) -> dict[str, float]:
             "import posefit, ms": 1e3 * float(ran(checkout, clock.format("import posefit"))),
             "first picture, cold, s": float(ran(checkout, picture, NUMBA_CACHE_DIR=cold)),
             "first picture, warm, s": float(ran(checkout, picture, NUMBA_CACHE_DIR=cold)),
-        }
+        } | commands(checkout)
+
+
+def commands(checkout: Path) -> dict[str, float]:
+    """Return the CPU seconds of the commands that a user begins with, with a cold and with a warm cache."""
+    figures = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for state in ("cold", "warm"):
+            at = f"{folder}/{state}"
+            runs = {
+                "sweep default": ["sweep", "default", "--out", at],
+                "report": ["report", at, "--out", f"{at}.html"],
+                "track walk": ["track", "walk", "--out", f"{at}-walk"],
+            }
+            for name, arguments in runs.items():
+                figures[f"{name}, {state} cache, s"] = cpu_seconds(checkout, arguments, f"{folder}/cache")
+    return figures
 
 
 @click.command()

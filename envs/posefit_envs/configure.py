@@ -7,6 +7,7 @@ from gymnasium import spaces
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
+from posefit.silhouette.sharing import work_through
 from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, log_improvement
 from posefit_envs.instance import ArgumentError, Episode, World, checked
 from posefit_envs.population import (
@@ -28,7 +29,7 @@ EVERY = 5  # iterations a step
 
 
 class ConfigureVectorEnv(SearchVectorEnv):
-    """`num_envs` environments as ConfigureEnv; a turn of all their searches is one compiled call."""
+    """`num_envs` environments as ConfigureEnv; a step of each is one compiled call, or a turn of all their searches."""
 
     def __init__(
         self,
@@ -67,6 +68,8 @@ class ConfigureVectorEnv(SearchVectorEnv):
         before = [population.best for population in populations]
         for i in rows.tolist():
             populations[i].begin_step(control_of(actions[i]))
+        each = [slice(i, i + 1) for i in rows.tolist()]
+        work_through(each, self._stage.threads, lambda _: (), lambda row: populations[row.start].take_turns())
         while open_rows := [i for i, population in enumerate(populations) if population.open]:
             asked = {i: populations[i].ask() for i in open_rows}
             widest = max(len(proposals) for proposals in asked.values())

@@ -42,7 +42,7 @@ class Stage:
     def __init__(self, world: World, rows: int, threads: int = 1) -> None:
         views, (width, height) = len(world.view_degrees), world.size
         bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
-        self._width, self._height, self._threads = width, height, threads
+        self._width, self._height, self.threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
         self._chain = body_of(world.motion).skeleton.chain
         self._silhouettes: list[Sequence[Silhouette]] = [()] * rows
@@ -138,13 +138,13 @@ class Stage:
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
         at = self._chain, self._read_only(), self._width, self._height
         values = poses, translations, areas, _BODY, pictures
-        shares = max(min(self._threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
+        shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
         if shares == 1:
             draw_scenes(*at, rows, *values)
         else:
             cuts = [len(rows) * share // shares for share in range(shares + 1)]
             parts = [slice(a, b) for a, b in pairwise(cuts)]
-            work_through(parts, self._threads, lambda _: (), lambda part: draw_scenes(*at, rows[part], *values))
+            work_through(parts, self.threads, lambda _: (), lambda part: draw_scenes(*at, rows[part], *values))
         costs = mean_over_views([mismatch(view) for view in areas.reshape(views, n * k, 3)])  # every pixel is known
         return costs.reshape(n, k), areas
 

@@ -12,7 +12,9 @@ from posefit.errors import InputError
 from posefit.evolution.strategy import LAG, Strategy, default_population_size
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
-from posefit.fitting.optimiser import finite_costs
+from posefit.fitting.optimiser import NOTHING_SEARCHED, WORST, finite_costs
+from posefit.fitting.problem import PoseProblem
+from posefit_evolution.kernels import search
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
@@ -91,8 +93,26 @@ class CMAES:
         self._strategy.learn(mean + displacement(self._space, mean, proposals) if round_trip else proposals, known)
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.ended():
-            self._population_size *= self._growth  # AUGER2005 (restart)
-            self._strategy = self._begun(np.full(self._space.dimensions, self._spread))
+            self._restart()
+
+    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
+        """Return the next populations (k, n, d) and their costs (k, n), up to the next restart."""
+        n, d, strategy = self._population_size, self._space.dimensions, self._strategy
+        objective = problem.compiled() if self._asked is None and evaluations >= n else None
+        if objective is None:
+            return NOTHING_SEARCHED
+        searched = np.empty((evaluations // n, n, d)), np.empty((evaluations // n, n))
+        draws = self._rng, self._space.periodic, (self._redraws, *strategy.settings), self._home
+        now = strategy.generation, strategy.sigma, strategy.ending, strategy.state
+        done, strategy.sigma, ended = search(objective, *draws, *now, WORST, searched)
+        strategy.generation += done
+        if ended:
+            self._restart()
+        return searched[0][:done], searched[1][:done]
+
+    def _restart(self) -> None:
+        self._population_size *= self._growth  # AUGER2005 (restart)
+        self._strategy = self._begun(np.full(self._space.dimensions, self._spread))
 
     def _begun(self, spread: Array) -> Strategy:
         """Return a strategy around the prediction, or else around a fresh draw."""

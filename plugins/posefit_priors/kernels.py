@@ -31,20 +31,11 @@ def recover(latents, components, mean, angles):
 
 
 @jit
-def distance(centres, latent):
-    """Return D: the mean absolute difference of a latent pose (m,) from the nearest centre, the L1 distance over m."""
-    nearest = np.inf
-    for c in range(centres.shape[0]):
-        total = 0.0
-        for j in range(centres.shape[1]):
-            total += abs(centres[c, j] - latent[j])
-        nearest = min(nearest, total / centres.shape[1])
-    return nearest
-
-
-@jit
 def close(centres, latents, i, reach):
-    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`, by distance D."""
+    """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`.
+
+    By distance D: the mean absolute difference, the L1 distance over m.
+    """
     for c in range(centres.shape[0]):
         total = 0.0
         for j in range(centres.shape[1]):
@@ -55,12 +46,10 @@ def close(centres, latents, i, reach):
 
 
 @jit
-def near(centres, latents, reach):
-    """Return which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
-    allowed = np.empty(latents.shape[0], dtype=np.bool_)
+def near(latents, centres, reach, allowed):
+    """Write which latents (n, m) are nearer to a centre (K, m) than `reach` ()."""
     for i in range(latents.shape[0]):
         allowed[i] = close(centres, latents, i, reach[()])
-    return allowed
 
 
 @jit

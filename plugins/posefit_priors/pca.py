@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
+from posefit.fitting.prior import CompiledLatents
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import Shape, Stored, angles_of, check_clustering
 from posefit_priors.clusters import clustered
-from posefit_priors.kernels import distance, near, recover
+from posefit_priors.kernels import near, recover
 
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
@@ -91,7 +92,14 @@ class PCA(Linear):
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
-        return np.asarray(near(self.centres, writeable(latents), self.reach))
+        allowed = np.empty(len(latents), dtype=bool)
+        near(writeable(latents), self.centres, self.reach, allowed)
+        return allowed
+
+    @property
+    def compiled(self) -> CompiledLatents:
+        """The loops of `inverse_transform` and of `feasible`."""
+        return (recover, (self.components, self.mean)), (near, (self.centres, self.reach))
 
 
 def check_components(components: float) -> None:
@@ -142,4 +150,7 @@ def _orthonormal(directions: Array) -> Array:
 
 def reach_of(centres: Array, latents: Array, quantile: float) -> Array:
     """Return chi (): this quantile of the distances D of training latents (n, m) from their nearest centres (K, m)."""
-    return np.array(np.quantile([distance(centres, latent) for latent in latents], quantile))  # Interpretation S5
+    away = np.zeros((len(latents), len(centres)))
+    for own, middle in zip(latents.T, centres.T, strict=True):  # in the order of `near`
+        away += np.abs(middle - own[:, None])
+    return np.array(np.quantile(away.min(axis=1) / len(centres.T), quantile))  # Interpretation S5

@@ -7,7 +7,12 @@ velocities are clamped to their limits; else one outside them breaks a constrain
 
 import math
 
+import numpy as np
+
 from posefit.arrays import jit
+from posefit.fitting.kernels import evaluate, feasible
+
+FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 
 
 @jit
@@ -134,36 +139,6 @@ def accept(moved, costs, chances, temperature, kept, swarm, accepted):
 
 
 @jit
-def accept_and_move(
-    costs,
-    temperature,
-    kept,
-    accepted,
-    rows,
-    rand,
-    spare,
-    used,
-    redraws,
-    omega,
-    acceleration,
-    swarm,
-    velocities,
-    moved,
-    stopped,
-):
-    """Accept or refuse the moves of a swarm and move it on towards its new best, with one block of draws for both.
-
-    Returns the swarm's best row, and what `move` returns.
-    """
-    leader = accept(moved, costs, rand, temperature, kept, swarm, accepted)
-    swarm_best = swarm[2][leader]
-    first, used = move(
-        rows, 0, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, velocities, moved, stopped
-    )
-    return leader, first, used
-
-
-@jit
 def repair(broken, works, velocities, moved, velocity, position):
     """Give each broken particle its first attempt that works (rows in equal shares); return those that have none."""
     many, left = works.size // broken.size, 0
@@ -179,3 +154,112 @@ def repair(broken, works, velocities, moved, velocity, position):
             broken[left] = broken[k]
             left += 1
     return broken[:left].copy()
+
+
+@jit
+def redraw(objective, rng, allowed, attempts, redraws, pull, spare, used, swarm, moves):
+    """Draw rand() again for whole particles that are not allowed (n,), or stop them, as `SwarmState` does.
+
+    Returns the numbers of `spare` that are used then.
+    """
+    velocities, moved, stopped = moves
+    omega, acceleration, swarm_best = pull
+    (n, d), position = moved.shape, swarm[0]
+    broken, count = np.empty(n, np.int64), 0
+    for i in range(n):
+        if not (allowed[i] or stopped[i]):
+            broken[count] = i
+            count += 1
+    broken, left, many = broken[:count], attempts, FIRST_REDRAWS
+    while left > 0 and broken.size:
+        many = min(left, many)
+        rows, rand = np.empty(broken.size * many, np.int64), np.empty(2 * broken.size * many * d)
+        for k in range(rows.size):
+            rows[k] = broken[k // many]
+        for k in range(rand.size):
+            rand[k] = rng.random()
+        works, stops = np.empty(rows.size, np.bool_), np.empty(rows.size, np.bool_)
+        again = np.empty((rows.size, d)), np.empty((rows.size, d)), stops
+        used = move_all(rng, rows, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, again)
+        feasible(objective, again[1], works)
+        broken = repair(broken, works, again[0], again[1], velocities, moved)
+        left, many = left - many, attempts
+    ends, works, clipped = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty((n, d))
+    for i in range(n):
+        ends[i] = stopped[i] and not allowed[i]
+        for j in range(d):
+            clipped[i, j] = min(max(moved[i, j], -1.0), 1.0)
+    for k in range(broken.size):
+        ends[broken[k]] = True
+    feasible(objective, clipped, works)
+    for i in range(n):
+        for j in range(d if ends[i] else 0):
+            moved[i, j] = clipped[i, j] if works[i] else position[i, j]
+            velocities[i, j] = 0.0
+    return used
+
+
+@jit
+def move_all(rng, rows, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, moves):
+    """Move particles `rows` (k,) as `move` does, with more drawn to `spare` as it is used up; return how much then."""
+    velocities, moved, stopped = moves
+    reached = 0
+    while reached < rows.size:
+        if used + 2 * redraws * moved.shape[1] > spare.size:
+            for k in range(spare.size):
+                spare[k] = rng.random()
+            used = 0
+        reached, used = move(
+            rows,
+            reached,
+            rand,
+            spare,
+            used,
+            redraws,
+            omega,
+            acceleration,
+            swarm_best,
+            swarm,
+            velocities,
+            moved,
+            stopped,
+        )
+    return used
+
+
+@jit
+def search(objective, rng, schedule, temperature, annealing, redraws, rows, spare, used, swarm, moves, searched):
+    """Evaluate, accept and move a swarm, by a row of a `schedule` (k, 3) after the other, as `SwarmState` does it.
+
+    A row are omega, the acceleration and the factor of the temperature. `annealing` are what a refused particle keeps
+    of its velocity, the temperature that ends the search, and whether each accepted move cools; `redraws` those of
+    whole particles and of a coordinate. Written to `searched` are the proposals (k, n, d) and their costs (k, n).
+
+    Returns how many rows are done, how much of `spare` is used, and the temperature.
+    """
+    velocities, moved, _ = moves
+    proposals, costs = searched
+    kept, stop, each = annealing
+    n, d = moved.shape
+    rand, accepted, allowed = np.empty(n + 2 * n * d), np.empty(n, np.bool_), np.empty(n, np.bool_)
+    for g in range(schedule.shape[0]):
+        if temperature <= stop or not evaluate(objective, moved, costs[g]):
+            return g, used, temperature
+        for i in range(n):
+            for j in range(d):
+                proposals[g, i, j] = moved[i, j]
+        for k in range(rand.size):
+            rand[k] = rng.random()
+        leader = accept(moved, costs[g], rand, temperature, kept, swarm, accepted)
+        moves_accepted = 0
+        for i in range(n):
+            moves_accepted += accepted[i]
+        temperature *= schedule[g, 2] ** (moves_accepted if each else 1)
+        pull = schedule[g, 0], schedule[g, 1], swarm[2][leader]
+        used = move_all(rng, rows, rand, spare, used, redraws[1], pull[0], pull[1], pull[2], swarm, moves)
+        if not feasible(objective, moved, allowed):
+            used = redraw(objective, rng, allowed, redraws[0], redraws[1], pull, spare, used, swarm, moves)
+        for i in range(n):
+            for j in range(d):
+                swarm[4][i, j] = velocities[i, j]
+    return schedule.shape[0], used, temperature

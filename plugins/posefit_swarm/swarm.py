@@ -11,7 +11,9 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population, extent
 from posefit.fitting.check import at_least, positive
-from posefit_swarm.kernels import accept, accept_and_move, move, repair
+from posefit.fitting.optimiser import NOTHING_SEARCHED
+from posefit.fitting.problem import PoseProblem
+from posefit_swarm.kernels import FIRST_REDRAWS, accept, move, repair, search
 
 INERTIA = 0.9  # A; Interpretation S5: the paper gives none, and it must be above 0.1
 ACCELERATION = 2.0  # c1 = c2, section 3.1
@@ -23,7 +25,6 @@ def inertia(step: int, steps: int, first: float = INERTIA) -> float:
     return first / math.exp(step * math.log(10.0 * first) / steps)  # SAPSO inertia
 
 
-FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 SPARE = 2048  # ours: how many numbers are drawn at once for redraws, beside those that one particle may need
 
 _EACH = ("moved", "velocity", "position", "cost", "best", "best_cost")  # what every particle has
@@ -63,7 +64,7 @@ class SwarmState:
         self._space, self._rng, self._limits, self._clamped = space, rng, limits, clamped
         self._redraws, self._scalar = redraws, rand == "scalar"
         self._coordinate_redraws = 0 if self._scalar else redraws  # of a coordinate by itself
-        self._spare, self._used = np.empty(0), 0  # random numbers for those redraws
+        self._spare, self.used = np.empty(0), 0  # random numbers for those redraws
         self._all_rows = np.arange(population_size)
         self.moved = draw_population(space, rng, population_size)
         self.velocity = self._first_velocities()
@@ -81,26 +82,43 @@ class SwarmState:
         """
         costs, accepted = self._checked(proposals, costs), np.empty(len(self.moved), dtype=bool)
         chances = self._rng.random(len(costs))
-        return accepted, accept(self.moved, costs, chances, temperature, kept, self._arrays(), accepted)
+        return accepted, accept(self.moved, costs, chances, temperature, kept, self.arrays(), accepted)
 
     def move(self, omega: float, acceleration: float, swarm_best: Array) -> None:
         """Move every particle by SAPSO (1) and (2), so that it meets the constraints. Interpretation S7."""
-        self._finish(0, self._draws(len(self.moved)), (omega, acceleration, swarm_best))
+        self._finish(self._draws(len(self.moved)), (omega, acceleration, swarm_best))
 
     def accept_and_move(
         self, proposals: Array, costs: Array, temperature: float, kept: float, omega: float, acceleration: float
     ) -> NDArray[np.bool_]:
-        """Accept or refuse, then move towards the best, in one compiled call; return which were accepted (n,)."""
+        """Accept or refuse, then move towards the best, with one block of draws; return which were accepted (n,)."""
         costs, accepted = self._checked(proposals, costs), np.empty(len(self.moved), dtype=bool)
         rand = self._draws(len(costs), len(costs))
-        self._restock()
-        draws = rand, self._spare, self._used, self._coordinate_redraws
-        moves = self._next_velocity, self.moved, self._stopped
-        leader, reached, self._used = accept_and_move(
-            costs, temperature, kept, accepted, self._all_rows, *draws, omega, acceleration, self._arrays(), *moves
-        )
-        self._finish(reached, rand, (omega, acceleration, self.best[leader]))
+        leader = accept(self.moved, costs, rand, temperature, kept, self.arrays(), accepted)
+        self._finish(rand, (omega, acceleration, self.best[leader]))
         return accepted
+
+    def compiled_search(
+        self, problem: PoseProblem, schedule: Array, temperature: float, annealing: tuple[float, float, bool]
+    ) -> tuple[tuple[Array, Array], float]:
+        """Return the next populations (k, n, d) with their costs (k, n), and the temperature after them.
+
+        They are evaluated, and `accept_and_move` is done with each. `schedule` (k, 3) has an omega, an acceleration and
+        a factor of the temperature for each; `annealing` are what a refused particle keeps of its velocity, the
+        temperature that ends the search, and whether each accepted move cools it. There are fewer where it ends, and
+        none where no compiled form is to be had.
+        """
+        (n, d), (count, _) = self.moved.shape, schedule.shape
+        objective = problem.compiled() if count and self._clamped and not self._scalar else None
+        if objective is None:
+            return NOTHING_SEARCHED, temperature
+        searched = np.empty((count, n, d)), np.empty((count, n))
+        redraws, moves = (self._redraws, self._coordinate_redraws), (self._next_velocity, self.moved, self._stopped)
+        draws = redraws, self._all_rows, *self.draws()
+        done, self.used, temperature = search(
+            objective, self._rng, schedule, temperature, annealing, *draws, self.arrays(), moves, searched
+        )
+        return (searched[0][:done], searched[1][:done]), temperature
 
     def subset(self, rows: NDArray[np.int64]) -> "SwarmState":
         """Return some particles (k,) as a state of their own, which draws from the same generator."""
@@ -115,9 +133,16 @@ class SwarmState:
         """Take back what `subset` returned for these rows, as it is now."""
         for name in _EACH:
             getattr(self, name)[rows] = getattr(part, name)
-        self._spare, self._used = part._spare, part._used
+        self._spare, self.used = part._spare, part.used
 
-    def _arrays(self) -> tuple[Any, ...]:
+    def draws(self) -> tuple[Array, int]:
+        """Return the random numbers for redraws, which compiled loops write to, and how many of them are `used`."""
+        most = 2 * self._coordinate_redraws * self.moved.shape[1] + SPARE
+        if len(self._spare) != most:  # nothing has been drawn yet
+            self._spare, self.used = np.empty(most), most
+        return self._spare, self.used
+
+    def arrays(self) -> tuple[Any, ...]:
         """Return the arrays that the compiled loops take."""
         known = self.position, self.cost, self.best, self.best_cost, self.velocity
         return *known, *self._limits, self._space.periodic, self._clamped
@@ -138,25 +163,24 @@ class SwarmState:
     def _restock(self) -> None:
         """Draw more numbers for redraws, where another particle might need more than there are."""
         most = 2 * self._coordinate_redraws * self.moved.shape[1]
-        if self._used + most > len(self._spare):
-            self._spare, self._used = self._rng.random(most + SPARE), 0
+        if self.used + most > len(self._spare):
+            self._spare, self.used = self._rng.random(most + SPARE), 0
 
-    def _finish(self, reached: int, rand: Array, pull: Pull) -> None:
-        """Move the particles from number `reached` on, and then see to constraint 2."""
-        if reached < len(self.moved):
-            self._move(reached, self._all_rows, rand, pull, (self._next_velocity, self.moved, self._stopped))
+    def _finish(self, rand: Array, pull: Pull) -> None:
+        """Move all particles, and then see to constraint 2."""
+        self._move(self._all_rows, rand, pull, (self._next_velocity, self.moved, self._stopped))
         works = self._allowed(self._next_velocity, self.moved)
         if np.count_nonzero(works) < len(works):
             self._redraw(np.flatnonzero(~works), pull)
         self.velocity, self._next_velocity = self._next_velocity, self.velocity
 
-    def _move(self, reached: int, rows: NDArray[np.int64], rand: Array, pull: Pull, moves: tuple[Any, ...]) -> None:
-        """Write the moves of particles (k,), velocities, positions and which are stopped, from number `reached` on."""
-        swarm = self._arrays()
+    def _move(self, rows: NDArray[np.int64], rand: Array, pull: Pull, moves: tuple[Any, ...]) -> None:
+        """Write the moves of particles (k,): velocities, positions and which are stopped."""
+        swarm, reached = self.arrays(), 0
         while reached < len(rows):
             self._restock()
-            reached, self._used = move(
-                rows, reached, rand, self._spare, self._used, self._coordinate_redraws, *pull, swarm, *moves
+            reached, self.used = move(
+                rows, reached, rand, self._spare, self.used, self._coordinate_redraws, *pull, swarm, *moves
             )
 
     def _redraw(self, broken: NDArray[np.int64], pull: Pull) -> None:
@@ -167,7 +191,7 @@ class SwarmState:
             many = min(left, many)
             rows = np.repeat(broken, many)
             moves = np.empty((len(rows), self.moved.shape[1])), np.empty((len(rows), self.moved.shape[1]))
-            self._move(0, rows, self._draws(len(rows)), pull, (*moves, np.empty(len(rows), dtype=bool)))
+            self._move(rows, self._draws(len(rows)), pull, (*moves, np.empty(len(rows), dtype=bool)))
             # SAPSO A1.2c
             broken = repair(broken, self._allowed(*moves), *moves, self._next_velocity, self.moved)
             left, many = left - many, self._redraws

@@ -10,6 +10,55 @@ APART = 1e-8  # ours, as cmaes has it: keeps the lengths of steps away from 0 wh
 LARGEST = 1e32  # ours, as cmaes has it: of a step size
 LONGEST = 1e4  # ours, as cmaes has it: an axis of proposals beyond it diverges
 FLATTEST = 1e14  # the longest axis over the shortest, as cmaes has it; the tutorial means their squares
+MENDED = 1e-8  # ours, as cmaes has it: an eigenvalue that rounding has made negative
+
+
+@jit
+def sample(normal, mean, sigma, scaled, drawn):
+    """Write the proposals (n, d) that normal draws (n, d) become, with `scaled` (d, d) the axes in rows, to scale."""
+    for k in range(normal.shape[0]):
+        for j in range(mean.size):
+            drawn[k, j] = 0.0
+        for i in range(mean.size):
+            for j in range(mean.size):
+                drawn[k, j] += normal[k, i] * scaled[i, j]  # HANSEN2016 (39)
+        for j in range(mean.size):
+            drawn[k, j] = mean[j] + sigma * drawn[k, j]  # HANSEN2016 (40)
+
+
+@jit
+def decompose(covariance, axes, lengths, scaled):
+    """Write the axes (d, d) of a covariance, in columns, their lengths (d,), and in rows the axes to scale."""
+    values, vectors = np.linalg.eigh(covariance)
+    if values[0] < 0.0:
+        values = np.where(values < 0.0, MENDED, values)
+        for i in range(values.size):
+            for j in range(values.size):
+                covariance[i, j] = 0.0
+                for k in range(values.size):
+                    covariance[i, j] += vectors[i, k] * values[k] * vectors[j, k]
+    for j in range(values.size):
+        lengths[j] = math.sqrt(values[j])
+        for i in range(values.size):
+            axes[i, j], scaled[j, i] = vectors[i, j], vectors[i, j] * lengths[j]
+
+
+@jit
+def learn(proposals, costs, weights, rates, every, generation, sigma, state):
+    """Adapt a state to a generation of proposals (n, d) and their finite costs (n,); return the step size.
+
+    The state are mean (d,), axes (d, d), lengths (d,), both paths (d,), covariance (d, d), the axes to scale (d, d) and
+    the best and worst costs of the last generations.
+    """
+    mean, axes, lengths, step_path, path, covariance, scaled, recent = state
+    order = np.argsort(costs, kind="mergesort")
+    slot = 2 * generation % recent.size
+    recent[slot], recent[slot + 1] = costs[order[0]], costs[order[-1]]
+    moved = mean, axes, lengths, step_path, path, covariance
+    sigma = adapt(proposals, order, weights, rates, generation, sigma, *moved)
+    if generation % every == 0:
+        decompose(covariance, axes, lengths, scaled)
+    return sigma
 
 
 @jit
@@ -76,12 +125,13 @@ def adapt(proposals, order, weights, rates, generation, sigma, mean, axes, lengt
 
 
 @jit
-def stagnant(generation, sigma, mean, axes, lengths, path, covariance, recent, flat, small):
+def stagnant(generation, sigma, state, flat, small):
     """Return whether a search has come to an end: nothing changes any more, or it diverges.
 
-    `recent` are the best and worst costs of the last generations, which are `flat` where they differ by less;
-    proposals are `small` apart where their spread and their path are less.
+    The state is that of `learn`. The costs of the last generations are `flat` where they differ by less; proposals are
+    `small` apart where their spread and their path are less.
     """
+    mean, axes, lengths, _, path, covariance, _, recent = state
     d = mean.size
     low, high = recent[0], recent[0]
     for cost in recent:

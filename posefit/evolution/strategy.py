@@ -6,7 +6,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from posefit.arrays import Array, writeable
-from posefit.evolution.kernels import adapt, stagnant
+from posefit.evolution.kernels import decompose, learn, sample, stagnant
 
 ALPHA = 2.0  # alpha_cov
 SLACK = 1e-8  # ours, as cmaes has it: what the rates of the covariance leave of 1 where populations are huge
@@ -61,7 +61,6 @@ def _worth(weights: Array) -> float:
 
 LAG = 0.1  # of the decomposition, appendix B.2
 LEAST = 1e-6  # ours: the shortest axis at first, in overall step sizes
-MENDED = 1e-8  # ours, as cmaes has it: an eigenvalue that rounding has made negative
 FLAT, SMALL = 1e-12, 1e-12  # TolFun, and TolX in first step sizes: as cmaes has them
 
 
@@ -84,35 +83,42 @@ class Strategy:
         self._rates = tuple(rates)
         self._every = max(1, math.floor(lag / (d * (rates.c_1 + rates.c_mu))))  # HANSEN2016 (B.2)
         self._recent, self._small = np.zeros(2 * (10 + math.ceil(30 * d / population))), SMALL * size
+        self._axes, self._lengths, self._scaled = np.empty((d, d)), np.empty(d), np.empty((d, d))
         self._decompose()
 
     def sample(self, rng: np.random.Generator, count: int) -> Array:
         """Return so many draws (count, d)."""
         normal = rng.standard_normal((count, len(self.mean)))  # HANSEN2016 (38)
-        steps = normal @ self._scaled  # HANSEN2016 (39)
-        return self.mean + self.sigma * steps  # HANSEN2016 (40)
+        drawn = np.empty(normal.shape)
+        sample(normal, self.mean, self.sigma, self._scaled, drawn)
+        return drawn
 
     def learn(self, proposals: Array, costs: Array) -> None:
         """Adapt to a generation of proposals (n, d), drawn here or moved since, and their finite costs (n,)."""
-        order = costs.argsort(kind="stable")
         self.generation += 1
-        slot = 2 * self.generation % len(self._recent)
-        self._recent[slot : slot + 2] = costs[order[0]], costs[order[-1]]
-        moved = self.mean, self._axes, self._lengths, self.step_path, self.path, self.covariance
-        self.sigma = adapt(writeable(proposals), order, self._weights, self._rates, self.generation, self.sigma, *moved)
-        if self.generation % self._every == 0:
-            self._decompose()
+        population = writeable(proposals), writeable(costs)
+        self.sigma = learn(*population, *self.settings, self.generation, self.sigma, self.state)
 
     def ended(self) -> bool:
         """Return whether the search has come to an end."""
-        grown = self.mean, self._axes, self._lengths, self.path, self.covariance, self._recent
-        return bool(stagnant(self.generation, self.sigma, *grown, FLAT, self._small))
+        return bool(stagnant(self.generation, self.sigma, self.state, *self.ending))
+
+    @property
+    def settings(self) -> tuple[Array, tuple[float, ...], int]:
+        """Weights (n,), rates, and how many generations old the decomposition becomes, as compiled loops take them."""
+        return self._weights, self._rates, self._every
+
+    @property
+    def ending(self) -> tuple[float, float]:
+        """Costs and proposals that differ by less end the search."""
+        return FLAT, self._small
+
+    @property
+    def state(self) -> tuple[Array, ...]:
+        """The arrays that `learn` changes, as the compiled loops take them."""
+        axes = self.mean, self._axes, self._lengths
+        return *axes, self.step_path, self.path, self.covariance, self._scaled, self._recent
 
     def _decompose(self) -> None:
         """Find the axes (d, d), in columns, and their lengths (d,): C = axes diag(lengths^2) axes'."""
-        values, self._axes = np.linalg.eigh(self.covariance)
-        if values[0] < 0.0:
-            values = np.where(values < 0.0, MENDED, values)
-            self.covariance = (self._axes * values) @ self._axes.T
-        self._lengths = np.sqrt(values)
-        self._scaled: Array = (self._axes * self._lengths).T
+        decompose(self.covariance, self._axes, self._lengths, self._scaled)

@@ -1,12 +1,119 @@
-"""Aligning, and decoding proposals, in numba: plain functions over arrays, shapes checked by the callers."""
+"""Aligning, decoding and evaluating proposals, in numba: plain functions over arrays, shapes checked by the callers."""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from posefit.arrays import jit
+from posefit.arrays.calling import call
+from posefit.fitting.box import REPAIR_STEPS
+from posefit.geometry.skeleton import ANGLES
+from posefit.silhouette.kernels import add_mismatch
 
 ROUNDS = 3  # which joint is outermost depends a little on where the body stands
 DAMPING = 1e-9  # keeps the 3 x 3 system solvable where a silhouette has too few borders
 NEAREST = 1e-3  # metres; a joint that is nearer, or behind the camera, counts as that far
+
+
+class Objective(NamedTuple):
+    """What compiled loops need to evaluate proposals of a problem.
+
+    `recover`, `near` and `count` are the addresses of functions, each followed by the arguments that never change.
+    """
+
+    box: tuple[Any, ...]  # what `unpack_proposals` takes between proposals and poses
+    recover: Any  # of the prior's `compiled`: from latents to joint angles
+    recovering: tuple[Any, ...]
+    near: Any  # of the prior's `compiled`: whether latents are feasible
+    clusters: tuple[Any, ...]
+    count: Any  # of `count_areas`
+    drawing: tuple[Any, ...]
+    scale: float
+    beta: float
+
+
+@jit
+def evaluate(objective, proposals, costs):
+    """Write the costs (n,) of proposals (n, d) as `PoseProblem.evaluate` does; return whether all are finite."""
+    centre, half, anchor, first, mean = objective.box
+    n, areas = costs.size, np.empty((costs.size, 3), np.int64)
+    latents, angles = np.empty((n, centre.size - first)), np.empty((n, ANGLES - 3))
+    poses, translations = np.empty((n, ANGLES)), np.empty((n, 3))
+    if not unpack_proposals(proposals, centre, half, anchor, first, mean, poses, translations, latents):
+        return False
+    call(objective.recover, (latents, *objective.recovering, angles))
+    for i in range(n):
+        costs[i] = 0.0
+        for j in range(angles.shape[1]):
+            poses[i, 3 + j] = angles[i, j]
+    call(objective.count, (*objective.drawing, poses, translations, areas))
+    add_mismatch(areas, objective.scale, objective.beta, costs)
+    return True
+
+
+@jit
+def feasible(objective, proposals, allowed):
+    """Write which proposals (n, d) are feasible (n,), as `SearchSpace.feasible` does; return whether all are."""
+    centre, half, _, first, _ = objective.box
+    inside, latents = np.empty(allowed.size, np.bool_), np.empty((allowed.size, centre.size - first))
+    within(proposals, centre, half, inside, latents)
+    call(objective.near, (latents, *objective.clusters, allowed))
+    everyone = True
+    for i in range(allowed.size):
+        allowed[i] &= inside[i]
+        everyone &= allowed[i]
+    return everyone
+
+
+@jit
+def wrap(periodic, proposals):
+    """Bring the periodic coordinates of proposals (n, d) into [-1, 1)."""
+    for j in range(periodic.size):
+        if periodic[j]:
+            for k in range(proposals.shape[0]):
+                proposals[k, j] = (proposals[k, j] + 1.0) % 2.0 - 1.0
+
+
+@jit
+def repair(objective, periodic, proposals, rows, homes):
+    """Move proposals (n, d) in some rows (k,) into the box, and towards homes (k or 1, d), as `box.repair` does it."""
+    d = proposals.shape[1]
+    inside, allowed = np.empty((rows.size, d)), np.empty(rows.size, np.bool_)
+    for k in range(rows.size):
+        for j in range(d):
+            inside[k, j] = proposals[rows[k], j]
+    wrap(periodic, inside)
+    for k in range(rows.size):
+        for j in range(d):
+            x = inside[k, j]
+            inside[k, j] = homes[k % homes.shape[0], j] if np.isnan(x) else min(max(x, -1.0), 1.0)
+    feasible(objective, inside, allowed)
+    way, line, works = np.empty((1, d)), np.empty((REPAIR_STEPS - 1, d)), np.empty(REPAIR_STEPS - 1, np.bool_)
+    for k in range(rows.size):
+        home = homes[k % homes.shape[0]]
+        if not allowed[k]:
+            for j in range(d):
+                way[0, j] = inside[k, j] - home[j]
+            wrap(periodic, way)
+            for s in range(REPAIR_STEPS - 1):
+                for j in range(d):
+                    line[s, j] = (REPAIR_STEPS - 1 - s) / REPAIR_STEPS * way[0, j]
+            for s in range(REPAIR_STEPS - 1):  # by itself: the product is rounded before the sum, as NumPy does it
+                for j in range(d):
+                    line[s, j] += home[j]
+            wrap(periodic, line)
+            for s in range(REPAIR_STEPS - 1):
+                for j in range(d):
+                    line[s, j] = min(max(line[s, j], -1.0), 1.0)
+            feasible(objective, line, works)
+            for j in range(d):
+                inside[k, j] = home[j]
+            for s in range(REPAIR_STEPS - 2, -1, -1):
+                if works[s]:
+                    for j in range(d):
+                        inside[k, j] = line[s, j]
+        for j in range(d):
+            proposals[rows[k], j] = inside[k, j]
 
 
 @jit

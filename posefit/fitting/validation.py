@@ -18,8 +18,9 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import BudgetError, Optimiser
+from posefit.fitting.optimiser import NOTHING_SEARCHED, BudgetError, Optimiser, compiled_search_of
 from posefit.fitting.prior import Prior
+from posefit.fitting.problem import PoseProblem
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
@@ -60,29 +61,45 @@ class CheckedOptimiser:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
         with self._called("ask"):
             proposals = self._optimiser.ask()
+        self._check(proposals)
+        count, budget = len(proposals), self._evaluations
+        if self._first and not count:
+            raise self._broken("ask must return a first population of one proposal or more, got none")
+        if self._first and budget is not None and count > budget:
+            raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {budget}")
+        return proposals
+
+    def _check(self, proposals: Array) -> None:
+        """Raise BrokenRuleError where proposals are not (n, d) numbers in the box."""
         plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
         if not plain or proposals.shape[1:] != (self._space.dimensions,):
             came = f"shape {proposals.shape}" if plain else type(proposals).__name__
             raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
         if proposals.dtype.kind != "f":
             raise self._broken(f"ask must return numbers of type float64, got {proposals.dtype}")
-        count, budget = len(proposals), self._evaluations
-        if self._first and not count:
-            raise self._broken("ask must return a first population of one proposal or more, got none")
-        if self._first and budget is not None and count > budget:
-            raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {budget}")
         farthest = np.abs(proposals).max(initial=0.0)
         if np.isnan(farthest):
             raise self._broken("ask must return finite proposals, got nan")
         if farthest > 1.0:
             raise self._broken(f"ask must return proposals in [-1, 1], got {proposals.flat[abs(proposals).argmax()]}")
-        return proposals
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs on."""
         self._first = False
         with self._called("tell"):
             self._optimiser.tell(proposals, costs)
+
+    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
+        """Return the optimiser's next populations and their costs; none where it has no compiled form."""
+        search = compiled_search_of(self._optimiser)
+        if search is None:
+            return NOTHING_SEARCHED
+        with self._called("compiled_search"):
+            proposals, costs = search(problem, evaluations)
+        if len(costs):
+            self._check(np.concatenate(proposals))
+            self._first = False
+        return proposals, costs
 
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
@@ -146,6 +163,7 @@ class CheckedPrior:
         self._prior, self._name = prior, name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
         self.affine = getattr(prior, "affine", None)
+        self.compiled = getattr(prior, "compiled", None)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn from joint angles (T, 63), and return itself."""

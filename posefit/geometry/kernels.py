@@ -211,8 +211,8 @@ def empty_lanes():
 @inlined
 def set_view(lanes, first, stop, rotation, translation, focal, centre):
     """Place the joints of some lanes in a camera's picture: x and y in pixels, times the depth, and the depth."""
-    for i in range(3):
-        for j in range(4):
+    for i in range(translation.size):
+        for j in range(translation.size + 1):
             own, depth = (rotation[i, j], rotation[2, j]) if j < 3 else (translation[i], translation[2])
             value = focal[i] * own + centre[i] * depth if i < 2 else depth
             for lane in range(first, stop):
@@ -222,8 +222,8 @@ def set_view(lanes, first, stop, rotation, translation, focal, centre):
 @inlined
 def set_offsets(lanes, first, stop, offsets):
     """Give some lanes the bones of a body (26, 3)."""
-    for b in range(_BONES):
-        for i in range(3):
+    for b in range(offsets.shape[0]):  # numbers known to the compiler would have it write out every turn
+        for i in range(offsets.shape[1]):
             for lane in range(first, stop):
                 lanes[_OFFSET + LANES * (3 * b + i) + lane] = offsets[b, i]
 

@@ -82,7 +82,7 @@ def test_inertia_falls_from_0_9_to_0_1() -> None:
     pso = PSO(Toy(2), np.random.default_rng(0), population_size=3, iterations=10, velocity="inertia")
     weights = []
     for _ in range(12):
-        weights.append(pso._weights())
+        weights.append(pso._weights(pso._iteration))
         pso.tell(pso.ask(), np.zeros(3))
     assert weights[0] == (0.9, 2.0)
     assert weights[10][0] == pytest.approx(0.1)
