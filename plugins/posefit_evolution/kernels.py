@@ -12,7 +12,7 @@ def ask(objective, rng, periodic, redraws, home, sigma, state, proposals):
     """Write the next population (n, d) as `CMAES.ask` does."""
     mean, scaled = state[0], state[6]
     allowed = np.empty(proposals.shape[0], np.bool_)
-    sample(rng.standard_normal(proposals.shape), mean, sigma, scaled, proposals)  # HANSEN2016 (38)
+    sample(rng.standard_normal(proposals.shape), mean, sigma, scaled, proposals)
     wrap(periodic, proposals)
     if feasible(objective, proposals, allowed):
         return

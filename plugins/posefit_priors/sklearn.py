@@ -105,7 +105,9 @@ class Transformed:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
-        return np.asarray(near(self.centres, writeable(latents), self.reach))
+        allowed = np.empty(len(latents), dtype=bool)
+        near(writeable(latents), self.centres, self.reach, allowed)
+        return allowed
 
     def save(self, path: str | Path) -> None:
         """Write what the space was learned from to an .npz file; `load` learns it again."""

@@ -105,7 +105,7 @@ class SAPSO:
         omegas = [inertia(step, self._iterations, self._inertia) for step in range(before, after)]
         schedule = np.tile([0.0, self._acceleration, self._cooling], (len(omegas), 1))
         schedule[:, 0] = omegas
-        schedule[: before == 0, 2] = 1.0  # SAPSO A1.2e
+        schedule[: before == 0, 2] = 1.0  # the first moves are not cooled after
         annealing = self._kept, self._stop, self._cool_each
         searched, self._temperature = self._swarm.compiled_search(problem, schedule, self._temperature, annealing)
         self._iteration += len(searched[1])
