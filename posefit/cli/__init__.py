@@ -19,6 +19,7 @@ from posefit.cli.motions import motions
 from posefit.cli.output import say
 from posefit.errors import InputError
 from posefit.reading import cut
+from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
 
 THREAD_SECONDS = 1.0  # that threads have to end after a command
@@ -93,7 +94,8 @@ def run() -> None:
     try:
         main()
     except SystemExit as end:
-        left = [one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread()]
+        others = (one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread())
+        left = [one for one in others if not one.name.startswith(f"{POOL}_")]
         for thread in left:
             thread.join(THREAD_SECONDS / len(left))
         names = ", ".join(sorted({thread.name for thread in left if thread.is_alive()}))

@@ -11,6 +11,7 @@ from typing import Any
 
 PART = 384  # poses: what is decoded of them is 0.5 MB, and stays in the cache of a core
 SHARED_PART = 128  # where several threads take parts in turn: the last one to be done is waited for
+POOL = "posefit"  # the name of its threads, which end with the process
 LEAST_SHARE = 16  # poses; a smaller share of work is not worth handing to another thread
 
 
@@ -57,7 +58,7 @@ def work_through(
 
 @lru_cache(maxsize=1)
 def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads - 1, thread_name_prefix="posefit")
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix=POOL)
 
 
 if hasattr(os, "register_at_fork"):

@@ -145,7 +145,9 @@ def wait_until(condition: Callable[[], Any]) -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_a_thread_that_a_plugin_leaves_running_does_not_keep_a_track_from_ending() -> None:
-    ran = posefit("track", "walk", "--method", "leaves-a-thread", "--frames", ":1", "--evaluations", "80")
+    ran = posefit(
+        "track", "walk", "--method", "leaves-a-thread", "--frames", ":1", "--evaluations", "80", "--threads", "2"
+    )
     assert ran.returncode == 0
     assert ran.stderr.splitlines()[-1] == "posefit: not waiting for what a plugin left running: planted"
 
