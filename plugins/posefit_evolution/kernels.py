@@ -63,8 +63,8 @@ def search(objective, rng, periodic, how, home, generation, sigma, ending, state
             finite[k] = worst if np.isnan(cost) else min(max(cost, -worst), worst)
             best = k if finite[k] < finite[best] else best
             for j in range(mean.size):
-                home[j] = proposals[g, best, j]
                 moved[k, j] = proposals[g, k, j] - mean[j]
+        home[:] = proposals[g, best]
         if periodic.any():
             wrap(periodic, moved)
             for k in range(finite.size):

@@ -27,7 +27,7 @@ def landmark_likelihoods(
     K are the groups of each view; each is as it is, or has left and right exchanged. Landmarks are those of an
     `Observation`. A joint counts by its confidence; distances have a Cauchy distribution.
     """
-    joints, found = skeleton.joints(poses, places), []
+    joints, groups = skeleton.joints(poses, places), []
     for camera, view in zip(cameras, landmarks, strict=True):
         pixels, depths = camera.project(joints)
         metres = np.maximum(depths, NEAR) / np.sqrt(camera.focal.prod())  # of a pixel
@@ -37,8 +37,8 @@ def landmark_likelihoods(
                 @ view[same, 2]
                 for same in (group, MIRRORED[group])
             ]
-            found.append(-np.stack(both, axis=-1))
-    return np.stack(found, axis=1)
+            groups.append(-np.stack(both, axis=-1))
+    return np.stack(groups, axis=1)
 
 
 def usually_exchanged(likelihoods: Array) -> Array:

@@ -149,7 +149,7 @@ class PoseProblem:
         """Return the cost as compiled loops take it, for this process only; None where it has no such form.
 
         It has where one view is drawn, in one thread, the translation is not aligned, and the prior has the attribute
-        `compiled`. Whoever evaluates it reports the evaluations to `count_poses`.
+        `compiled`. What evaluates it reports the evaluations to `count_poses`.
         """
         space, views = self.space, self._drawings
         prior = getattr(space.prior, "compiled", None)

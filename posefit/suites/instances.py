@@ -214,7 +214,7 @@ def _noisy(draft: _Draft) -> SuiteInstance:
 
 
 def _sequence(draft: _Draft) -> SuiteInstance:
-    """Return `FRAMES` poses of a motion as the box holds them, seen by one camera; the root turns in none of them."""
+    """Return `FRAMES` poses of a motion as the box holds them, before one camera; the root turns in none of them."""
     poses, rng, box = draft.poses(FRAMES), draft.rng, draft.box
     assert isinstance(box, SequenceBox)
     space = draft.space(float(poses[0, 0]) + YAW_OFF * rng.uniform(-1.0, 1.0))

@@ -186,13 +186,13 @@ def test_the_loop_tells_the_costs_of_a_population_before_it_asks_for_the_next() 
         assert costs is pair[1]
 
 
-def test_a_compiled_search_counts_its_poses_and_a_subclass_is_told_in_python(problem: PoseProblem) -> None:
-    told: list[int] = []
+def test_a_compiled_search_counts_its_poses_and_a_subclass_learns_in_python(problem: PoseProblem) -> None:
+    sizes: list[int] = []
     problem = replace(problem, cameras=problem.cameras[:1], silhouettes=problem.silhouettes[:1])
 
     class Watched(SAPSO):
         def tell(self, proposals: Array, costs: Array) -> None:
-            told.append(len(costs))
+            sizes.append(len(costs))
             super().tell(proposals, costs)
 
     best = []
@@ -201,7 +201,7 @@ def test_a_compiled_search_counts_its_poses_and_a_subclass_is_told_in_python(pro
         with drawn.counting():
             best.append(minimise(problem.evaluate, swarm, 24))
         assert drawn.poses == 24
-    assert told == [6] * 4
+    assert sizes == [6] * 4
     np.testing.assert_array_equal(best[0].history, best[1].history)
 
 
