@@ -113,19 +113,19 @@ def stages() -> dict[str, float]:
 
     from posefit.arrays import jit
     from posefit.fitting.box import draw_population
-    from posefit.geometry.kernels import LANES, Chain
+    from posefit.geometry.kernels import LANES, Chain, kinematics
     from posefit.silhouette.cost import areas, view_of
-    from posefit.silhouette.rasteriser import fill_pose, outline_poses, scratch, set_scene
+    from posefit.silhouette.rasteriser import fill_pose, outline_poses, scratch, set_scene, strips_and_words
     from posefit_reproduce.bench.kernel import bench_problem
 
     @jit
-    def drawn(chain, radii, view, poses, places, filling):  # type: ignore[no-untyped-def]
-        work, rows = scratch(view.width, view.height), np.empty(LANES, np.int64)
+    def drawn(address, chain, radii, view, strips, words, poses, places, filling):  # type: ignore[no-untyped-def]
+        work, rows = scratch(strips, words), np.empty(LANES, np.int64)
         set_scene(work, 0, LANES, chain.offsets, radii, view)
         for first in range(0, len(poses), LANES):
             for lane in range(LANES):
                 rows[lane] = first + lane
-            outline_poses(chain, poses, places, rows, view.width, view.height, work)
+            outline_poses(address, chain, poses, places, rows, view.width, view.height, work)
             for lane in range(LANES if filling else 0):
                 fill_pose(lane, work)
 
@@ -133,7 +133,8 @@ def stages() -> dict[str, float]:
     proposals = draw_population(problem.space, np.random.default_rng(0), 200)
     poses, places = problem.decode(proposals)
     camera, chain = problem.cameras[0], Chain(*problem.body.skeleton.chain)
-    scene = chain, problem.body.radii, view_of(camera), poses, places
+    size = strips_and_words(camera.width, camera.height)
+    scene = kinematics(), chain, problem.body.radii, view_of(camera), *size, poses, places
     jobs = {
         "decoding": partial(problem.decode, proposals),
         "joints": partial(problem.body.skeleton.joints, poses, places),

@@ -2,28 +2,29 @@
 
 import numpy as np
 
-from posefit.arrays import jit
+from posefit.arrays import inlined, jit
 from posefit.evolution.kernels import learn, sample, stagnant
 from posefit.fitting.kernels import evaluate, feasible, repair, wrap
 
 
-@jit
+@inlined
 def ask(objective, rng, periodic, redraws, home, sigma, state, proposals):
     """Write the next population (n, d) as `CMAES.ask` does."""
-    mean, scaled = state[0], state[6]
-    allowed = np.empty(proposals.shape[0], np.bool_)
-    sample(rng.standard_normal(proposals.shape), mean, sigma, scaled, proposals)
+    mean, scaled, n, left = state[0], state[6], proposals.shape[0], 0
+    allowed, broken = np.empty(n, np.bool_), np.empty(n, np.int64)
+    sample(rng, mean, sigma, scaled, proposals)
     wrap(periodic, proposals)
-    if feasible(objective, proposals, allowed):
-        return
-    broken = np.flatnonzero(~allowed)
-    if redraws:
-        again, works = np.empty((broken.size * redraws, mean.size)), np.empty(broken.size * redraws, np.bool_)
-        sample(rng.standard_normal(again.shape), mean, sigma, scaled, again)
+    if not feasible(objective, proposals, allowed):
+        for k in range(n):
+            if not allowed[k]:
+                broken[left] = k
+                left += 1
+    if left and redraws:
+        again, works, count, left = np.empty((left * redraws, mean.size)), np.empty(left * redraws, np.bool_), left, 0
+        sample(rng, mean, sigma, scaled, again)
         wrap(periodic, again)
         feasible(objective, again, works)
-        left = 0
-        for k in range(broken.size):
+        for k in range(count):
             chosen = k * redraws
             while chosen < (k + 1) * redraws and not works[chosen]:
                 chosen += 1
@@ -33,13 +34,13 @@ def ask(objective, rng, periodic, redraws, home, sigma, state, proposals):
             else:
                 broken[left] = broken[k]
                 left += 1
-        broken = broken[:left]
-    if broken.size:
-        middle = np.empty((1, mean.size))
+    if left:
+        points = np.empty((2, mean.size))
+        first, last = points[:1], points[1:]
         for j in range(mean.size):
-            middle[0, j] = mean[j]
-        repair(objective, periodic, middle, np.zeros(1, np.int64), home.reshape(1, -1))
-        repair(objective, periodic, proposals, broken, middle)
+            points[0, j], points[1, j] = mean[j], home[j]
+        repair(objective, periodic, first, np.arange(1), last)
+        repair(objective, periodic, proposals, broken[:left], first)
 
 
 @jit
@@ -51,28 +52,27 @@ def search(objective, rng, periodic, how, home, generation, sigma, ending, state
     Returns how many there are, the step size, and whether the search has come to an end with the last of them.
     """
     redraws, weights, rates, every = how
-    proposals, costs = searched
-    mean, finite, moved = state[0], np.empty(costs.shape[1]), np.empty(proposals.shape[1:])
-    for g in range(costs.shape[0]):
-        ask(objective, rng, periodic, redraws, home, sigma, state, proposals[g])
-        if not evaluate(objective, proposals[g], costs[g]):
+    mean, (n, d), turns = state[0], searched[0].shape[1:], False
+    finite, moved = np.empty(n), np.empty((n, d))
+    for j in range(d):
+        turns |= periodic[j]
+    for g in range(searched[1].shape[0]):
+        proposals, costs = searched[0][g], searched[1][g]
+        ask(objective, rng, periodic, redraws, home, sigma, state, proposals)
+        if not evaluate(objective, proposals, costs):
             return g, sigma, False
         best = 0
-        for k in range(finite.size):
-            cost = costs[g, k]
-            finite[k] = worst if np.isnan(cost) else min(max(cost, -worst), worst)
+        for k in range(n):
+            finite[k] = worst if np.isnan(costs[k]) else min(max(costs[k], -worst), worst)
             best = k if finite[k] < finite[best] else best
-            for j in range(mean.size):
-                moved[k, j] = proposals[g, k, j] - mean[j]
-        home[:] = proposals[g, best]
-        if periodic.any():
-            wrap(periodic, moved)
-            for k in range(finite.size):
-                for j in range(mean.size):
-                    moved[k, j] += mean[j]
-        else:
-            moved[:] = proposals[g]
+            for j in range(d):
+                moved[k, j] = proposals[k, j] - mean[j]
+        wrap(periodic, moved)
+        for j in range(d):
+            home[j] = proposals[best, j]
+            for k in range(n):
+                moved[k, j] = moved[k, j] + mean[j] if turns else proposals[k, j]
         sigma = learn(moved, finite, weights, rates, every, generation + g + 1, sigma, state)
         if stagnant(generation + g + 1, sigma, state, ending[0], ending[1]):
             return g + 1, sigma, True
-    return costs.shape[0], sigma, False
+    return searched[1].shape[0], sigma, False

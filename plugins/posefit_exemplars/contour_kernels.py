@@ -193,6 +193,7 @@ def _solve(matrix, vector):
 
 @jit
 def fit_poses(
+    kinematics,
     parents,
     angles,
     turns,
@@ -218,9 +219,9 @@ def fit_poses(
 ):
     """Move poses (n, 66) at `places` (n, 3) by a step for each of `reaches`, metres, towards the contours of all views.
 
-    First come the fields of `Chain`, then radii, cameras, and the fields of `FrameContours`. Angles are pulled to
-    `means` (n, 66), and places to where they were, with `precisions` (69,), of a place and a pose; no angle turns by
-    more than `most` a step.
+    First come the address of `place_lanes` and the fields of `Chain`, then radii, cameras, and the fields of
+    `FrameContours`. Angles are pulled to `means` (n, 66), and places to where they were, with `precisions` (69,), of a
+    place and a pose; no angle turns by more than `most` a step.
     """
     chain = Chain(parents, angles, turns, turned, offsets)
     frames = np.empty((parents.size + 1, 4, 3))
@@ -230,7 +231,7 @@ def fit_poses(
     for n in range(poses.shape[0]):
         start = places[n].copy()
         for reach in reaches:
-            place_frames(chain, poses[n], places[n], sines, cosines, frames)
+            place_frames(kinematics, chain, poses[n], places[n], sines, cosines, frames)
             forces[:] = 0.0
             curves[:] = 0.0
             for v in range(len(steps)):

@@ -5,7 +5,7 @@ One row is computed after the other, so that a row has the same bits whatever st
 
 import numpy as np
 
-from posefit.arrays import jit
+from posefit.arrays import inlined, jit
 
 ROUNDING = 1e-9  # radians by which a joint may pass its limit
 
@@ -30,7 +30,7 @@ def recover(latents, components, mean, angles):
                 angles[i, j] += latents[i, k] * components[k, j]
 
 
-@jit
+@inlined
 def close(centres, latents, i, reach):
     """Return whether the row i of latents (n, m or more) is nearer to a centre (K, m) than `reach`.
 

@@ -9,13 +9,13 @@ import math
 
 import numpy as np
 
-from posefit.arrays import jit
+from posefit.arrays import inlined, jit
 from posefit.fitting.kernels import evaluate, feasible
 
 FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 
 
-@jit
+@inlined
 def wrap(x):
     """Return a unit coordinate brought into [-1, 1)."""
     return (x + 1.0) % 2.0 - 1.0
@@ -40,7 +40,7 @@ def step(r1, r2, omega, acceleration, x, v, best, swarm_best, low, high, periodi
     return v, x, abs(x) <= 1.0 and low <= v <= high
 
 
-@jit
+@inlined
 def reachable(omega, acceleration, x, v, best, swarm_best, low, high, periodic, clamped):
     """Return whether some rand() in [0, 1] would keep one coordinate, and its velocity, within the limits."""
     to_personal, to_swarm = best - x, swarm_best - x
@@ -103,7 +103,7 @@ def move(rows, first, rand, spare, used, redraws, omega, acceleration, swarm_bes
     return rows.size, used
 
 
-@jit
+@inlined
 def update_best(i, position, cost, best, best_costs, leader):
     """Make a position (d,) that costs less the best of particle i; return the row of the best of all."""
     if cost < best_costs[i]:  # SAPSO A1.2b
@@ -156,7 +156,7 @@ def repair(broken, works, velocities, moved, velocity, position):
     return broken[:left].copy()
 
 
-@jit
+@inlined
 def redraw(objective, rng, allowed, attempts, redraws, pull, spare, used, swarm, moves):
     """Draw rand() again for whole particles that are not allowed (n,), or stop them, as `SwarmState` does.
 
@@ -199,7 +199,7 @@ def redraw(objective, rng, allowed, attempts, redraws, pull, spare, used, swarm,
     return used
 
 
-@jit
+@inlined
 def move_all(rng, rows, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, moves):
     """Move particles `rows` (k,) as `move` does, with more drawn to `spare` as it is used up; return how much then."""
     velocities, moved, stopped = moves

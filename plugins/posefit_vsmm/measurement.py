@@ -14,7 +14,7 @@ from posefit.arrays import Array
 from posefit.fitting.landmarks import DEVIATION, GROUPS, MIRRORED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import place_frames
+from posefit.geometry.kernels import kinematics, place_frames
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_vsmm.imm import Measurement
 from posefit_vsmm.joints import OWN, Lines, detected, rule_errors
@@ -52,7 +52,7 @@ class Figure:
         bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
         sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
         frames = np.empty((len(JOINTS), 4, 3))
-        place_frames(self.skeleton.chain, pose, state[:3], sines, cosines, frames)
+        place_frames(kinematics(), self.skeleton.chain, pose, state[:3], sines, cosines, frames)
         count = len(POINTS)
         points, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
         others = np.empty((count, 3, len(offset)))

@@ -14,14 +14,15 @@ MENDED = 1e-8  # ours, as cmaes has it: an eigenvalue that rounding has made neg
 
 
 @jit
-def sample(normal, mean, sigma, scaled, drawn):
-    """Write the proposals (n, d) that normal draws (n, d) become, with `scaled` (d, d) the axes in rows, to scale."""
-    for k in range(normal.shape[0]):
+def sample(rng, mean, sigma, scaled, drawn):
+    """Write proposals (n, d) that are drawn, with `scaled` (d, d) the axes in rows, to scale."""
+    for k in range(drawn.shape[0]):
         for j in range(mean.size):
             drawn[k, j] = 0.0
         for i in range(mean.size):
+            normal = rng.standard_normal()  # HANSEN2016 (38)
             for j in range(mean.size):
-                drawn[k, j] += normal[k, i] * scaled[i, j]  # HANSEN2016 (39)
+                drawn[k, j] += normal * scaled[i, j]  # HANSEN2016 (39)
         for j in range(mean.size):
             drawn[k, j] = mean[j] + sigma * drawn[k, j]  # HANSEN2016 (40)
 
@@ -31,7 +32,8 @@ def decompose(covariance, axes, lengths, scaled):
     """Write the axes (d, d) of a covariance, in columns, their lengths (d,), and in rows the axes to scale."""
     values, vectors = np.linalg.eigh(covariance)
     if values[0] < 0.0:
-        values = np.where(values < 0.0, MENDED, values)
+        for i in range(values.size):  # np.where would compile three times as long as all the rest
+            values[i] = MENDED if values[i] < 0.0 else values[i]
         for i in range(values.size):
             for j in range(values.size):
                 covariance[i, j] = 0.0
@@ -44,33 +46,41 @@ def decompose(covariance, axes, lengths, scaled):
 
 
 @jit
+def rank(costs, order):
+    """Write the rows of costs (n,), none of them nan, to `order` (n,): best first, of equal ones the first."""
+    n = gap = costs.size
+    for i in range(n):
+        order[i] = i
+    while gap > 1:  # Shell's sort: numba's own takes three times as long to compile
+        gap //= 2
+        for i in range(gap, n):
+            row, j = order[i], i
+            while j >= gap:
+                before = order[j - gap]
+                if costs[before] < costs[row] or (costs[before] == costs[row] and before < row):
+                    break
+                order[j] = before
+                j -= gap
+            order[j] = row
+
+
+@jit
 def learn(proposals, costs, weights, rates, every, generation, sigma, state):
     """Adapt a state to a generation of proposals (n, d) and their finite costs (n,); return the step size.
 
     The state are mean (d,), axes (d, d), lengths (d,), both paths (d,), covariance (d, d), the axes to scale (d, d) and
-    the best and worst costs of the last generations.
+    the best and worst costs of the last generations. The covariance is axes diag(lengths^2) axes', from when it was
+    last decomposed.
     """
     mean, axes, lengths, step_path, path, covariance, scaled, recent = state
-    order = np.argsort(costs, kind="mergesort")
-    slot = 2 * generation % recent.size
+    order, slot = np.empty(costs.size, np.int64), 2 * generation % recent.size
+    rank(costs, order)
     recent[slot], recent[slot + 1] = costs[order[0]], costs[order[-1]]
-    moved = mean, axes, lengths, step_path, path, covariance
-    sigma = adapt(proposals, order, weights, rates, generation, sigma, *moved)
-    if generation % every == 0:
-        decompose(covariance, axes, lengths, scaled)
-    return sigma
-
-
-@jit
-def adapt(proposals, order, weights, rates, generation, sigma, mean, axes, lengths, step_path, path, covariance):
-    """Move mean (d,), both paths (d,) and covariance (d, d) by a generation's proposals (n, d); return the step size.
-
-    `order` (n,) ranks the proposals, best first. The covariance is axes diag(lengths^2) axes', from when it was last
-    decomposed.
-    """
     mu_eff, c_sigma, d_sigma, c_c, c_1, c_mu, chi = rates
     n, d = proposals.shape
-    steps, step, turned = np.empty((n, d)), np.zeros(d), np.zeros(d)
+    steps, step, turned = np.empty((n, d)), np.empty(d), np.empty(d)
+    for i in range(d):
+        step[i] = turned[i] = 0.0
     total = 0.0
     for k in range(n):
         total += weights[k]
@@ -121,6 +131,8 @@ def adapt(proposals, order, weights, rates, generation, sigma, mean, axes, lengt
     for i in range(d):
         for j in range(i):
             covariance[j, i] = covariance[i, j]
+    if generation % every == 0:
+        decompose(covariance, axes, lengths, scaled)
     return min(grown, LARGEST)
 
 

@@ -88,9 +88,8 @@ class Strategy:
 
     def sample(self, rng: np.random.Generator, count: int) -> Array:
         """Return so many draws (count, d)."""
-        normal = rng.standard_normal((count, len(self.mean)))  # HANSEN2016 (38)
-        drawn = np.empty(normal.shape)
-        sample(normal, self.mean, self.sigma, self._scaled, drawn)
+        drawn = np.empty((count, len(self.mean)))
+        sample(rng, self.mean, self.sigma, self._scaled, drawn)
         return drawn
 
     def learn(self, proposals: Array, costs: Array) -> None:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posefit.arrays import jit
+from posefit.arrays import inlined, jit
 from posefit.arrays.calling import call
 from posefit.fitting.box import REPAIR_STEPS
 from posefit.geometry.skeleton import ANGLES
@@ -32,7 +32,7 @@ class Objective(NamedTuple):
     beta: float
 
 
-@jit
+@inlined
 def evaluate(objective, proposals, costs):
     """Write the costs (n,) of proposals (n, d) as `PoseProblem.evaluate` does; return whether all are finite."""
     centre, half, anchor, first, mean = objective.box

@@ -16,6 +16,7 @@ from posefit.fitting.kernels import Objective, move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.cost import (
     BETA,
@@ -156,7 +157,8 @@ class PoseProblem:
         simple = space.translation != "aligned" and space.root_order == "yaw_first" and len(views) == self.threads == 1
         if prior is None or not simple or self.on_device:
             return None
-        m, (drawing, _), ((recover, recovering), (near, clusters)) = len(space.prior.low), views[0], prior
+        m, ((recover, recovering), (near, clusters)) = len(space.prior.low), prior
+        drawing = kinematics(), *views[0][0]
         poses, translations, latents, angles = (np.empty((0, columns)) for columns in (ANGLES, 3, m, ANGLES - 3))
         areas, allowed = np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=bool)
         return Objective(

@@ -6,7 +6,7 @@ registers. A bone stands here as plain Python, and below it as numba compiles it
 """
 
 from collections.abc import Sequence
-from functools import partial, reduce
+from functools import cache, partial, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
+from posefit.arrays.calling import address_of, call
 
 LANES = 4  # poses side by side: one vector register of AVX2; with more, a call for one pose takes longer
 
@@ -199,7 +200,7 @@ def sine_cosine(angle):
     return sign * (x + x * z * s), sign * (1.0 + z * c)
 
 
-@jit
+@inlined
 def empty_lanes():
     """Return room for LANES poses in the world's frame: the slots of angles and the angles in them, and numbers."""
     lanes = np.empty(_END)
@@ -228,7 +229,7 @@ def set_offsets(lanes, first, stop, offsets):
                 lanes[_OFFSET + LANES * (3 * b + i) + lane] = offsets[b, i]
 
 
-@inlined
+@jit
 def place_lanes(chain, poses, places, rows, slots, lanes):
     """Write axes and joints of the poses (n, 66), their roots at places (n, 3), that are in these rows (LANES,)."""
     bits = poses.view(np.int64)
@@ -271,15 +272,33 @@ def place_lanes(chain, poses, places, rows, slots, lanes):
         place_bone(chain, b, slots, lanes)
 
 
+@cache
+def kinematics() -> Any:
+    """Return the address of `place_lanes`, which whatever moves poses calls: it takes seconds to compile."""
+    number, flag, many, vector, matrix = (
+        np.empty(0, np.int64),
+        np.empty(0, np.bool_),
+        *map(np.empty, ((0, 0), 0, (0, 0, 0))),
+    )
+    return address_of(place_lanes, (Chain(number, number, matrix, flag, many), many, many, number, number, vector))
+
+
 @jit
-def place_frames(chain, pose, place, sines, cosines, frames):
+def place_frames(kinematics, chain, pose, place, sines, cosines, frames):
     """Write the frames (27, 4, 3) of the joints of one pose (66,), its root at a place (3,): three axes and an origin.
 
     And the sine and cosine (66,) of its angles.
     """
     slots, lanes = empty_lanes()
     set_offsets(lanes, 0, LANES, chain.offsets)
-    place_lanes(chain, pose.reshape(1, -1), place.reshape(1, -1), np.zeros(LANES, np.int64), slots, lanes)
+    poses, places, rows = np.empty((1, _ANGLES)), np.empty((1, 3)), np.empty(LANES, np.int64)
+    for a in range(_ANGLES):
+        poses[0, a] = pose[a]
+    for i in range(3):
+        places[0, i] = place[i]
+    for lane in range(LANES):
+        rows[lane] = 0
+    call(kinematics, (chain, poses, places, rows, slots, lanes))
     for a in range(_ANGLES):
         moves, at = slots[a] != _STILL, LANES * (slots[a] & NATURAL)
         sines[a], cosines[a] = lanes[_SINE + at] if moves else 0.0, lanes[_COSINE + at] if moves else 1.0
@@ -299,7 +318,7 @@ def read_joints(lanes, lane, joints):
 
 
 @jit
-def joint_positions(chain, poses, places):
+def joint_positions(kinematics, chain, poses, places):
     """Return the joints (n, 27, 3) of poses (n, 66) with their roots at places (n, 3)."""
     n, rows = poses.shape[0], np.empty(LANES, np.int64)
     joints, (slots, lanes) = np.empty((n, _JOINTS, 3)), empty_lanes()
@@ -307,7 +326,7 @@ def joint_positions(chain, poses, places):
     for first in range(0, n, LANES):
         for lane in range(LANES):
             rows[lane] = min(first + lane, n - 1)
-        place_lanes(chain, poses, places, rows, slots, lanes)
+        call(kinematics, (chain, poses, places, rows, slots, lanes))
         for lane in range(min(LANES, n - first)):
             read_joints(lanes, lane, joints[first + lane])
     return joints

@@ -6,21 +6,22 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
+from posefit.arrays import Array, Bits, writeable
 from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import LANES
+from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
-from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
+from posefit.silhouette.rasteriser import View, strips_and_words
 from posefit.silhouette.sharing import parts_of, work_through
 
 SCALE = 100.0  # S
 BETA = 0.5  # beta
 
 Areas = NDArray[np.int64]  # (..., 3): R, B, Y
+_NO_IMAGES: Bits = np.empty((0, 0, 0), dtype=np.uint64)  # where only the areas are wanted
 T = TypeVar("T")
 
 
@@ -31,7 +32,8 @@ def view_of(camera: Camera) -> View:
 
 def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
     """Return what the kernel wants to know before the poses. Made once, it holds for any number of calls."""
-    return *body.skeleton.chain, body.radii, *view_of(camera), *silhouette.bits, silhouette.pixels
+    scene = *body.skeleton.chain, body.radii, *view_of(camera)
+    return *scene, *silhouette.bits, silhouette.pixels, _NO_IMAGES
 
 
 def areas(
@@ -53,11 +55,11 @@ def areas(
     drawing = drawing_of(body, camera, silhouette)
     parts = parts_of(len(poses), threads)
     if len(parts) == 1:
-        kernels.count_areas(*drawing, poses, translations, out)  # SAPSO (3)
+        kernels.count_areas(kinematics(), *drawing, poses, translations, out)  # SAPSO (3)
         return out
 
     def count(_part: slice, *rows: NDArray[Any]) -> None:
-        kernels.count_areas(*drawing, *rows)
+        kernels.count_areas(kinematics(), *drawing, *rows)
 
     work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
@@ -125,7 +127,7 @@ def costs_in(
     """
     drawn.count_poses(len(poses), silhouette)
     counted = np.empty((len(poses), 3), dtype=np.int64)
-    kernels.count_areas(*drawing, poses, translations, counted)
+    kernels.count_areas(kinematics(), *drawing, poses, translations, counted)
     return mismatch(counted, beta)
 
 
@@ -142,8 +144,8 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     drawn.count_poses(1)
-    chain, (width, height) = body.skeleton.chain, (camera.width, camera.height)
-    work, rows = scratch(width, height), np.zeros(LANES, dtype=np.int64)
-    set_scene(work, 0, LANES, chain.offsets, body.radii, view_of(camera))
-    outline_poses(chain, writeable(pose)[None], writeable(translation)[None], rows, width, height, work)
-    return unpack(fill_pose(0, work)[0], width, height)
+    image = np.zeros((1, *strips_and_words(camera.width, camera.height)), dtype=np.uint64)
+    drawing = *body.skeleton.chain, body.radii, *view_of(camera), image[0], image[0], 0, image
+    uncounted = np.empty((1, 3), dtype=np.int64)
+    kernels.count_areas(kinematics(), *drawing, writeable(pose)[None], writeable(translation)[None], uncounted)
+    return unpack(image[0], camera.width, camera.height)

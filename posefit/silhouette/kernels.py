@@ -56,6 +56,7 @@ def paint_bits(image, box, value, pixels):
 
 @jit
 def count_areas(
+    kinematics,
     parents,
     angles,
     turns,
@@ -71,28 +72,34 @@ def count_areas(
     observed,
     valid,
     pixels,
+    images,
     poses,
     translations,
     areas,
 ):
     """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid.
 
-    Of the observed silhouette's pixels there are so many. First come the fields of `Chain`, then radii, then those of
-    `View`: one by one, since to take a tuple apart costs a call twice as much as its arrays do.
+    Of the observed silhouette's pixels there are so many. The bit images of the bodies are written to `images`
+    (n, strips, words), where it is not empty. First come the address of `place_lanes` and the fields of `Chain`, then
+    radii, then those of `View`: one by one, since to take a tuple apart costs a call twice as much as its arrays do.
     """
     chain = Chain(parents, angles, turns, turned, offsets)
     view = View(rotation, translation, focal, centre, width, height)
     n, silhouette = poses.shape[0], np.uint64(pixels)
-    rows, work = np.empty(LANES, np.int64), scratch(width, height)
+    rows, work = np.empty(LANES, np.int64), scratch(observed.shape[0], observed.shape[1])
     set_scene(work, 0, LANES, offsets, radii, view)
     for first in range(0, n, LANES):
         for lane in range(LANES):
             rows[lane] = min(first + lane, n - 1)
-        outline_poses(chain, poses, translations, rows, width, height, work)
+        outline_poses(kinematics, chain, poses, translations, rows, width, height, work)
         for lane in range(min(LANES, n - first)):
             image, box = fill_pose(lane, work)
-            body, overlap = count(image, observed, valid, box)
             i = first + lane
+            if images.size:
+                for strip in range(image.shape[0]):
+                    for k in range(image.shape[1]):
+                        images[i, strip, k] = image[strip, k]
+            body, overlap = count(image, observed, valid, box)
             areas[i, 0] = silhouette - overlap
             areas[i, 1] = body - overlap
             areas[i, 2] = overlap

@@ -20,7 +20,8 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 from posefit.arrays import Array, inlined, jit
-from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, place_lanes, set_offsets, set_view
+from posefit.arrays.calling import call
+from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, set_offsets, set_view
 
 STRIP_PIXELS = 32  # pixels: bits of a lane
 BLOCK = 8  # rows filled at a time
@@ -168,8 +169,7 @@ def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     return context.get_dummy_value()
 
 
-@jit
-def strips_and_words(width, height):
+def strips_and_words(width: int, height: int) -> tuple[int, int]:
     """Return the shape of an image's bit image."""
     return 2 * ((width + 2 * STRIP_PIXELS - 1) // (2 * STRIP_PIXELS)), (height + BLOCK - 1) // BLOCK * (BLOCK // 2)
 
@@ -334,10 +334,10 @@ def columns(spans, lines, j, row):
         spans[k + BLOCK] = np.int32(min(high - column + _ONE, stop))
 
 
-@jit
-def scratch(width, height):
+@inlined
+def scratch(strips, words):
     """Return the work arrays of one thread: for the kinematics, for outlines and filling, and a clear bit image."""
-    image = np.empty(strips_and_words(width, height), np.uint64)
+    image = np.empty((strips, words), np.uint64)
     for strip in range(image.shape[0]):
         for i in range(image.shape[1]):
             image[strip, i] = NONE
@@ -347,14 +347,14 @@ def scratch(width, height):
         np.empty(5 * ROOM, np.int32),
         np.empty(2 * BLOCK, np.int32),
         np.empty(ROOM, np.int64),
-        np.empty((CONES // LANES) * (height // BLOCK + 1) + LISTED, np.int64),
+        np.empty((CONES // LANES) * (2 * words // BLOCK + 1) + LISTED, np.int64),
         np.empty(4, np.int64),
         image.reshape(-1).view(np.uint32),
     )
     return empty_lanes(), filling, image
 
 
-@jit
+@inlined
 def set_scene(work, first, stop, offsets, radii, view):
     """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
     (_, lanes), (ends, _, _, _, _, _, _, _), _ = work
@@ -369,13 +369,13 @@ def set_scene(work, first, stop, offsets, radii, view):
 
 
 @jit
-def outline_poses(chain, poses, places, rows, width, height, work):
+def outline_poses(kinematics, chain, poses, places, rows, width, height, work):
     """Outline the poses (n, 66) at places (n, 3) that are in these rows (LANES,), each in the scene of its lane.
 
-    `work` is what `scratch` makes and `set_scene` fills.
+    `kinematics` is the address of `place_lanes`; `work` is what `scratch` makes and `set_scene` fills.
     """
     (slots, lanes), (ends, lines, bounds, _, keys, _, _, _), image = work
-    place_lanes(chain, poses, places, rows, slots, lanes)
+    call(kinematics, (chain, poses, places, rows, slots, lanes))
     project(chain.parents, lanes, ends)
     strips, stride = image.shape[0], 2 * image.shape[1]
     outline(ends, lines, bounds, strips, float(width), float(height))
