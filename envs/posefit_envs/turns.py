@@ -10,7 +10,7 @@ import numpy as np
 
 from posefit.arrays import Array, jit
 from posefit.fitting.kernels import evaluate, feasible, repair, wrap
-from posefit_swarm.kernels import accept, move_all, redraw
+from posefit_swarm.kernels import accept, advance
 from posefit_swarm.kernels import repair as repair_first
 
 
@@ -62,7 +62,7 @@ def products(normal, offsets, steps):
 
 
 @jit
-def differential(objective, rng, turns, points, bests, order, weight, periodic, trials):
+def differential(constraint, rng, turns, points, bests, order, weight, periodic, trials):
     """Write trials (k, d) for points (k, d), as `population.differential` does."""
     (k, d), n, home = points.shape, bests.shape[0], bests[order[0]].copy().reshape(1, -1)
     leaders = rng.integers(0, max(1, round(turns.leaders * n)), size=k)
@@ -81,11 +81,11 @@ def differential(objective, rng, turns, points, bests, order, weight, periodic, 
             trials[i, j] = weight * (step[i, j] + difference[i, j]) if moves else 0.0
     add(points, trials)
     fold(periodic, trials)
-    repair(objective, periodic, trials, np.arange(k), home)
+    repair(constraint, periodic, trials, np.arange(k), home)
 
 
 @jit
-def draw_elite(objective, rng, turns, bests, order, stride, periodic, drawn):
+def draw_elite(constraint, rng, turns, bests, order, stride, periodic, drawn):
     """Write draws (k, d) from the distribution of the better bests, as `population.normal` does."""
     m, d = max(2, round(turns.elite * order.size)), drawn.shape[1]
     m = min(m, order.size)
@@ -108,11 +108,11 @@ def draw_elite(objective, rng, turns, bests, order, stride, periodic, drawn):
             drawn[k, j] = stride / turns.neutral * (drawn[k, j] / np.sqrt(m))
     add(middle, drawn)
     fold(periodic, drawn)
-    repair(objective, periodic, drawn, np.arange(drawn.shape[0]), bests[order[0]].copy().reshape(1, -1))
+    repair(constraint, periodic, drawn, np.arange(drawn.shape[0]), bests[order[0]].copy().reshape(1, -1))
 
 
 @jit
-def kick(objective, rng, turns, periodic, moved):
+def kick(constraint, rng, turns, periodic, moved):
     """Move proposals (n, d) by a normal draw each, as `posefit.fitting.box.sample_normal` does."""
     (n, d), spread = moved.shape, turns.kick
     drawn, works = rng.standard_normal((n, d)), np.empty(n, np.bool_)
@@ -121,7 +121,7 @@ def kick(objective, rng, turns, periodic, moved):
             drawn[i, j] *= spread[j]
     add(moved, drawn)
     fold(periodic, drawn)
-    feasible(objective, drawn, works)
+    feasible(constraint, drawn, works)
     broken, left = np.flatnonzero(~works), turns.redraws - 1
     while left > 0 and broken.size:
         many = min(left, turns.batch)
@@ -132,7 +132,7 @@ def kick(objective, rng, turns, periodic, moved):
                 again[i, j] *= spread[j]
         add(moved[rows], again)
         fold(periodic, again)
-        feasible(objective, again, works)
+        feasible(constraint, again, works)
         broken = repair_first(broken, works, again, again, drawn, drawn)
         left -= many
     for row in broken:
@@ -142,7 +142,7 @@ def kick(objective, rng, turns, periodic, moved):
 
 
 @jit
-def move_part(objective, rng, turns, stride, spare, used, best_costs, bests, part, moved):
+def move_part(constraint, rng, turns, stride, spare, used, best_costs, bests, part, moved):
     """Move the particles (k, d) of a part, each share with its optimiser; return how much of `spare` is used."""
     position, _, own, _, velocity, low, high, periodic, _ = part
     count, d = moved.shape
@@ -151,19 +151,16 @@ def move_part(objective, rng, turns, stride, spare, used, best_costs, bests, par
     swarmed = round(turns.shares[0] * count)
     apart = min(swarmed + round(turns.shares[1] * count), count)
     if swarmed:
-        velocities, allowed = np.empty((count, d)), np.empty(count, np.bool_)
-        moves, rows = (velocities, moved, np.zeros(count, np.bool_)), np.arange(count)
+        moves = np.empty((count, d)), moved, np.empty(count, np.bool_)
         pull, redraws = (stride, turns.acceleration, bests[order[0]].copy()), turns.redraws
         rand = rng.random(2 * count * d)
-        used = move_all(rng, rows, rand, spare, used, redraws, pull[0], pull[1], pull[2], part, moves)
-        if not feasible(objective, moved, allowed):
-            used = redraw(objective, rng, allowed, redraws, redraws, pull, spare, used, part, moves)
-        velocity[:] = velocities
+        used = advance(constraint, rng, rand, redraws, redraws, pull, spare, used, part, moves)
+        velocity[:] = moves[0]
     if swarmed < apart:
         points, trials = own[swarmed:apart], moved[swarmed:apart]
-        differential(objective, rng, turns, points, bests, order, stride, periodic, trials)
+        differential(constraint, rng, turns, points, bests, order, stride, periodic, trials)
     if apart < count:
-        draw_elite(objective, rng, turns, bests, order, stride, periodic, moved[apart:])
+        draw_elite(constraint, rng, turns, bests, order, stride, periodic, moved[apart:])
     if swarmed < count:
         way = moved[swarmed:] - position[swarmed:]
         wrap(periodic, way)
@@ -171,7 +168,7 @@ def move_part(objective, rng, turns, stride, spare, used, best_costs, bests, par
             for j in range(d):
                 velocity[i, j] = min(max(way[i - swarmed, j], low[j]), high[j])
     if turns.kick.size:
-        kick(objective, rng, turns, periodic, moved)
+        kick(constraint, rng, turns, periodic, moved)
     return used
 
 
@@ -197,7 +194,7 @@ def take_turns(objective, rng, turns, spare, used, best, leader, swarm, moved, c
         part = position[rows], cost[rows], bests[rows], best_costs[rows], velocity[rows], low, high, periodic, clamped
         if not fresh.all():
             used = move_part(
-                objective, rng, turns, turns.strides[done // n], spare, used, best_costs, bests, part, there
+                objective.constraint, rng, turns, turns.strides[done // n], spare, used, best_costs, bests, part, there
             )
         for i in range(count):
             for j in range(d if fresh[i] else 0):

@@ -8,13 +8,13 @@ from posefit.fitting.kernels import evaluate, feasible, repair, wrap
 
 
 @inlined
-def ask(objective, rng, periodic, redraws, home, sigma, state, proposals):
+def ask(constraint, rng, periodic, redraws, home, sigma, state, proposals):
     """Write the next population (n, d) as `CMAES.ask` does."""
     mean, scaled, n, left = state[0], state[6], proposals.shape[0], 0
     allowed, broken = np.empty(n, np.bool_), np.empty(n, np.int64)
     sample(rng, mean, sigma, scaled, proposals)
     wrap(periodic, proposals)
-    if not feasible(objective, proposals, allowed):
+    if not feasible(constraint, proposals, allowed):
         for k in range(n):
             if not allowed[k]:
                 broken[left] = k
@@ -23,7 +23,7 @@ def ask(objective, rng, periodic, redraws, home, sigma, state, proposals):
         again, works, count, left = np.empty((left * redraws, mean.size)), np.empty(left * redraws, np.bool_), left, 0
         sample(rng, mean, sigma, scaled, again)
         wrap(periodic, again)
-        feasible(objective, again, works)
+        feasible(constraint, again, works)
         for k in range(count):
             chosen = k * redraws
             while chosen < (k + 1) * redraws and not works[chosen]:
@@ -39,8 +39,8 @@ def ask(objective, rng, periodic, redraws, home, sigma, state, proposals):
         first, last = points[:1], points[1:]
         for j in range(mean.size):
             points[0, j], points[1, j] = mean[j], home[j]
-        repair(objective, periodic, first, np.arange(1), last)
-        repair(objective, periodic, proposals, broken[:left], first)
+        repair(constraint, periodic, first, np.arange(1), last)
+        repair(constraint, periodic, proposals, broken[:left], first)
 
 
 @jit
@@ -58,7 +58,7 @@ def search(objective, rng, periodic, how, home, generation, sigma, ending, state
         turns |= periodic[j]
     for g in range(searched[1].shape[0]):
         proposals, costs = searched[0][g], searched[1][g]
-        ask(objective, rng, periodic, redraws, home, sigma, state, proposals)
+        ask(objective.constraint, rng, periodic, redraws, home, sigma, state, proposals)
         if not evaluate(objective, proposals, costs):
             return g, sigma, False
         best = 0

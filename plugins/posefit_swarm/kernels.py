@@ -157,78 +157,68 @@ def repair(broken, works, velocities, moved, velocity, position):
 
 
 @inlined
-def redraw(objective, rng, allowed, attempts, redraws, pull, spare, used, swarm, moves):
-    """Draw rand() again for whole particles that are not allowed (n,), or stop them, as `SwarmState` does.
+def advance(constraint, rng, rand, attempts, redraws, pull, spare, used, swarm, moves):
+    """Move a swarm so that it meets the constraints, as `SwarmState.move` does; return how much of `spare` is used.
 
-    Returns the numbers of `spare` that are used then.
+    `rand` and `redraws` are as in `move`, with more drawn to `spare` as it is used up; `attempts` are the redraws of
+    whole particles, and `pull` omega, the acceleration and the swarm's best (d,).
     """
     velocities, moved, stopped = moves
     omega, acceleration, swarm_best = pull
-    (n, d), position = moved.shape, swarm[0]
-    broken, count = np.empty(n, np.int64), 0
+    (n, d), position, again, first = moved.shape, swarm[0], moves, True
+    rows, broken, count, left, many = np.empty(n, np.int64), np.empty(n, np.int64), 0, attempts, FIRST_REDRAWS
+    ends, works, clipped = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty((n, d))
     for i in range(n):
-        if not (allowed[i] or stopped[i]):
-            broken[count] = i
-            count += 1
-    broken, left, many = broken[:count], attempts, FIRST_REDRAWS
-    while left > 0 and broken.size:
+        rows[i], ends[i] = i, False
+    while True:
+        reached = 0
+        while reached < rows.size:
+            if used + 2 * redraws * d > spare.size:
+                for k in range(spare.size):
+                    spare[k] = rng.random()
+                used = 0
+            reached, used = move(
+                rows, reached, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, *again
+            )
+        feasible(constraint, again[1], works)
+        if first:
+            for i in range(n):
+                if not works[i]:
+                    broken[count], ends[i] = i, stopped[i]
+                    count += not stopped[i]
+            broken, first = broken[:count], False
+        else:
+            broken = repair(broken, works, again[0], again[1], velocities, moved)
+            left, many = left - many, attempts
+        if left <= 0 or not broken.size:
+            break
         many = min(left, many)
-        rows, rand = np.empty(broken.size * many, np.int64), np.empty(2 * broken.size * many * d)
+        rows, works = np.empty(broken.size * many, np.int64), np.empty(broken.size * many, np.bool_)
+        again = np.empty((rows.size, d)), np.empty((rows.size, d)), np.empty(rows.size, np.bool_)
+        rand = np.empty(2 * rows.size * d)
         for k in range(rows.size):
             rows[k] = broken[k // many]
         for k in range(rand.size):
             rand[k] = rng.random()
-        works, stops = np.empty(rows.size, np.bool_), np.empty(rows.size, np.bool_)
-        again = np.empty((rows.size, d)), np.empty((rows.size, d)), stops
-        used = move_all(rng, rows, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, again)
-        feasible(objective, again[1], works)
-        broken = repair(broken, works, again[0], again[1], velocities, moved)
-        left, many = left - many, attempts
-    ends, works, clipped = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty((n, d))
-    for i in range(n):
-        ends[i] = stopped[i] and not allowed[i]
-        for j in range(d):
-            clipped[i, j] = min(max(moved[i, j], -1.0), 1.0)
     for k in range(broken.size):
         ends[broken[k]] = True
-    feasible(objective, clipped, works)
+    count = 0
     for i in range(n):
-        for j in range(d if ends[i] else 0):
-            moved[i, j] = clipped[i, j] if works[i] else position[i, j]
-            velocities[i, j] = 0.0
-    return used
-
-
-@inlined
-def move_all(rng, rows, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, moves):
-    """Move particles `rows` (k,) as `move` does, with more drawn to `spare` as it is used up; return how much then."""
-    velocities, moved, stopped = moves
-    reached = 0
-    while reached < rows.size:
-        if used + 2 * redraws * moved.shape[1] > spare.size:
-            for k in range(spare.size):
-                spare[k] = rng.random()
-            used = 0
-        reached, used = move(
-            rows,
-            reached,
-            rand,
-            spare,
-            used,
-            redraws,
-            omega,
-            acceleration,
-            swarm_best,
-            swarm,
-            velocities,
-            moved,
-            stopped,
-        )
+        count += ends[i]
+        for j in range(d):
+            clipped[i, j] = min(max(moved[i, j], -1.0), 1.0)
+    if count:
+        works = np.empty(n, np.bool_)
+        feasible(constraint, clipped, works)
+        for i in range(n):
+            for j in range(d if ends[i] else 0):
+                moved[i, j] = clipped[i, j] if works[i] else position[i, j]
+                velocities[i, j] = 0.0
     return used
 
 
 @jit
-def search(objective, rng, schedule, temperature, annealing, redraws, rows, spare, used, swarm, moves, searched):
+def search(objective, rng, schedule, temperature, annealing, redraws, spare, used, swarm, moves, searched):
     """Evaluate, accept and move a swarm, by a row of a `schedule` (k, 3) after the other, as `SwarmState` does it.
 
     A row are omega, the acceleration and the factor of the temperature. `annealing` are what a refused particle keeps
@@ -238,27 +228,25 @@ def search(objective, rng, schedule, temperature, annealing, redraws, rows, spar
     Returns how many rows are done, how much of `spare` is used, and the temperature.
     """
     velocities, moved, _ = moves
-    proposals, costs = searched
     kept, stop, each = annealing
     n, d = moved.shape
-    rand, accepted, allowed = np.empty(n + 2 * n * d), np.empty(n, np.bool_), np.empty(n, np.bool_)
+    rand, accepted = np.empty(n + 2 * n * d), np.empty(n, np.bool_)
     for g in range(schedule.shape[0]):
-        if temperature <= stop or not evaluate(objective, moved, costs[g]):
+        proposals, costs = searched[0][g], searched[1][g]
+        if temperature <= stop or not evaluate(objective, moved, costs):
             return g, used, temperature
         for i in range(n):
             for j in range(d):
-                proposals[g, i, j] = moved[i, j]
+                proposals[i, j] = moved[i, j]
         for k in range(rand.size):
             rand[k] = rng.random()
-        leader = accept(moved, costs[g], rand, temperature, kept, swarm, accepted)
+        leader = accept(moved, costs, rand, temperature, kept, swarm, accepted)
         moves_accepted = 0
         for i in range(n):
             moves_accepted += accepted[i]
         temperature *= schedule[g, 2] ** (moves_accepted if each else 1)
         pull = schedule[g, 0], schedule[g, 1], swarm[2][leader]
-        used = move_all(rng, rows, rand, spare, used, redraws[1], pull[0], pull[1], pull[2], swarm, moves)
-        if not feasible(objective, moved, allowed):
-            used = redraw(objective, rng, allowed, redraws[0], redraws[1], pull, spare, used, swarm, moves)
+        used = advance(objective.constraint, rng, rand, redraws[0], redraws[1], pull, spare, used, swarm, moves)
         for i in range(n):
             for j in range(d):
                 swarm[4][i, j] = velocities[i, j]

@@ -114,7 +114,7 @@ class SwarmState:
             return NOTHING_SEARCHED, temperature
         searched = np.empty((count, n, d)), np.empty((count, n))
         redraws, moves = (self._redraws, self._coordinate_redraws), (self._next_velocity, self.moved, self._stopped)
-        draws = redraws, self._all_rows, *self.draws()
+        draws = redraws, *self.draws()
         done, self.used, temperature = search(
             objective, self._rng, schedule, temperature, annealing, *draws, self.arrays(), moves, searched
         )

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from posefit.arrays import inlined, jit
+from posefit.arrays import Array, inlined, jit
 from posefit.arrays.calling import call
 from posefit.fitting.box import REPAIR_STEPS
 from posefit.geometry.skeleton import ANGLES
@@ -15,17 +15,27 @@ DAMPING = 1e-9  # keeps the 3 x 3 system solvable where a silhouette has too few
 NEAREST = 1e-3  # metres; a joint that is nearer, or behind the camera, counts as that far
 
 
+class Constraint(NamedTuple):
+    """What compiled loops need to know of which proposals are feasible."""
+
+    centre: Array  # (d,)
+    half: Array  # (d,)
+    first: int  # where the latents begin in a proposal
+    near: Any  # the address of the prior's function of whether latents are feasible
+    clusters: tuple[Any, ...]  # its arguments that never change
+
+
 class Objective(NamedTuple):
     """What compiled loops need to evaluate proposals of a problem.
 
-    `recover`, `near` and `count` are the addresses of functions, each followed by the arguments that never change.
+    `recover` and `count` are the addresses of functions, each followed by the arguments that never change.
     """
 
-    box: tuple[Any, ...]  # what `unpack_proposals` takes between proposals and poses
+    constraint: Constraint
+    anchor: Array
+    mean: Array  # as `unpack_proposals` takes it
     recover: Any  # of the prior's `compiled`: from latents to joint angles
     recovering: tuple[Any, ...]
-    near: Any  # of the prior's `compiled`: whether latents are feasible
-    clusters: tuple[Any, ...]
     count: Any  # of `count_areas`
     drawing: tuple[Any, ...]
     scale: float
@@ -35,11 +45,13 @@ class Objective(NamedTuple):
 @inlined
 def evaluate(objective, proposals, costs):
     """Write the costs (n,) of proposals (n, d) as `PoseProblem.evaluate` does; return whether all are finite."""
-    centre, half, anchor, first, mean = objective.box
+    centre, half, first, _, _ = objective.constraint
     n, areas = costs.size, np.empty((costs.size, 3), np.int64)
     latents, angles = np.empty((n, centre.size - first)), np.empty((n, ANGLES - 3))
     poses, translations = np.empty((n, ANGLES)), np.empty((n, 3))
-    if not unpack_proposals(proposals, centre, half, anchor, first, mean, poses, translations, latents):
+    if not unpack_proposals(
+        proposals, centre, half, objective.anchor, first, objective.mean, poses, translations, latents
+    ):
         return False
     call(objective.recover, (latents, *objective.recovering, angles))
     for i in range(n):
@@ -52,12 +64,12 @@ def evaluate(objective, proposals, costs):
 
 
 @jit
-def feasible(objective, proposals, allowed):
+def feasible(constraint, proposals, allowed):
     """Write which proposals (n, d) are feasible (n,), as `SearchSpace.feasible` does; return whether all are."""
-    centre, half, _, first, _ = objective.box
+    centre, half, first, near, clusters = constraint
     inside, latents = np.empty(allowed.size, np.bool_), np.empty((allowed.size, centre.size - first))
     within(proposals, centre, half, inside, latents)
-    call(objective.near, (latents, *objective.clusters, allowed))
+    call(near, (latents, *clusters, allowed))
     everyone = True
     for i in range(allowed.size):
         allowed[i] &= inside[i]
@@ -75,7 +87,7 @@ def wrap(periodic, proposals):
 
 
 @jit
-def repair(objective, periodic, proposals, rows, homes):
+def repair(constraint, periodic, proposals, rows, homes):
     """Move proposals (n, d) in some rows (k,) into the box, and towards homes (k or 1, d), as `box.repair` does it."""
     d = proposals.shape[1]
     inside, allowed = np.empty((rows.size, d)), np.empty(rows.size, np.bool_)
@@ -87,7 +99,7 @@ def repair(objective, periodic, proposals, rows, homes):
         for j in range(d):
             x = inside[k, j]
             inside[k, j] = homes[k % homes.shape[0], j] if np.isnan(x) else min(max(x, -1.0), 1.0)
-    feasible(objective, inside, allowed)
+    feasible(constraint, inside, allowed)
     way, line, works = np.empty((1, d)), np.empty((REPAIR_STEPS - 1, d)), np.empty(REPAIR_STEPS - 1, np.bool_)
     for k in range(rows.size):
         home = homes[k % homes.shape[0]]
@@ -105,7 +117,7 @@ def repair(objective, periodic, proposals, rows, homes):
             for s in range(REPAIR_STEPS - 1):
                 for j in range(d):
                     line[s, j] = min(max(line[s, j], -1.0), 1.0)
-            feasible(objective, line, works)
+            feasible(constraint, line, works)
             for j in range(d):
                 inside[k, j] = home[j]
             for s in range(REPAIR_STEPS - 2, -1, -1):

@@ -12,7 +12,7 @@ from posefit.arrays.calling import address_of
 from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, between
-from posefit.fitting.kernels import Objective, move_to_borders
+from posefit.fitting.kernels import Constraint, Objective, move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -161,10 +161,11 @@ class PoseProblem:
         drawing = kinematics(), *views[0][0]
         poses, translations, latents, angles = (np.empty((0, columns)) for columns in (ANGLES, 3, m, ANGLES - 3))
         areas, allowed = np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=bool)
+        nearness = address_of(near, (latents, *clusters, allowed)), clusters
         return Objective(
-            (space.centre, space.half, space.anchor, space.dimensions - m, space.tilt_mean),
+            Constraint(space.centre, space.half, space.dimensions - m, *nearness),
+            *(space.anchor, space.tilt_mean),
             *(address_of(recover, (latents, *recovering, angles)), recovering),
-            *(address_of(near, (latents, *clusters, allowed)), clusters),
             *(address_of(count_areas, (*drawing, poses, translations, areas)), drawing),
             *(SCALE, float(self.beta)),
         )
