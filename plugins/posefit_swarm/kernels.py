@@ -138,7 +138,7 @@ def accept(moved, costs, chances, temperature, kept, swarm, accepted):
     return leader
 
 
-@jit
+@inlined
 def repair(broken, works, velocities, moved, velocity, position):
     """Give each broken particle its first attempt that works (rows in equal shares); return those that have none."""
     many, left = works.size // broken.size, 0

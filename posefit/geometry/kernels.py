@@ -232,13 +232,12 @@ def set_offsets(lanes, first, stop, offsets):
 @jit
 def place_lanes(chain, poses, places, rows, slots, lanes):
     """Write axes and joints of the poses (n, 66), their roots at places (n, 3), that are in these rows (LANES,)."""
-    bits = poses.view(np.int64)
     for a in range(_ANGLES):
         slots[a] = 0
     for lane in range(LANES):
-        row = bits[rows[lane]]
+        row = poses[rows[lane]]
         for a in range(_ANGLES):
-            slots[a] |= row[a]
+            slots[a] |= row[a] != 0.0
     count = 0
     for a in range(_ANGLES):
         if slots[a] != 0 or a < 3:

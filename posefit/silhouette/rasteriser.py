@@ -116,12 +116,13 @@ def _build_steps(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     return context.get_dummy_value()
 
 
-def set_spans(pixels: Any, place: Any, stride: Any, spans: Any) -> None:
-    """Set the bits of eight spans in eight words from `place` on, and in the eight words `stride` farther on.
+def set_spans(image: Any, place: Any, stride: Any, spans: Any) -> None:
+    """Set the bits of eight spans in eight half words from `place` on, and in the eight ones `stride` farther on.
 
     `spans` (16,) are eight first bits, from 0 on, and eight that come after a last one, 64 at most; a span that ends
     before it begins is empty. Bits from 32 on are those of the farther words.
     """
+    pixels = image.reshape(-1).view(np.uint32)
     for k in range(BLOCK):
         first, stop = int(spans[k]), max(int(spans[k]), int(spans[BLOCK + k]))
         bits = ((1 << stop) - (1 << first)) & 0xFFFFFFFFFFFFFFFF if first < 2 * STRIP_PIXELS else 0
@@ -130,33 +131,34 @@ def set_spans(pixels: Any, place: Any, stride: Any, spans: Any) -> None:
 
 
 @intrinsic
-def _set_spans(typing_context: Any, pixels: Any, place: Any, stride: Any, spans: Any) -> Any:  # noqa: ARG001
-    return types.void(pixels, types.int64, types.int64, spans), _build_spans
+def _set_spans(typing_context: Any, image: Any, place: Any, stride: Any, spans: Any) -> Any:  # noqa: ARG001
+    return types.void(image, types.int64, types.int64, spans), _build_spans
 
 
 @overload(set_spans, inline="always")
-def _set_spans_compiled(pixels, place, stride, spans):  # noqa: ARG001
-    return lambda pixels, place, stride, spans: _set_spans(pixels, place, stride, spans)  # type: ignore[call-arg]
+def _set_spans_compiled(image, place, stride, spans):  # noqa: ARG001
+    return lambda image, place, stride, spans: _set_spans(image, place, stride, spans)  # type: ignore[call-arg]
 
 
 def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Write `set_spans` as instructions for eight lanes of 32 bits."""
     vector = ir.VectorType(ir.IntType(32), BLOCK)
-    pixels, place, stride, spans = arguments
+    image, place, stride, spans = arguments
 
     def splat(value: int) -> Any:
         return ir.Constant(vector, [value] * BLOCK)
 
     def lanes_at(kind: Any, array: Any, index: Any) -> Any:
         data = context.make_array(kind)(context, builder, array).data
-        return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+        pixels = builder.bitcast(data, ir.IntType(32).as_pointer())
+        return builder.bitcast(builder.gep(pixels, [index]), vector.as_pointer())
 
     def shifted(shift: Any, by: Any) -> Any:
         # a shift by 32 and more leaves nothing: one instruction on x86 with AVX2, without the choice
         return builder.select(builder.icmp_unsigned("<", by, splat(STRIP_PIXELS)), shift(splat(-1), by), splat(0))
 
     def add_bits(at: Any, bits: Any) -> None:
-        words = lanes_at(signature.args[0], pixels, at)
+        words = lanes_at(signature.args[0], image, at)
         builder.store(builder.or_(builder.load(words, align=4), bits), words, align=4)
 
     first, stop = (
@@ -349,7 +351,6 @@ def scratch(strips, words):
         np.empty(ROOM, np.int64),
         np.empty((CONES // LANES) * (2 * words // BLOCK + 1) + LISTED, np.int64),
         np.empty(4, np.int64),
-        image.reshape(-1).view(np.uint32),
     )
     return empty_lanes(), filling, image
 
@@ -357,7 +358,7 @@ def scratch(strips, words):
 @inlined
 def set_scene(work, first, stop, offsets, radii, view):
     """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
-    (_, lanes), (ends, _, _, _, _, _, _, _), _ = work
+    (_, lanes), (ends, _, _, _, _, _, _), _ = work
     set_offsets(lanes, first, stop, offsets)
     centre = view.centre[0] - 0.5, view.centre[1] - 0.5
     set_view(lanes, first, stop, view.rotation, view.translation, view.focal, centre)
@@ -374,7 +375,7 @@ def outline_poses(kinematics, chain, poses, places, rows, width, height, work):
 
     `kinematics` is the address of `place_lanes`; `work` is what `scratch` makes and `set_scene` fills.
     """
-    (slots, lanes), (ends, lines, bounds, _, keys, _, _, _), image = work
+    (slots, lanes), (ends, lines, bounds, _, keys, _, _), image = work
     call(kinematics, (chain, poses, places, rows, slots, lanes))
     project(chain.parents, lanes, ends)
     strips, stride = image.shape[0], 2 * image.shape[1]
@@ -389,11 +390,11 @@ def fill_pose(lane, work):
 
     The lane's outline is used up.
     """
-    _, (_, lines, bounds, spans, keys, blocks, box, pixels), image = work
+    _, (_, lines, bounds, spans, keys, blocks, box), image = work
     strips, stride = image.shape[0], 2 * image.shape[1]
     for step in range(bounding_box(lane, bounds, box)):
         for i in range(list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride)):
             block = blocks[i]
             columns(spans, lines, block & (ROOM - 1), np.float32((block & 0xFFFFFFFF) // ROOM))
-            set_spans(pixels, block >> 32, stride, spans)
+            set_spans(image, block >> 32, stride, spans)
     return image, box
