@@ -215,10 +215,6 @@ def outline(ends, lines, bounds, strips, width, height):
         length = 1.0 / max(dd, 1e-30)
         along = dr * length
         across = math.sqrt(max(gap, 0.0)) * length
-        px = along * dx - across * dy
-        py = along * dy + across * dx
-        qx = along * dx + across * dy
-        qy = along * dy - across * dx
         top = min(max(np.ceil(min(v0 - r0, v1 - r1)), 0.0), height)
         bottom = max(min(np.floor(max(v0 + r0, v1 + r1)) + 1.0, height), 0.0)
         left = min(max(np.ceil(min(u0 - r0, u1 - r1)), 0.0), width)
@@ -236,22 +232,19 @@ def outline(ends, lines, bounds, strips, width, height):
         lines[_X1 + k] = u1
         lines[_Y1 + k] = v1 - top
         lines[_S1 + k] = r1 * r1
-        a = v0 + r0 * py - top
-        b = v1 + r1 * py - top
-        crosses = (abs(px) > _FLAT) & (gap > 0.0)
-        slope = -py / (px if crosses else 1.0)
-        lines[_XP + k] = u0 + r0 * px - a * slope
-        lines[_MP + k] = slope
-        lines[_PA + k] = min(a, b) if crosses else 1.0
-        lines[_PB + k] = max(a, b) if crosses else 0.0
-        a = v0 + r0 * qy - top
-        b = v1 + r1 * qy - top
-        crosses = (abs(qx) > _FLAT) & (gap > 0.0)
-        slope = -qy / (qx if crosses else 1.0)
-        lines[_XQ + k] = u0 + r0 * qx - a * slope
-        lines[_MQ + k] = slope
-        lines[_QA + k] = min(a, b) if crosses else 1.0
-        lines[_QB + k] = max(a, b) if crosses else 0.0
+        for side in range(2):
+            apart = across if side == 0 else -across
+            x = along * dx - apart * dy
+            y = along * dy + apart * dx
+            a = v0 + r0 * y - top
+            b = v1 + r1 * y - top
+            crosses = (abs(x) > _FLAT) & (gap > 0.0)
+            slope = -y / (x if crosses else 1.0)
+            at = side * (_XQ - _XP) + k
+            lines[_XP + at] = u0 + r0 * x - a * slope
+            lines[_MP + at] = slope
+            lines[_PA + at] = min(a, b) if crosses else 1.0
+            lines[_PB + at] = max(a, b) if crosses else 0.0
 
 
 @inlined
