@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array, jit
+from posefit.evolution.kernels import rank
 from posefit.fitting.kernels import evaluate, feasible, repair, wrap
 from posefit_swarm.kernels import accept, advance
 from posefit_swarm.kernels import repair as repair_first
@@ -62,9 +63,19 @@ def products(normal, offsets, steps):
 
 
 @jit
-def differential(constraint, rng, turns, points, bests, order, weight, periodic, trials):
-    """Write trials (k, d) for points (k, d), as `population.differential` does."""
-    (k, d), n, home = points.shape, bests.shape[0], bests[order[0]].copy().reshape(1, -1)
+def rows_of(values, rows):
+    """Return some rows (k, d) of values (n, d): numba takes seconds to compile this as an index."""
+    some = np.empty((rows.size, values.shape[1]))
+    for i in range(rows.size):
+        for j in range(values.shape[1]):
+            some[i, j] = values[rows[i], j]
+    return some
+
+
+@jit
+def differential(constraint, rng, turns, points, bests, order, home, weight, periodic, trials):
+    """Write trials (k, d) for points (k, d), as `population.differential` does; `home` (1, d) is the best of all."""
+    (k, d), n = points.shape, bests.shape[0]
     leaders = rng.integers(0, max(1, round(turns.leaders * n)), size=k)
     others = rng.integers(0, n, size=2 * k)
     step, difference = np.empty((k, d)), np.empty((k, d))
@@ -85,88 +96,109 @@ def differential(constraint, rng, turns, points, bests, order, weight, periodic,
 
 
 @jit
-def draw_elite(constraint, rng, turns, bests, order, stride, periodic, drawn):
+def draw_elite(constraint, rng, turns, bests, order, home, stride, periodic, drawn):
     """Write draws (k, d) from the distribution of the better bests, as `population.normal` does."""
-    m, d = max(2, round(turns.elite * order.size)), drawn.shape[1]
-    m = min(m, order.size)
-    offsets, middle = np.empty((m, d)), np.zeros((1, d))
+    (k, d), m = drawn.shape, min(max(2, round(turns.elite * order.size)), order.size)
+    offsets, middle, normal = np.empty((m, d)), np.empty((1, d)), np.empty((k, m))
     for i in range(m):
         for j in range(d):
-            offsets[i, j] = bests[order[i], j] - bests[order[0], j]
+            offsets[i, j] = bests[order[i], j] - home[0, j]
     wrap(periodic, offsets)
-    for i in range(m):
-        for j in range(d):
-            middle[0, j] += offsets[i, j]
     for j in range(d):
+        middle[0, j] = 0.0
+        for i in range(m):
+            middle[0, j] += offsets[i, j]
         middle[0, j] /= m
         for i in range(m):
             offsets[i, j] -= middle[0, j]
-        middle[0, j] += bests[order[0], j]
-    products(rng.standard_normal((drawn.shape[0], m)), offsets, drawn)
-    for k in range(drawn.shape[0]):
+        middle[0, j] += home[0, j]
+    for i in range(k):
+        for j in range(m):
+            normal[i, j] = rng.standard_normal()
+    products(normal, offsets, drawn)
+    for i in range(k):
         for j in range(d):
-            drawn[k, j] = stride / turns.neutral * (drawn[k, j] / np.sqrt(m))
+            drawn[i, j] = stride / turns.neutral * (drawn[i, j] / np.sqrt(m))
     add(middle, drawn)
     fold(periodic, drawn)
-    repair(constraint, periodic, drawn, np.arange(drawn.shape[0]), bests[order[0]].copy().reshape(1, -1))
+    repair(constraint, periodic, drawn, np.arange(k), home)
+
+
+@jit
+def scatter(rng, spread, periodic, points, rows, drawn):
+    """Write a normal draw (k, d) around points (n, d) in some rows (k,), folded into the box."""
+    for i in range(rows.size):
+        for j in range(spread.size):
+            drawn[i, j] = rng.standard_normal() * spread[j]
+    add(rows_of(points, rows), drawn)
+    fold(periodic, drawn)
 
 
 @jit
 def kick(constraint, rng, turns, periodic, moved):
     """Move proposals (n, d) by a normal draw each, as `posefit.fitting.box.sample_normal` does."""
-    (n, d), spread = moved.shape, turns.kick
-    drawn, works = rng.standard_normal((n, d)), np.empty(n, np.bool_)
-    for i in range(n):
-        for j in range(d):
-            drawn[i, j] *= spread[j]
-    add(moved, drawn)
-    fold(periodic, drawn)
+    n, d = moved.shape
+    drawn, works, broken, count = np.empty((n, d)), np.empty(n, np.bool_), np.empty(n, np.int64), 0
+    scatter(rng, turns.kick, periodic, moved, np.arange(n), drawn)
     feasible(constraint, drawn, works)
-    broken, left = np.flatnonzero(~works), turns.redraws - 1
+    for i in range(n):
+        if not works[i]:
+            broken[count] = i
+            count += 1
+    broken, left = broken[:count], turns.redraws - 1
     while left > 0 and broken.size:
         many = min(left, turns.batch)
-        rows = np.repeat(broken, many)
-        again, works = rng.standard_normal((rows.size, d)), np.empty(rows.size, np.bool_)
-        for i in range(rows.size):
-            for j in range(d):
-                again[i, j] *= spread[j]
-        add(moved[rows], again)
-        fold(periodic, again)
+        rows, works = np.empty(broken.size * many, np.int64), np.empty(broken.size * many, np.bool_)
+        again = np.empty((rows.size, d))
+        for k in range(rows.size):
+            rows[k] = broken[k // many]
+        scatter(rng, turns.kick, periodic, moved, rows, again)
         feasible(constraint, again, works)
         broken = repair_first(broken, works, again, again, drawn, drawn)
         left -= many
-    for row in broken:
-        for j in range(d):
-            drawn[row, j] = moved[row, j]
-    moved[:] = drawn
+    for j in range(d):
+        for k in range(broken.size):
+            drawn[broken[k], j] = moved[broken[k], j]
+        for i in range(n):
+            moved[i, j] = drawn[i, j]
 
 
 @jit
 def move_part(constraint, rng, turns, stride, spare, used, best_costs, bests, part, moved):
     """Move the particles (k, d) of a part, each share with its optimiser; return how much of `spare` is used."""
     position, _, own, _, velocity, low, high, periodic, _ = part
-    count, d = moved.shape
-    known = np.flatnonzero(np.isfinite(best_costs))
-    bests, order = bests[known], np.argsort(best_costs[known], kind="mergesort")
+    (count, d), n = moved.shape, 0
+    known, costs = np.empty(best_costs.size, np.int64), np.empty(best_costs.size)
+    for i in range(best_costs.size):
+        if np.isfinite(best_costs[i]):
+            known[n], costs[n] = i, best_costs[i]
+            n += 1
+    bests, order = rows_of(bests, known[:n]), np.empty(n, np.int64)
+    rank(costs[:n], order)
+    home = rows_of(bests, order[:1])
     swarmed = round(turns.shares[0] * count)
     apart = min(swarmed + round(turns.shares[1] * count), count)
     if swarmed:
-        moves = np.empty((count, d)), moved, np.empty(count, np.bool_)
-        pull, redraws = (stride, turns.acceleration, bests[order[0]].copy()), turns.redraws
+        moves, pull = (np.empty((count, d)), moved, np.empty(count, np.bool_)), (stride, turns.acceleration, home[0])
         rand = rng.random(2 * count * d)
-        used = advance(constraint, rng, rand, redraws, redraws, pull, spare, used, part, moves)
-        velocity[:] = moves[0]
+        used = advance(constraint, rng, rand, turns.redraws, turns.redraws, pull, spare, used, part, moves)
+        for i in range(count):
+            for j in range(d):
+                velocity[i, j] = moves[0][i, j]
     if swarmed < apart:
         points, trials = own[swarmed:apart], moved[swarmed:apart]
-        differential(constraint, rng, turns, points, bests, order, stride, periodic, trials)
+        differential(constraint, rng, turns, points, bests, order, home, stride, periodic, trials)
     if apart < count:
-        draw_elite(constraint, rng, turns, bests, order, stride, periodic, moved[apart:])
+        draw_elite(constraint, rng, turns, bests, order, home, stride, periodic, moved[apart:])
     if swarmed < count:
-        way = moved[swarmed:] - position[swarmed:]
+        way = np.empty((count, d))
+        for i in range(count):
+            for j in range(d):
+                way[i, j] = moved[i, j] - position[i, j]
         wrap(periodic, way)
         for i in range(swarmed, count):
             for j in range(d):
-                velocity[i, j] = min(max(way[i - swarmed, j], low[j]), high[j])
+                velocity[i, j] = min(max(way[i, j], low[j]), high[j])
     if turns.kick.size:
         kick(constraint, rng, turns, periodic, moved)
     return used
@@ -180,38 +212,42 @@ def take_turns(objective, rng, turns, spare, used, best, leader, swarm, moved, c
     Returns how much of `spare` is used, -1 where a proposal is not finite, and the best cost.
     """
     position, cost, bests, best_costs, velocity, low, high, periodic, clamped = swarm
-    (n, d), done = moved.shape, 0
+    (n, d), done, ranks, all_rows = moved.shape, 0, np.empty(moved.shape[0]), np.empty(moved.shape[0], np.int64)
     while done < turns.evaluations:
         left = turns.evaluations - done
         count = min(turns.wanted, left % n if left % n else n)
-        rows = np.arange(n)
+        for i in range(n):
+            ranks[i], all_rows[i] = -1.0 if np.isinf(best_costs[i]) else best_costs[i], i
         if count < n:
-            ranks = np.empty(n)
-            for i in range(n):
-                ranks[i] = -1.0 if np.isinf(best_costs[i]) else best_costs[i]
-            rows = np.argsort(ranks, kind="mergesort")[:count].copy()
-        there, fresh, some = moved[rows], np.isinf(best_costs[rows]), costs[done : done + count]
-        part = position[rows], cost[rows], bests[rows], best_costs[rows], velocity[rows], low, high, periodic, clamped
-        if not fresh.all():
-            used = move_part(
-                objective.constraint, rng, turns, turns.strides[done // n], spare, used, best_costs, bests, part, there
-            )
+            rank(ranks, all_rows)
+        rows, there, some = all_rows[:count], rows_of(moved, all_rows[:count]), costs[done : done + count]
+        fresh, own_costs, own_bests, moving = np.empty(count, np.bool_), np.empty(count), np.empty(count), False
+        for i in range(count):
+            own_costs[i], own_bests[i] = cost[rows[i]], best_costs[rows[i]]
+            fresh[i] = np.isinf(own_bests[i])
+            moving |= not fresh[i]
+        places, own, speeds = rows_of(position, rows), rows_of(bests, rows), rows_of(velocity, rows)
+        part = places, own_costs, own, own_bests, speeds, low, high, periodic, clamped
+        if moving:
+            stride = turns.strides[done // n]
+            used = move_part(objective.constraint, rng, turns, stride, spare, used, best_costs, bests, part, there)
         for i in range(count):
             for j in range(d if fresh[i] else 0):
-                there[i, j], part[4][i, j] = part[2][i, j], 0.0
+                there[i, j], speeds[i, j] = own[i, j], 0.0
         if not evaluate(objective, there, some):
             return -1, best
-        least = np.argmin(some)
-        if some[least] < best:
-            best = some[least]
-            leader[:] = there[least]
+        for i in range(count):
+            if some[i] < best:
+                best = some[i]
+                for j in range(d):
+                    leader[j] = there[i, j]
         chances, taken = rng.random(count), accepted[done : done + count]
         accept(there, some, chances, turns.temperatures[done // n], 1.0, part, taken)
         for i in range(count):
             row = rows[i]
-            cost[row], best_costs[row] = part[1][i], part[3][i]
+            cost[row], best_costs[row] = own_costs[i], own_bests[i]
             for j in range(d):
-                moved[row, j], position[row, j], bests[row, j] = there[i, j], part[0][i, j], part[2][i, j]
-                velocity[row, j] = part[4][i, j]
+                moved[row, j], position[row, j], bests[row, j] = there[i, j], places[i, j], own[i, j]
+                velocity[row, j] = speeds[i, j]
         done += count
     return used, best
