@@ -231,7 +231,7 @@ def fit_poses(
     for n in range(poses.shape[0]):
         start = places[n].copy()
         for reach in reaches:
-            place_frames(kinematics, chain, poses[n], places[n], sines, cosines, frames)
+            place_frames(kinematics, chain, poses[n : n + 1], places[n : n + 1], sines, cosines, frames)
             forces[:] = 0.0
             curves[:] = 0.0
             for v in range(len(steps)):

@@ -52,7 +52,7 @@ class Figure:
         bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
         sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
         frames = np.empty((len(JOINTS), 4, 3))
-        place_frames(kinematics(), self.skeleton.chain, pose, state[:3], sines, cosines, frames)
+        place_frames(kinematics(), self.skeleton.chain, pose[None], state[None, :3], sines, cosines, frames)
         count = len(POINTS)
         points, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
         others = np.empty((count, 3, len(offset)))

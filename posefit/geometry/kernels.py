@@ -274,30 +274,20 @@ def place_lanes(chain, poses, places, rows, slots, lanes):
 @cache
 def kinematics() -> Any:
     """Return the address of `place_lanes`, which whatever moves poses calls: it takes seconds to compile."""
-    number, flag, many, vector, matrix = (
-        np.empty(0, np.int64),
-        np.empty(0, np.bool_),
-        *map(np.empty, ((0, 0), 0, (0, 0, 0))),
-    )
-    return address_of(place_lanes, (Chain(number, number, matrix, flag, many), many, many, number, number, vector))
+    whole, flags, rows = np.empty(0, np.int64), np.empty(0, np.bool_), np.empty((0, 3))
+    some = Chain(whole, whole, np.empty((0, 3, 3)), flags, rows)
+    return address_of(place_lanes, (some, rows, rows, whole, whole, np.empty(0)))
 
 
 @jit
-def place_frames(kinematics, chain, pose, place, sines, cosines, frames):
-    """Write the frames (27, 4, 3) of the joints of one pose (66,), its root at a place (3,): three axes and an origin.
+def place_frames(kinematics, chain, poses, places, sines, cosines, frames):
+    """Write the frames (27, 4, 3) of the joints of a pose (1, 66) at a place (1, 3): three axes and an origin each.
 
     And the sine and cosine (66,) of its angles.
     """
     slots, lanes = empty_lanes()
     set_offsets(lanes, 0, LANES, chain.offsets)
-    poses, places, rows = np.empty((1, _ANGLES)), np.empty((1, 3)), np.empty(LANES, np.int64)
-    for a in range(_ANGLES):
-        poses[0, a] = pose[a]
-    for i in range(3):
-        places[0, i] = place[i]
-    for lane in range(LANES):
-        rows[lane] = 0
-    call(kinematics, (chain, poses, places, rows, slots, lanes))
+    call(kinematics, (chain, poses, places, np.zeros(LANES, np.int64), slots, lanes))
     for a in range(_ANGLES):
         moves, at = slots[a] != _STILL, LANES * (slots[a] & NATURAL)
         sines[a], cosines[a] = lanes[_SINE + at] if moves else 0.0, lanes[_COSINE + at] if moves else 1.0
