@@ -144,8 +144,9 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     drawn.count_poses(1)
-    image = np.zeros((1, *strips_and_words(camera.width, camera.height)), dtype=np.uint64)
-    drawing = *body.skeleton.chain, body.radii, *view_of(camera), image[0], image[0], 0, image
+    nothing = np.zeros(strips_and_words(camera.width, camera.height), dtype=np.uint64)
+    image = np.empty((1, *nothing.shape), dtype=np.uint64)
+    drawing = *body.skeleton.chain, body.radii, *view_of(camera), nothing, nothing, 0, image
     uncounted = np.empty((1, 3), dtype=np.int64)
     kernels.count_areas(kinematics(), *drawing, writeable(pose)[None], writeable(translation)[None], uncounted)
     return unpack(image[0], camera.width, camera.height)
