@@ -5,7 +5,7 @@
 | before the first frame | `best_restart`: searches of the first frame, followed over a few more | the cheapest |
 | after a gap, or while costs are high | `RelocalisingTracker`: such restarts beside the track as it is | the cheapest |
 | with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
-| where the body spins | `retrack_spins`: what is before and after the longest run without | the new one, if about as cheap |
+| where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
 | with several passes | `smoothing.smooth`: all frames again, their path known | the new one, if about as cheap |
 """
 
@@ -244,10 +244,10 @@ def retrack_spins(
 ) -> tuple[list[Frame], tuple[int, int] | None]:
     """Return a track without spins, and the first and last frame of those that stay; None where all do.
 
-    Those are of the longest run that faces as most frames do, see `facing_consensus`: from the surest near its beginning
-    to the surest near its end. The person is followed onward from the last, and backwards from the first by training
-    motions in reverse. The old track is kept where the new one spins as often, or costs half as much again. Frames that
-    are tracked again have the effort of both tracks.
+    Those are of the longest run that faces as most frames do, see `facing_consensus`, between its surest ends. The
+    person is followed onward from the last, and backwards from the first by training motions in reverse. The old track
+    is kept where the new one spins as often, or costs half as much again. Frames that are tracked again have the effort
+    of both tracks.
     """
     usable = np.array([observation.usable for observation in observations])
 
