@@ -108,7 +108,6 @@ def _check() -> None:
 
 
 def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
-    """Return a plugin's label and its checks."""
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
