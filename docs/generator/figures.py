@@ -54,8 +54,9 @@ ROW = {
     "dimensions": ("", "coordinates of a proposal; none of a tracker that searches no box"),
     "seconds": ("s", "wall time of the whole cell"),
     "warnings": ("", "what to look at before the result is trusted"),
+    "joint_errors_mm.JOINT": ("mm", "mean distance of one joint from the true one, both roots at one point"),
 }
-SPENT = ("evaluations_used", "dimensions", "seconds", "warnings")
+SPENT = ("evaluations_used", "dimensions", "seconds", "warnings", "joint_errors_mm.JOINT")
 RESULT = {
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
     "none_of_modes": (
@@ -128,23 +129,11 @@ def page() -> str:
         "`baselines_degrees.mean_pose`.",
         "What the cell is:",
         _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")} | CELL)),
-        "What it measured:",
-        _table(
-            "column",
-            [*_measured(_of_rows()), *_described({name: ROW[name] for name in SPENT})],
-        ),
-        _table(
-            "column",
-            [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")],
-        ),
+        "What it measured: the figures of [`summary.json`](#keys-of-summary-json), `evaluations_per_second` aside, and",
+        _table("column", _described({name: ROW[name] for name in SPENT})),
         "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
     ]
     return "\n\n".join(parts) + "\n"
-
-
-def _of_rows() -> list[Measure]:
-    """Return the figures of a track that a row of a sweep has under the same name."""
-    return [one for one in MEASURES.values() if one.name not in ("evaluations", "evaluations_per_second")]
 
 
 def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
