@@ -81,25 +81,6 @@ RESULT = {
     "trust": ("", "of footage, whether the track [can be trusted](../howto/trust.md), and why"),
     "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
 }
-CELL = {
-    "method": ("", "OPTIMISER@PRIOR, or a tracker"),
-    "motion": ("", "a built-in motion, or a capture file"),
-    "train": ("", "motions that the prior learned from"),
-    "settings": ("", "settings as `--set` takes them"),
-    "view_degrees": ("degrees", "where the cameras stand: 0 in front of the person, 90 to the side"),
-    "corruption": ("", "kinds of damage to the silhouettes, with their strength from 0 to 1"),
-    "instance": ("", "number of the variation of the motion; 0 is the motion as it is"),
-    "frames": ("frames", "length of the sequence"),
-    "fps": ("1/s", "frames a second"),
-    "size": ("pixels", "width and height of the masks"),
-    "evaluations": ("", "budget of a frame, in each track"),
-    "translation": ("", "the root's position: known, searched or aligned"),
-    "first_pose": ("", "the first pose: searched, or given"),
-    "hypotheses": ("", "of how many tracks from different beginnings one was chosen"),
-    "yaw_off_degrees": ("degrees", "by how much the first known yaw is off at most; 180 for an unknown one"),
-    "body_off_percent": ("%", "by how much the known bones and radii are off at most"),
-    "seed": ("", "the seed of the method"),
-}
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"
 
 Descriptions = Mapping[str, tuple[str, str]]
@@ -127,8 +108,8 @@ def page() -> str:
         "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
-        "What the cell is:",
-        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")} | CELL)),
+        "What the cell is: the fields [of a plan](../howto/plan.md#the-fields-of-a-cell), and",
+        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")})),
         "What it measured: the figures of [`summary.json`](#keys-of-summary-json), `evaluations_per_second` aside, and",
         _table("column", _described({name: ROW[name] for name in SPENT})),
         "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
