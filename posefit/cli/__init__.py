@@ -63,9 +63,9 @@ class _Commands(Group):
 
 
 def _added() -> dict[str, click.Command]:
-    from posefit.registry import command_plugins
+    from posefit.registry import plugins_of
 
-    added = command_plugins(tuple(main.commands))
+    added = plugins_of("commands", tuple(main.commands))
     return {command.name or "": command for plugin in added for command in plugin.offers}
 
 

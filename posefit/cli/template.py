@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
-from posefit.registry import KINDS, Kind, command_plugins, registry
+from posefit.registry import KINDS, Kind, plugins_of, registry
 
 COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
 TAKEN = {"Frame"}  # names that a template's module has already
@@ -72,5 +72,7 @@ def _taken(kind: Kind | Literal["command"], own: Sequence[str]) -> dict[str, str
     """Return the names that a new plugin cannot have, each with the distribution that has it."""
     if kind != "command":
         return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
-    theirs = {str(one.name): plugin.distribution for plugin in command_plugins(tuple(own)) for one in plugin.offers}
+    theirs = {
+        str(one.name): plugin.distribution for plugin in plugins_of("commands", tuple(own)) for one in plugin.offers
+    }
     return dict.fromkeys(own, PROJECT) | theirs

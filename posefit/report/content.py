@@ -12,7 +12,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
 from posefit.motion.built_in import average_skeleton
 from posefit.reading import counted
-from posefit.registry import claimed_orders
+from posefit.registry import plugins_of
 from posefit.report import curves
 from posefit.report.animations import animations_of
 from posefit.report.columns import COLUMNS, SEARCH_COLUMNS
@@ -173,7 +173,7 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     title = "Targets reached, of all runs and 51 costs an instance"
     return {
         "examples": three_tracks(contest, leader),
-        "claims": published_claims(contest, claimed_orders()),
+        "claims": published_claims(contest, [claim for one in plugins_of("claims") for claim in one.offers]),
         "selection": selection_of(contest),
         "evaluations": evaluations,
         "charts": [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]

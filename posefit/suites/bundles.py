@@ -47,8 +47,7 @@ def write_bundle(runs: Sequence[SuiteRun], path: str | Path) -> str:
     """
     if len(suites := {run.suite for run in runs}) != 1:
         raise InputError(f"runs must be of one suite, got {', '.join(sorted(suites)) or 'none'}")
-    methods = {method_text(run): None for run in runs}
-    numbers = {text: k for k, text in enumerate(sorted(methods))}
+    numbers = {text: k for k, text in enumerate(sorted({method_text(run) for run in runs}))}
     order = sorted(runs, key=lambda run: (numbers[method_text(run)], *_place(run)))
     listed = []
     for k, run in enumerate(order):
