@@ -11,6 +11,7 @@ from typing import Literal
 
 from posefit.errors import InputError
 from posefit.files import new_folder
+from posefit.fitting.check import one_of
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
 from posefit.registry import KINDS, Kind, plugins_of, registry
@@ -27,8 +28,7 @@ def write_plugin(
     `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
     be a plugin's, or the folder is there already.
     """
-    if kind not in (*KINDS, COMMAND):
-        raise InputError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {quoted(kind)}")
+    one_of("kind", kind, (*KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}")
     if name in (known := _taken(kind, own)):
