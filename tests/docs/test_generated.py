@@ -10,14 +10,13 @@ import architecture
 import generator
 import pytest
 from click.testing import CliRunner
-from generator import angles, commands, equations, figures, settings
+from generator import angles, commands, equations, figures
 from generator.prose import restructured, shortened
 
 from posefit import track
 from posefit.cli import main
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
-from posefit.registry import KINDS, registry
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import DROPPED, TrackCell, run_cell
 from posefit.sweep.check import FIELDS, cell_of
@@ -71,15 +70,6 @@ def test_every_column_of_a_sweeps_csv_is_described() -> None:
         assert column in described or column.partition(".")[0] in described or column.startswith("joint_errors_mm."), (
             column
         )
-
-
-def test_every_setting_of_every_method_is_described() -> None:
-    described = rows(settings.page())
-    for kind in KINDS:
-        for offer in registry().offers[kind].values():
-            assert {
-                f"{offer.name}.{one.name}" for one in offer.settings
-            } <= described or offer.distribution != "posefit"
 
 
 def test_every_equation_has_a_line_and_a_test() -> None:
