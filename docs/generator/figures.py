@@ -69,10 +69,10 @@ RESULT = {
         "",
         "numbers of the frames in which it was looked all around again, after a gap or where costs stayed high",
     ),
-    "retracked_from": (
+    "retracked_outside": (
         "",
-        "the frame from which footage was followed again, onward and backwards, because the body turned faster than "
-        "anybody does; null where it was not",
+        "the first and last frame between which a track of footage stayed where all others were tracked again, because "
+        "the body turned faster than a person can; null where it did not",
     ),
     "backwards_share": (
         "",

@@ -126,7 +126,10 @@ class ExemplarTracker:
         intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
         slack, turning = math.sqrt(intervals), math.radians(turning_degrees)
         fastest = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
-        self.task, self.exemplars = task, exemplars_of(task.training, task.body.skeleton, mirrored)
+        # one set of states serves both directions
+        training = [motion.reversed() for motion in task.training] if task.backwards else task.training
+        self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
+        self.seconds = (-1.0 if task.backwards else 1.0) / task.fps  # from a frame to the next one
         self.steps = Steps(spread * slack, turning * slack, jump, straying, depth, pace * intervals, fastest)
         self.transitions: Transitions = partial(transition_costs, steps=self.steps)
         if transitions != "clips":
@@ -198,7 +201,7 @@ class ExemplarTracker:
         self, look: FrameCosts, before: FrameStates[Beam] | None, rng: np.random.Generator
     ) -> tuple[FrameStates[Beam], float]:
         """Return the states of a frame, and the evaluations that they took."""
-        latest, seconds, root = None if before is None else before.beam, 1.0 / self.task.fps, look.root
+        latest, seconds, root = None if before is None else before.beam, self.seconds, look.root
         if latest is not None and not look.usable:
             beam = next_states(self.exemplars, latest, seconds, self.steps, WIDTH, root)
             if root is not None:
@@ -240,7 +243,7 @@ class ExemplarTracker:
         """Return a frame, joined to the one before."""
         if before is None:
             return frame_states(beam, fits, None, None)
-        transition = Transition(self.exemplars, before.beam, beam, 1.0 / self.task.fps, look.root, look.eye)
+        transition = Transition(self.exemplars, before.beam, beam, self.seconds, look.root, look.eye)
         return frame_states(beam, fits, before, self.transitions(transition))
 
     def _elsewhere(

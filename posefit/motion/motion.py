@@ -50,6 +50,10 @@ class Motion:
             raise InputError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
         return Motion(self.name, self.skeleton, self.poses[start:stop], self.translations[start:stop], self.fps)
 
+    def reversed(self) -> "Motion":
+        """Return the motion with its last frame first."""
+        return Motion(self.name, self.skeleton, self.poses[::-1], self.translations[::-1], self.fps)
+
     def resampled(self, fps: float) -> "Motion":
         """Return the motion at another rate, over the times k / fps that lie within it.
 
