@@ -77,7 +77,7 @@ def fit_poses(
     sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
     curves, forces = np.empty((parents.size + 1, 6, 6)), np.empty((parents.size + 1, 6, 1))
     screws, matrix, slopes = np.empty((NUMBERS, 6)), np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, 1))
-    grown = np.empty((0, parents.size + 1, 3)), np.empty((0, parents.size, 2)), np.empty((0, 0)), np.empty(0)
+    grown = np.empty((0, parents.size + 1, 3)), np.empty((0, parents.size, 2)), np.zeros((1, 1))
     for n in range(poses.shape[0]):
         start = places[n].copy()
         for reach in reaches:

@@ -110,7 +110,7 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     poses = estimate_of(motion).poses
     moving = replace(motion, poses=poses)
     changes = growth(body, body.stature, moving)
-    curve, slope = np.zeros((len(NAMES), len(NAMES))), np.zeros(len(NAMES))
+    by_factors = np.zeros((1 + len(NAMES), 1 + len(NAMES)))
     bones = np.zeros((3, 27, 6, 6)), np.zeros((3, 27, 6, 1 + len(NAMES)))
     views = [
         MaskContours.of(camera, k, scene.observations, motion.translations) for k, camera in enumerate(scene.cameras)
@@ -119,7 +119,7 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
         camera = tuple(np.array(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
         borders = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
         moved = body.radii, camera, poses, motion.translations.copy()
-        kernels.add_frames(*skeleton.chain, *moved, borders, 0.09, (*changes, curve, slope), bones)
+        kernels.add_frames(*skeleton.chain, *moved, borders, 0.09, (*changes, by_factors), bones)
     matrices, slopes = np.empty((3, 69, 69)), np.empty((3, 69, 1 + len(NAMES)))
     kernels.add_all_bones(*skeleton.chain, poses, motion.translations.copy(), *bones, matrices, slopes)
     expected = np.zeros((3, 69 + len(NAMES), 69 + len(NAMES))), np.zeros((3, 69 + len(NAMES)))
@@ -138,10 +138,10 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
         matrices[:, free][:, :, free], expected[0][:, :69, :69][:, free][:, :, free], atol=1e-3 * scale
     )
     np.testing.assert_allclose(slopes[:, free, 1:], expected[0][:, :69, 69:][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(curve, expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(by_factors[1:, 1:], expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
     scale = np.abs(expected[1]).max()
     np.testing.assert_allclose(slopes[:, free, 0], expected[1][:, :69][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(slope, expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(by_factors[1:, 0], expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
 
 
 def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:

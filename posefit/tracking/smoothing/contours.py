@@ -201,15 +201,16 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     grown = np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2))
     if factors:
         grown = growth(part.body, part.height, part.fitted)
-    curve, slope = np.zeros((factors, factors)), np.zeros(factors)
+    by_factors = np.zeros((1 + factors, 1 + factors))
     bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
     for view in borders:
         camera = tuple(writeable(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
         contours = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
         moved = part.body.radii, camera, writeable(poses), writeable(places)
-        kernels.add_frames(*skeleton.chain, *moved, contours, scale, (*grown, curve, slope), bones)
+        kernels.add_frames(*skeleton.chain, *moved, contours, scale, (*grown, by_factors), bones)
     sums = np.empty((count, kernels.NUMBERS, kernels.NUMBERS)), np.empty((count, kernels.NUMBERS, 1 + factors))
     kernels.add_all_bones(*skeleton.chain, writeable(poses), writeable(places), *bones, *sums)
+    slope, curve = by_factors[1:, 0], by_factors[1:, 1:]
     free = [0, 1, 2, *(3 + angle for angle in angles)]
     curves, slopes, mixed = sums[0][:, free][:, :, free], sums[1][:, free, 0], sums[1][:, free, 1:]
     fitted, estimate, turns, spread = part.fitted, part.estimate, np.zeros(factors), part.spread

@@ -196,14 +196,14 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forc
     The first force is half the gradient, the others are half the second derivatives by a twist and F factors of the
     build. `frames` (27, 4, 3) are of the joints. `contour` is the field, its corner and size, the points (n, 2) and how
     many pixels each stands for; a distance counts less beyond `reach` metres. `grown` is how joints (F, 27, 3) and
-    radii (F, 26, 2) change with factors, and the derivatives by these, (F, F) and (F,), that are added to.
+    radii (F, 26, 2) change with factors, and a matrix (1 + F, 1 + F) to whose first column the gradient by these is
+    added, and to the rest the second derivatives.
     """
     rotation, translation, focal, centre = camera
     field, corner, size, points, step = contour
-    wider, larger, growth, pull_of_growth = grown
-    bones, factors = parents.size, len(wider)
+    bones = parents.size
     centres, depth, wide = np.empty((bones + 1, 2)), np.empty(bones + 1), np.empty((bones, 2))
-    ways = np.empty((bones + 1, 3, 3))  # of each joint: how its pixel and its size change with its place
+    moves = np.empty((bones + 1, 3, 3))  # of each joint: how its pixel and its size change with its place
     for j in range(bones + 1):
         x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
         a = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
@@ -212,9 +212,9 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forc
         centres[j, 0], centres[j, 1] = a / c * focal[0] + centre[0], b / c * focal[1] + centre[1]
         depth[j] = math.sqrt(focal[0] * focal[1]) / c
         for i in range(3):
-            ways[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
-            ways[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
-            ways[j, 2, i] = -depth[j] / c * rotation[2, i]
+            moves[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
+            moves[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
+            moves[j, 2, i] = -depth[j] / c * rotation[2, i]
     metres = depth[0]  # pixels of one, where the root is
     for b in range(bones):
         wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
@@ -224,8 +224,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forc
     )
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
-    rows, changes = np.empty((6, 6)), np.empty((6, factors))  # of a bone's six numbers, with twists and factors
-    turned, changed = np.empty((6, 6)), np.empty((6, factors))
+    rows, turned = np.empty((6, 6)), np.empty((6, 6))
     for b in range(bones):
         p = parents[b]
         for k in range(6):  # how each of the six numbers changes with a twist: velocity, then rotation
@@ -233,33 +232,54 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forc
             size = radii[b, 0] if k == 4 else radii[b, 1]
             which = k % 2 if k < 4 else 2
             factor = 1.0 if k < 4 else size
-            mx, my, mz = factor * ways[j, which, 0], factor * ways[j, which, 1], factor * ways[j, which, 2]
+            mx, my, mz = factor * moves[j, which, 0], factor * moves[j, which, 1], factor * moves[j, which, 2]
             x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
             rows[k, 0], rows[k, 1], rows[k, 2] = mx, my, mz
             rows[k, 3], rows[k, 4], rows[k, 5] = y * mz - z * my, z * mx - x * mz, x * my - y * mx
-            for f in range(factors):
-                changes[k, f] = mx * wider[f, j, 0] + my * wider[f, j, 1] + mz * wider[f, j, 2]
-                if k > 3:
-                    changes[k, f] += depth[j] * larger[f, b, k - 4]
-        turned[:], changed[:] = 0.0, 0.0
-        _add_product(blocks[b], rows, 1.0, turned)
-        _add_product(blocks[b], changes, 1.0, changed)
-        _add_product(rows.T, turned, worth, curves[b + 1])
-        _add_product(rows.T, slopes[b].reshape(6, 1), worth, forces[b + 1, :, :1])
-        _add_product(rows.T, changed, worth, forces[b + 1, :, 1:])
-        _add_product(changes.T, changed, worth, growth)
-        _add_product(changes.T, slopes[b].reshape(6, 1), worth, pull_of_growth.reshape(factors, 1))
+        for i in range(6):
+            for j in range(6):
+                total = 0.0
+                for k in range(6):
+                    total += blocks[b, i, k] * rows[k, j]
+                turned[i, j] = total
+        for i in range(6):
+            total = 0.0
+            for k in range(6):
+                total += rows[k, i] * slopes[b, k]
+            forces[b + 1, i, 0] += worth * total
+            for j in range(6):
+                total = 0.0
+                for k in range(6):
+                    total += rows[k, i] * turned[k, j]
+                curves[b + 1, i, j] += worth * total
+        if len(grown[0]):
+            _add_growth(b, p, rows, depth, blocks[b], slopes[b], worth, grown, forces[b + 1])
 
 
 @jit
-def _add_product(left, right, weight, out):
-    """Add `weight` times the product of two matrices, (m, k) and (k, n), to one (m, n)."""
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            total = 0.0
-            for k in range(left.shape[1]):
-                total += left[i, k] * right[k, j]
-            out[i, j] += weight * total
+def _add_growth(b, p, rows, depth, block, slope, worth, grown, forces):
+    """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
+    wider, larger, growth = grown
+    factors = len(wider)
+    changes, changed = np.zeros((6, 1 + factors)), np.zeros((6, 1 + factors))
+    for k in range(6):
+        j = p if k in (0, 1, 4) else b + 1
+        for f in range(factors):
+            for i in range(3):
+                changes[k, 1 + f] += rows[k, i] * wider[f, j, i]
+            if k > 3:
+                changes[k, 1 + f] += depth[j] * larger[f, b, k - 4]
+    for k in range(6):
+        changed[k, 0] = worth * slope[k]
+        for i in range(6):
+            for f in range(factors):
+                changed[k, 1 + f] += worth * block[k, i] * changes[i, 1 + f]
+    for k in range(6):
+        for f in range(1 + factors):
+            for g in range(1 + factors):
+                growth[f, g] += changes[k, f] * changed[k, g]
+            for i in range(6 if f else 0):
+                forces[i, f] += rows[k, i] * changed[k, f]
 
 
 @jit
@@ -305,8 +325,12 @@ def add_bones(chain, screws, curves, forces, matrix, slopes):
     """
     parents = chain.parents
     for b in range(parents.size - 1, -1, -1):
-        curves[parents[b]] += curves[b + 1]
-        forces[parents[b]] += forces[b + 1]
+        p = parents[b]
+        for i in range(6):
+            for j in range(6):
+                curves[p, i, j] += curves[b + 1, i, j]
+            for f in range(slopes.shape[1]):
+                forces[p, i, f] += forces[b + 1, i, f]
     matrix[:], slopes[:] = 0.0, 0.0
     force = np.empty(6)
     for joint in range(parents.size + 1):
@@ -351,15 +375,14 @@ def add_frames(parents, angles, turns, turned, offsets, radii, camera, poses, pl
     """
     chain = Chain(parents, angles, turns, turned, offsets)
     fields, corners, sizes, points, starts, step = contours
-    wider, larger, growth, pull_of_growth = grown
+    wider, larger, growth = grown
     curves, forces = out
     frames, sines, cosines = np.empty((parents.size + 1, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
     for k in range(len(poses)):
         if starts[k] < starts[k + 1]:
             place_frames(chain, poses[k], places[k], sines, cosines, frames)
             contour = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step
-            more = wider[k], larger, growth, pull_of_growth
-            add_view(parents, radii, camera, frames, contour, reach, more, curves[k], forces[k])
+            add_view(parents, radii, camera, frames, contour, reach, (wider[k], larger, growth), curves[k], forces[k])
 
 
 @jit
