@@ -246,7 +246,6 @@ def _exists(target: str | Path) -> InputError:
 
 
 def _beside(target: Path) -> Path:
-    """Return a random name in the target's folder."""
     return target.with_name(f".{target.name}.{secrets.token_hex(8)}{target.suffix}")
 
 

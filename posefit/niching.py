@@ -37,7 +37,7 @@ from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, LIMBS, angle_index
+from posefit.geometry.skeleton import ANGLES, LIMBS, turns_of
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.motion import built_in, recorded
 from posefit.silhouette.cost import project
@@ -50,10 +50,7 @@ STRIDES = ("02_01", "05_01", "49_01", "16_16", "29_01", "09_12", "16_13", "16_22
 COMPONENTS = (3, 2)  # ours: of legs and trunk, and of the arms; with more, unlisted poses fit as well
 SPARSE = 4  # every fourth library pose lends its arms: neighbours are nearly the same
 
-_ARMS = np.zeros(ANGLES, dtype=bool)
-for _joint in INNER:
-    if JOINTS[_joint] in (*LIMBS["left arm"], *LIMBS["right arm"]):
-        _ARMS[angle_index(_joint) : angle_index(_joint) + 3] = True
+_ARMS = np.isin(np.arange(ANGLES), turns_of((*LIMBS["left arm"], *LIMBS["right arm"])))
 ARMS = np.flatnonzero(_ARMS)  # angles of a pose (66,) that belong to its arms
 
 

@@ -38,16 +38,16 @@ class Progress:
 QUIET = Progress()
 
 
-def _show_warning(message: str) -> None:
-    if message.startswith(WARNING) and sys.stderr is not None:
-        print(printable(message), file=sys.stderr)
-
-
 def interactive() -> Progress:
     """Return messages and bars on stderr where that is a terminal, bars in a notebook; elsewhere warnings alone."""
     terminal = sys.stderr is not None and sys.stderr.isatty()
     if not terminal and "ipykernel" not in sys.modules:
-        return Progress(_show_warning)
+
+        def show_warning(message: str) -> None:
+            if message.startswith(WARNING) and sys.stderr is not None:
+                print(printable(message), file=sys.stderr)
+
+        return Progress(show_warning)
     from tqdm.auto import tqdm
 
     def log(message: str) -> None:

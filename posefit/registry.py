@@ -30,8 +30,6 @@ from posefit.settings import Setting, settings_of
 from posefit.version import posefit_build, source_digest
 
 if TYPE_CHECKING:
-    import click
-
     from posefit.fitting.optimiser import NextFrame, OptimiserFactory
     from posefit.fitting.prior import PriorFactory
 
@@ -159,24 +157,18 @@ def registry() -> Registry:
     """Return the methods of all installed plugins; they are loaded once a process."""
     import numpy  # noqa: F401  # before a plugin that may change it
 
-    return Registry(load("methods", _installed("methods")))
+    return Registry(plugins_of("methods"))
 
 
-@lru_cache(maxsize=1)
-def command_plugins(taken: tuple[str, ...] = ()) -> "tuple[Plugin[click.Command], ...]":
-    """Return all installed plugins with commands; `taken` are the names of posefit's own commands."""
-    return load("commands", _installed("commands"), taken=taken)
+@lru_cache
+def plugins_of(what: Registered, taken: tuple[str, ...] = ()) -> tuple[Plugin[Any], ...]:
+    """Return all installed plugins that register `what`; `taken` are the names of posefit's own commands.
 
-
-@lru_cache(maxsize=1)
-def claim_plugins() -> tuple[Plugin[ClaimedOrder], ...]:
-    """Return all installed plugins with claims of publications."""
-    return load("claims", _installed("claims"))
-
-
-def claimed_orders() -> tuple[ClaimedOrder, ...]:
-    """Return the claims of publications that all installed plugins register."""
-    return tuple(claim for plugin in claim_plugins() for claim in plugin.offers)
+    An entry point whose name ends in nothing else is of methods.
+    """
+    points = entry_points(group=PROJECT)
+    mine = [p for p in points if what == next((one for one in APART if p.name.endswith(f"-{one}")), "methods")]
+    return load(what, mine, taken=taken)
 
 
 def version_of(origins: Iterable[str]) -> str:
@@ -299,12 +291,6 @@ def _unpatched() -> Iterator[None]:
         sys.setrecursionlimit(limit)
     if changed:
         raise InputError(f"to load it must leave NumPy and Python as they are, got {cut(', '.join(changed))}")
-
-
-def _installed(what: Registered) -> list[EntryPoint]:
-    """Return the installed entry points that register `what`: methods, where their names end in nothing else."""
-    points = entry_points(group=PROJECT)
-    return [p for p in points if what == next((one for one in APART if p.name.endswith(f"-{one}")), "methods")]
 
 
 def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:

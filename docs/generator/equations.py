@@ -50,11 +50,10 @@ def page() -> str:
     ordered = sorted(tags(), key=lambda tag: _key(tag.step))
     parts = []
     for source, title in SOURCES.items():
-        lines = [f"## {source}", f"{title}.", "| tag | the line that carries it | where | tests |\n|---|---|---|---|"]
+        lines = [f"## {source}", f"{title}.", "| tag | where | tests |\n|---|---|---|"]
         for tag in (tag for tag in ordered if tag.source == source):
-            code = f"`{tag.code}`".replace("|", "\\|")
             named = "<br>".join(f"`{name}`" for name in tests_of(tag))
-            lines[-1] += f"\n| `{source} {tag.step}` | {code} | `{tag.path}` | {named} |"
+            lines[-1] += f"\n| `{source} {tag.step}` | `{tag.path}` | {named} |"
         parts += lines
     return "\n\n".join(parts) + "\n"
 

@@ -54,8 +54,9 @@ ROW = {
     "dimensions": ("", "coordinates of a proposal; none of a tracker that searches no box"),
     "seconds": ("s", "wall time of the whole cell"),
     "warnings": ("", "what to look at before the result is trusted"),
+    "joint_errors_mm.JOINT": ("mm", "mean distance of one joint from the true one, both roots at one point"),
 }
-SPENT = ("evaluations_used", "dimensions", "seconds", "warnings")
+SPENT = ("evaluations_used", "dimensions", "seconds", "warnings", "joint_errors_mm.JOINT")
 RESULT = {
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
     "none_of_modes": (
@@ -68,10 +69,10 @@ RESULT = {
         "",
         "numbers of the frames in which it was looked all around again, after a gap or where costs stayed high",
     ),
-    "retracked_from": (
+    "retracked_outside": (
         "",
-        "the frame from which footage was followed again, onward and backwards, because the body turned faster than "
-        "anybody does; null where it was not",
+        "the first and last frame between which a track of footage stayed where all others were tracked again, because "
+        "the body turned faster than a person can; null where it did not",
     ),
     "backwards_share": (
         "",
@@ -79,25 +80,6 @@ RESULT = {
     ),
     "trust": ("", "of footage, whether the track [can be trusted](../howto/trust.md), and why"),
     "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
-}
-CELL = {
-    "method": ("", "OPTIMISER@PRIOR, or a tracker"),
-    "motion": ("", "a built-in motion, or a capture file"),
-    "train": ("", "motions that the prior learned from"),
-    "settings": ("", "settings as `--set` takes them"),
-    "view_degrees": ("degrees", "where the cameras stand: 0 in front of the person, 90 to the side"),
-    "corruption": ("", "kinds of damage to the silhouettes, with their strength from 0 to 1"),
-    "instance": ("", "number of the variation of the motion; 0 is the motion as it is"),
-    "frames": ("frames", "length of the sequence"),
-    "fps": ("1/s", "frames a second"),
-    "size": ("pixels", "width and height of the masks"),
-    "evaluations": ("", "budget of a frame, in each track"),
-    "translation": ("", "the root's position: known, searched or aligned"),
-    "first_pose": ("", "the first pose: searched, or given"),
-    "hypotheses": ("", "of how many tracks from different beginnings one was chosen"),
-    "yaw_off_degrees": ("degrees", "by how much the first known yaw is off at most; 180 for an unknown one"),
-    "body_off_percent": ("%", "by how much the known bones and radii are off at most"),
-    "seed": ("", "the seed of the method"),
 }
 HEAD = "| {0} | unit | meaning |\n|---|---|---|"
 
@@ -126,25 +108,13 @@ def page() -> str:
         "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
-        "What the cell is:",
-        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")} | CELL)),
-        "What it measured:",
-        _table(
-            "column",
-            [*_measured(_of_rows()), *_described({name: ROW[name] for name in SPENT})],
-        ),
-        _table(
-            "column",
-            [("joint_errors_mm.JOINT", "mm", "mean distance of one joint from the true one, both roots at one point")],
-        ),
+        "What the cell is: the fields [of a plan](../howto/plan.md#the-fields-of-a-cell), and",
+        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")})),
+        "What it measured: the figures of [`summary.json`](#keys-of-summary-json), `evaluations_per_second` aside, and",
+        _table("column", _described({name: ROW[name] for name in SPENT})),
         "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
     ]
     return "\n\n".join(parts) + "\n"
-
-
-def _of_rows() -> list[Measure]:
-    """Return the figures of a track that a row of a sweep has under the same name."""
-    return [one for one in MEASURES.values() if one.name not in ("evaluations", "evaluations_per_second")]
 
 
 def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:

@@ -1,6 +1,6 @@
 """The table of the joints: their names, where on a person they are, and where a pose holds their angles."""
 
-from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, angle_index
+from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, angle_index, kind, side
 from posefit.measuring.centres import PLACES
 
 WHERE = {
@@ -31,10 +31,9 @@ def page() -> str:
         "|---:|---|---|---|---|---|",
     ]
     for number, name in enumerate(JOINTS):
-        side = "" if name in WHERE else {"l": "left ", "r": "right "}[name[0]]
-        place = WHERE[name if name in WHERE else name[1:]]
+        place = WHERE[kind(name)] if side(name) == "middle" else f"{side(name)} {WHERE[kind(name)]}"
         begins = "" if number == 0 else f"`{JOINTS[PARENTS[number]]}`"
-        lines.append(f"| {number} | `{name}` | {side}{place} | `{PLACES[number]}` | {begins} | {_angles(number)} |")
+        lines.append(f"| {number} | `{name}` | {place} | `{PLACES[number]}` | {begins} | {_angles(number)} |")
     return "\n".join(lines) + "\n"
 
 

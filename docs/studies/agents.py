@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
+from itertools import product
 from typing import Any, NamedTuple
 
 import click
@@ -38,7 +39,7 @@ from table import WORKERS, earlier, kept, markdown
 
 HELD_OUT = 10_000  # the first instance of the test split
 INSTANCES, SEEDS, STEPS = 40, 5, 20_000
-QUICK_INSTANCES, QUICK_STEPS = 4, 300
+QUICK_INSTANCES, QUICK_SEEDS, QUICK_STEPS = 4, 2, 300
 CURVE = 5  # looks at an agent while it learns
 CURVE_INSTANCES = 16  # that each look takes, the first of those held out
 STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method and budget of the best known costs
@@ -53,7 +54,6 @@ class Contested:
     evaluations: int
     length: int  # steps of an episode
     references: tuple[str, ...]  # not trained
-    learners: tuple[str, ...]
 
 
 CONFIGURE = Contested(
@@ -61,16 +61,15 @@ CONFIGURE = Contested(
     POPULATION_SIZE * (ITERATIONS + 1),
     ITERATIONS // EVERY,
     ("random search", "random actions", "middle", "sapso"),
-    ("bandit", "cma over constants", "ppo", "sac"),
 )
 FIT = Contested(
     "posefit/FitState-v0",
     MAX_EVALUATIONS,
     MAX_EVALUATIONS - 1,
     ("random search", "random actions", "gaussian", "sapso", "cma"),
-    ("bandit", "cma over constants", "ppo", "sac"),
 )
 TASKS = {"configure": CONFIGURE, "fit": FIT}
+LEARNERS = ("bandit", "cma over constants", "ppo", "sac")
 
 
 class Training(NamedTuple):
@@ -81,21 +80,6 @@ class Training(NamedTuple):
     seed: int
     steps: int
     instances: int
-
-
-def agent_turns(
-    tasks: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int
-) -> list[Training]:
-    """Return the rows of the chosen agents of each task."""
-    turns = []
-    for name in tasks:
-        task = TASKS[name]
-        for seed in range(seeds):
-            for agent in (*task.references, *task.learners):
-                if not agents or agent in agents or agent == "random search":
-                    trained = steps if agent in task.learners else UNTRAINED
-                    turns.append(Training(name, agent, seed, trained, instances))
-    return turns
 
 
 WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
@@ -192,9 +176,9 @@ DISCOUNT = 0.99  # their default, stated
 ROLLOUT = 2048  # steps that PPO takes before it learns of them; its default, stated
 
 
-def check_learners(agents: set[str]) -> None:
-    """Return nothing. Raises ImportError where agents need Stable-Baselines3 and it is not there."""
-    if agents & {"ppo", "sac"} and find_spec("stable_baselines3") is None:
+def check_learners() -> None:
+    """Return nothing. Raises ImportError where Stable-Baselines3, which PPO and SAC need, is not there."""
+    if find_spec("stable_baselines3") is None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
@@ -232,32 +216,18 @@ BEST = "best known"
 SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
 
 
-def agents(
-    environments: tuple[str, ...],
-    names: tuple[str, ...],
-    seeds: int,
-    steps: int,
-    instances: int,
-    quick: bool,
-    rows: str | None,
-    workers: int | None,
-) -> dict[str, Any]:
-    """Return the table of agents: normalised scores on held-out instances, with intervals, and learning curves.
-
-    `rows` is a file for a row a line as they come; rows in it already are not measured again. Raises ValueError where
-    an agent or environment is unknown.
-    """
-    chosen = tuple(dict.fromkeys(environments)) or tuple(TASKS)
-    if quick:
-        seeds, steps, instances = min(seeds, 2), QUICK_STEPS, QUICK_INSTANCES
-    turns = agent_turns(chosen, names, seeds, steps, instances)
-    check_learners({turn.agent for turn in turns})
-    turns += [Training(name, BEST, 0, 0, instances) for name in chosen]
+def agents(instances: int, quick: bool, rows: str | None, workers: int | None) -> list[dict[str, Any]]:
+    """Return the rows of all agents; those in the file `rows` are not measured again, and others are added to it."""
+    check_learners()
+    seeds, steps, instances = (QUICK_SEEDS, QUICK_STEPS, QUICK_INSTANCES) if quick else (SEEDS, STEPS, instances)
+    turns = [Training(name, BEST, 0, UNTRAINED, instances) for name in TASKS]
+    for name, seed in product(TASKS, range(seeds)):
+        turns += [Training(name, agent, seed, UNTRAINED, instances) for agent in TASKS[name].references]
+        turns += [Training(name, agent, seed, steps, instances) for agent in LEARNERS]
     done = earlier(rows, turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
     done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    results = [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
-    return {"seeds": seeds, "steps": steps, "instances": instances, "rows": results} | agent_tables(results)
+    return [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
 
 
 def agent_row(turn: Training) -> dict[str, Any]:
@@ -351,21 +321,14 @@ RESAMPLES, LEVEL, RNG_STREAM = 2000, 0.95, 67
 MIN_GAP = 0.1  # of a cost between random search and the best known: instances without it are left out
 
 
-def agent_tables(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return for each environment its agents' scores: 0 is random search on the instance, 1 the best known cost.
+def agent_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return the scores of an environment's agents: 0 is random search on the instance, 1 the best known cost.
 
     The best known is the lowest cost in any row. A score is the mean over seeds and instances; its interval is a
     bootstrap of both. `steps` are those of training, `taken` of a row.
     """
-    return {"tables": {task: _table([row for row in rows if row["task"] == task]) for task in _tasks(rows)}}
-
-
-def _tasks(rows: Sequence[Row]) -> list[str]:
-    return [task for task in TASKS if any(row["task"] == task for row in rows)]
-
-
-def _table(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    costs = {name: np.array([row["costs"] for row in rows if row["agent"] == name]) for name in _agents(rows)}
+    names = dict.fromkeys(row["agent"] for row in rows)
+    costs = {name: np.array([row["costs"] for row in rows if row["agent"] == name]) for name in names}
     chance = costs["random search"].mean(axis=0)
     best = np.concatenate(list(costs.values())).min(axis=0)
     table = []
@@ -388,10 +351,6 @@ def _table(rows: Sequence[Row]) -> list[dict[str, Any]]:
             }
         )
     return sorted(table, key=lambda row: row["score"])
-
-
-def _agents(rows: Sequence[Row]) -> list[str]:
-    return list(dict.fromkeys(row["agent"] for row in rows))
 
 
 def normalised(costs: Array, chance: Array, best: Array) -> Array:
@@ -429,10 +388,11 @@ def _curve(curves: Sequence[Any], chance: Array, best: Array) -> list[dict[str, 
     return points
 
 
-def agents_lines(results: Mapping[str, Any]) -> Iterator[str]:
+def agents_lines(rows: Sequence[Row]) -> Iterator[str]:
     """Yield the printed tables."""
-    for task, table in results["tables"].items():
-        yield f"{TASKS[task].name}, {TASKS[task].evaluations} evaluations, {results['instances']} held-out instances"
+    for name, task in TASKS.items():
+        table = agent_table([row for row in rows if row["task"] == name])
+        yield f"{task.name}, {task.evaluations} evaluations, {rows[0]['instances']} held-out instances"
         yield ""
         lines = []
         for row in table:
@@ -454,25 +414,12 @@ def agents_lines(results: Mapping[str, Any]) -> Iterator[str]:
 
 
 @click.command(help=__doc__)
-@click.option("--environment", "environments", multiple=True, type=click.Choice([*TASKS]), help="By default all.")
-@click.option("--agent", "names", multiple=True, help="One alone, such as ppo, beside random search. Again for more.")
-@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each agent.")
-@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
 @click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
 @click.option("--quick", is_flag=True, help="Two trainings of 300 steps, four instances: a look, not a measurement.")
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
 @WORKERS
-def main(
-    environments: tuple[str, ...],
-    names: tuple[str, ...],
-    seeds: int,
-    steps: int,
-    instances: int,
-    quick: bool,
-    rows: str | None,
-    workers: int | None,
-) -> None:
-    for line in agents_lines(agents(environments, names, seeds, steps, instances, quick, rows, workers)):
+def main(instances: int, quick: bool, rows: str | None, workers: int | None) -> None:
+    for line in agents_lines(agents(instances, quick, rows, workers)):
         click.echo(line)
 
 

@@ -96,10 +96,10 @@ def lines_of(groups: Mapping[str, Sequence[Row]]) -> Iterator[str]:
     yield from markdown(["", "tracks", *heads, "swapped %"], table)
 
 
-def walk_lines(quick: bool, workers: int | None) -> Iterator[str]:
+def walk_lines(workers: int | None) -> Iterator[str]:
     """Yield the table of recorded walks by view."""
     jobs = {}
-    for clip, views in product(GROUPS[WALKS][: 2 if quick else None], (*SIDES, *PAIRS, FOUR)):
+    for clip, views in product(GROUPS[WALKS], (*SIDES, *PAIRS, FOUR)):
         cell = cell_of(cell_fields(clip, views, clip.frames))
         jobs[clip.name, clip.instance, views] = partial(walk_row, cell, clip, views)
     groups: dict[str, list[Row]] = {}
@@ -109,10 +109,9 @@ def walk_lines(quick: bool, workers: int | None) -> Iterator[str]:
 
 
 @click.command(help=__doc__)
-@click.option("--quick", is_flag=True, help="A few tracks: a look, not a measurement.")
 @WORKERS
-def main(quick: bool, workers: int | None) -> None:
-    for line in walk_lines(quick, workers):
+def main(workers: int | None) -> None:
+    for line in walk_lines(workers):
         click.echo(line)
 
 

@@ -8,13 +8,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import click
 import numpy as np
 
-from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.fitting.space import Translation
 from posefit.fitting.tracker import Task
 from posefit.footage.scene import rendered, synthetic
@@ -24,12 +22,12 @@ from posefit.motion import built_in
 from posefit.tracking.initialise import BODY_FRAMES, fitted_build
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_reproduce.jobs import Progress, each
+from posefit_reproduce.jobs import each
 from table import WORKERS, bar
 
 MOTION, SIZE = "walk-b", (320, 240)
 PERCENT = 10.0
-SUBJECTS = 8
+SUBJECTS = 8  # people, each of another build
 
 
 class Setup(NamedTuple):
@@ -65,32 +63,22 @@ def subject(seed: int) -> Body:
     return body.scaled(scale, scale)
 
 
-def builds(motion: str, subjects: int, workers: int | None, progress: Progress | None = None) -> dict[str, Any]:
-    """Return by how many percent stature and limbs are off, before and after the fit, for every setup."""
-    if subjects < 1:
-        raise InputError(f"subjects must be at least 1, got {subjects}")
-    if motion not in built_in.names():
-        raise InputError(f"motion must be one of {', '.join(built_in.names())}, got {motion}")
-    keys = list(product(SETUPS, range(subjects)))
-    found = each({(one.label, k): partial(_found, motion, one, k) for one, k in keys}, workers, progress)
-    told: dict[str, Any] = {}
+def builds_lines(workers: int | None) -> Iterator[str]:
+    """Yield by how many percent stature and limbs are off, after the fit and before it, for every setup."""
+    keys = list(product(SETUPS, range(SUBJECTS)))
+    found = each({(one.label, k): partial(_found, one, k) for one, k in keys}, workers, bar)
     for one in SETUPS:
-        pairs = np.array([found[one.label, k] for k in range(subjects)])  # (subjects, 2, parts)
-        told[one.label] = {label: _told(pairs[:, k]) for k, label in enumerate(("fitted", "average"))}
-    return {"motion": motion, "subjects": subjects, "percent_off": told}
+        pairs = np.array([found[one.label, k] for k in range(SUBJECTS)])  # (subjects, 2, parts)
+        for k, label in enumerate(("fitted", "average")):
+            parts = zip(PARTS, pairs[:, k].mean(axis=0), pairs[:, k].max(axis=0), strict=True)
+            figures = [f"{part} {mean:.1f} (at most {most:.1f})" for part, mean, most in parts]
+            yield f"{one.label:22} {label:8} % off: {', '.join(figures)}"
 
 
-def _told(off: Array) -> dict[str, dict[str, float]]:
-    return {
-        part: {"mean": float(mean), "most": float(most)}
-        for part, mean, most in zip(PARTS, off.mean(axis=0), off.max(axis=0), strict=True)
-    }
-
-
-def _found(motion: str, setup: Setup, seed: int) -> tuple[list[float], list[float]]:
+def _found(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
     options, average, true = TrackOptions(method="@loose"), Body.of(built_in.average_skeleton()), subject(seed)
-    walk = replace(built_in.motion(motion), skeleton=true.skeleton)
+    walk = replace(built_in.motion(MOTION), skeleton=true.skeleton)
     scene = synthetic(walk, setup.views_degrees, SIZE, [], (None, None))
     scene = replace(scene, body=true, observations=rendered(walk, true, scene.cameras))
     height = true.stature if setup.stature else None
@@ -108,19 +96,10 @@ def _off(body: Body, true: Body) -> list[float]:
     return [100.0 * abs(length / other - 1.0) for length, other in zip(lengths, others, strict=True)]
 
 
-def builds_lines(told: dict[str, Any]) -> Iterator[str]:
-    """Yield the table as it is printed."""
-    for setup, rows in told["percent_off"].items():
-        for label, parts in rows.items():
-            figures = [f"{part} {one['mean']:.1f} (at most {one['most']:.1f})" for part, one in parts.items()]
-            yield f"{setup:22} {label:8} % off: {', '.join(figures)}"
-
-
 @click.command(help=__doc__)
-@click.option("--subjects", type=click.IntRange(1), default=8, show_default=True, help="People, each of another build.")
 @WORKERS
-def main(subjects: int, workers: int | None) -> None:
-    for line in builds_lines(builds(MOTION, subjects, workers, bar)):
+def main(workers: int | None) -> None:
+    for line in builds_lines(workers):
         click.echo(line)
 
 

@@ -113,7 +113,6 @@ ALL_CHANGES = {name: value for name, value in CHANGES["all of these"].items() if
 CONDITIONS: Mapping[str, Mapping[str, Any]] = {CLEAN: {}, **CHANGES, MASKS: ALL_CHANGES}
 VIEWS: tuple[Views, ...] = (*SIDES, *PAIRS)
 FRAMES = 48  # of a clip at most
-QUICK_CLIPS = 2  # of a group, in a quick look, which are two people's
 ON_THE_SPOT: dict[str, tuple[Clip, ...]] = {
     "gestures": (
         Clip("29_05", FRAMES, 1, "moves their arms"),
@@ -152,14 +151,14 @@ class Case(NamedTuple):
         return cell_fields(self.clip, self.views, FRAMES, **CONDITIONS[self.condition])
 
 
-def cases(quick: bool) -> list[Case]:
+def cases() -> list[Case]:
     """Return the tracks, those of one person together, since they share a library."""
-    clips = [(group, clip) for group, some in EVERY.items() for clip in some[: QUICK_CLIPS if quick else None]]
+    clips = [(group, clip) for group, some in EVERY.items() for clip in some]
     conditions, tracks = [name for name in CONDITIONS if name != MASKS], []
     for k, (group, clip) in enumerate(clips):
         tracks.append(Case(group, clip, VIEWS[k % len(VIEWS)], conditions[(3 * k + k // len(VIEWS)) % len(conditions)]))
         tracks.append(Case(group, clip, VIEWS[(k + 2) % len(VIEWS)], MASKS))
-        if group in COMMON and not quick:
+        if group in COMMON:
             tracks.append(Case(group, clip, SIDES[(k + 4) % len(SIDES)], MASKS))
             tracks.append(Case(group, clip, FOUR, MASKS))
     return sorted(set(tracks), key=lambda track: (track.clip.subject, track))
@@ -278,7 +277,6 @@ MAX_BYTES = 200_000_000  # of a file of rows
 
 
 def lost(
-    quick: bool,
     store: str | None,
     workers: int | None,
     rows: str | None,
@@ -290,15 +288,13 @@ def lost(
     `out` is a new file for a row a track, and `rows` such a file, from which the models are fitted without tracking
     again. `store` is a new file for the models fitted to all rows, for `exemplars` to read.
     """
-    if store and quick:
-        raise InputError("store must be given for all tracks, got --store with --quick")
     if rows is not None and out is not None:
         raise InputError("out must be given for new tracks, got --out with --rows")
     with new_file(out) if out else nullcontext() as file, new_file(store) if store else nullcontext() as stored:
         tracks = (
             [parsed_json(line) for line in read_text(rows, MAX_BYTES).splitlines()]
             if rows is not None
-            else _rows(cases(quick), workers, progress)
+            else _rows(cases(), workers, progress)
         )
         if file is not None:
             file.write_text("".join(f"{json.dumps(row)}\n" for row in tracks), encoding="utf-8")
@@ -466,7 +462,6 @@ def _number(value: float | None) -> str:
 
 
 @click.command(help=__doc__)
-@click.option("--quick", is_flag=True, help="Two clips of each group: a look, not a measurement.")
 @click.option("--store", metavar="FILE.json", help="New file for the fitted models, for exemplars to read.")
 @click.option("--rows", metavar="FILE", help="Fit to rows of --out, without tracking.")
 @click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")

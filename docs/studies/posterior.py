@@ -36,7 +36,7 @@ from posefit_reproduce.jobs import Progress, each
 from scores import auroc, calibration_error, conformal_factor
 from table import WORKERS, bar, markdown
 
-FRAMES, QUICK_FRAMES = 50, 12
+FRAMES = 50
 TEMPERATURE = 8.0  # of the posterior
 OTHERS: Mapping[str, Mapping[str, Any]] = {
     "annealed@pca": {"tracker.modes": 1},  # its own particles
@@ -98,21 +98,18 @@ def pieces() -> list[tuple[str, Clip]]:
     return sorted(chosen, key=lambda pair: pair[1].subject)  # a person's library is made once
 
 
-def planned_tracks(quick: bool) -> tuple[list[Case], list[Case]]:
+def planned_tracks() -> tuple[list[Case], list[Case]]:
     """Return the tracks of the method, and those of methods that only search."""
     base: list[Case] = []
     others: list[Case] = []
     for k, (group, clip) in enumerate(pieces()):
-        sides = [SIDES[(2 * k + turn) % len(SIDES)] for turn in ((0,) if quick else (0, 1, 3))]
-        frames = QUICK_FRAMES if quick else FRAMES
-        tracks = [Case(group, clip, side, "known", frames) for side in sides]
-        if not quick:
-            last = (PAIRS[k // 2 % len(PAIRS)], "known") if k % 2 else (sides[0], "aligned")
-            tracks.append(Case(group, clip, *last, frames))
-            tracks.append(Case(group, clip, PAIRS[k // 2 % 2] if k % 2 else sides[1], "aligned", frames, hard=True))
+        sides = [SIDES[(2 * k + turn) % len(SIDES)] for turn in (0, 1, 3)]
+        tracks = [Case(group, clip, side, "known", FRAMES) for side in sides]
+        last = (PAIRS[k // 2 % len(PAIRS)], "known") if k % 2 else (sides[0], "aligned")
+        tracks.append(Case(group, clip, *last, FRAMES))
+        tracks.append(Case(group, clip, PAIRS[k // 2 % 2] if k % 2 else sides[1], "aligned", FRAMES, hard=True))
         base += tracks
-        few = min(frames, 20)
-        others += [tracks[0]._replace(method=method, frames=few, temperature=0.0) for method in OTHERS]
+        others += [tracks[0]._replace(method=method, frames=20, temperature=0.0) for method in OTHERS]
     return base, others
 
 
@@ -383,7 +380,6 @@ MIN_PEOPLE = 3  # of which one is left out at a time
 
 
 def posterior(
-    quick: bool,
     again: str | None,
     out: str | None,
     store: str | None,
@@ -395,14 +391,14 @@ def posterior(
     `again` is a file of tracks that an earlier `out` wrote, instead of tracking. `out` is a new file .npz for the
     frames of all tracks, `store` a new one .json for the calibration fitted to all people.
     """
-    if again is not None and (quick or out):
-        raise InputError(f"again must not be given beside {'--quick' if quick else '--out'}, got --again {again}")
+    if again is not None and out:
+        raise InputError(f"again must not be given beside --out, got --again {again}")
     with ExitStack() as stack:
         file, table = (stack.enter_context(new_file(path)) if path else None for path in (out, store))
         if again is not None:
             tracks = load_tracks(again)
         else:
-            base, more = planned_tracks(quick)
+            base, more = planned_tracks()
             arrays = each({case: partial(sampled, case) for case in (*base, *more)}, workers, progress)
             tracks = [Samples(case, **some) for case, some in arrays.items()]
             if file is not None:
@@ -581,7 +577,6 @@ def posterior_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 
 
 @click.command(help=__doc__)
-@click.option("--quick", is_flag=True, help="A few frames of every clip from one side: a look, not a measurement.")
 @click.option("--again", metavar="FILE", help="Tracks that --out wrote, instead of tracking.")
 @click.option("--out", metavar="FILE.npz", help="New file for the frames of all tracks.")
 @click.option("--store", metavar="FILE.json", help="New file for the calibration, for exemplars to read.")

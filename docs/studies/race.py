@@ -244,7 +244,7 @@ def _interval(drawn: Array, value: float) -> str:
 @WORKERS
 def main(names: tuple[str, ...], seeds: int, instances: int, rows: str | None, workers: int | None) -> None:
     learners = names or LEARNERS
-    check_learners({"ppo"} if any(name.startswith(("PPO", "SAC")) for name in learners) else set())
+    check_learners()
     turns = [Turn(agent, 0, instances) for agent in REFERENCES]
     turns += [Turn(agent, seed, instances) for agent in learners for seed in range(seeds)]
     done = earlier(rows, turn_of)

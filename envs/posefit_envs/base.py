@@ -186,7 +186,6 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         return generator
 
     def _enter(self, i: int, episode: Episode) -> None:
-        """Make this what environment i searches."""
         self._episodes[i] = episode
         self._stage.set_problem(i, episode.problem)
         self._truths[i] = episode.instance.truth.poses[episode.frame]

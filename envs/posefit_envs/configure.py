@@ -44,7 +44,13 @@ class ConfigureVectorEnv(SearchVectorEnv):
         checked(whole, "iterations", iterations, 2)
         if iterations % checked(whole, "every", every, 1):
             raise ArgumentError(f"iterations must be a multiple of every {every}, got {iterations}")
-        super().__init__(num_envs, _spaces, **arguments)
+
+        def control_spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
+            features = INSTANCE_FEATURES + PROGRESS_FEATURES
+            action = spaces.Box(-1.0, 1.0, (ACTION_NUMBERS,), np.float32)
+            return action, spaces.Box(0.0, 1.0, (features,), np.float32)
+
+        super().__init__(num_envs, control_spaces, **arguments)
         self.population_size, self.every = int(population_size), int(every)
         self._step_count = int(iterations) // self.every
         self._populations: dict[int, Population] = {}
@@ -86,7 +92,6 @@ class ConfigureVectorEnv(SearchVectorEnv):
         return Outcome(self._states(), rewards, terminated, infos, infos)
 
     def _evaluate_first(self, rows: list[int]) -> None:
-        """Evaluate the first populations of some environments."""
         moved = np.stack([population.swarm.moved for population in self._populations.values()])
         costs = self._stage.costs(moved, np.array(rows))
         for i in rows:
@@ -179,11 +184,3 @@ class ConfigureEnv(SearchEnv):
     """
 
     vector = ConfigureVectorEnv
-
-
-def _spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
-    features = INSTANCE_FEATURES + PROGRESS_FEATURES
-    return (
-        spaces.Box(-1.0, 1.0, (ACTION_NUMBERS,), np.float32),
-        spaces.Box(0.0, 1.0, (features,), np.float32),
-    )

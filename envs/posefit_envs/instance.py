@@ -221,7 +221,11 @@ def first_episode(world: World, number: int, evaluations: int, frames: int = 1) 
 @lru_cache(maxsize=64)
 def instance(world: World, number: int, frames: int, evaluations: int) -> Instance:
     """Return an instance: the same person, pose and silhouettes for the same number and arguments, everywhere."""
-    truth = _truth(world.motion, number, frames)
+    source = world.motion if world.motion in built_in.names() else _source(world.motion)
+    try:
+        truth = motion_of_instance(source, number, frames=frames, fps=FPS)
+    except ValueError as mistake:  # a file that is too short
+        raise error.Error(str(mistake)) from None
     rng = np.random.default_rng([RNG_STREAM, number])  # of noise, yaw and build alone: motion and views are a sweep's
     body, facing = body_of(world.motion), float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
@@ -238,10 +242,3 @@ def instance(world: World, number: int, frames: int, evaluations: int) -> Instan
     fitted = varied(body, world.mismatch_percent, rng)
     task = Task(fitted, cameras, evaluations, yaw, truth.translations[0].copy(), world.translation, FPS)
     return Instance(number, task, truth, observations)
-
-
-def _truth(name: str, number: int, frames: int) -> Motion:
-    try:
-        return motion_of_instance(name if name in built_in.names() else _source(name), number, frames=frames, fps=FPS)
-    except ValueError as mistake:  # a file that is too short
-        raise error.Error(str(mistake)) from None

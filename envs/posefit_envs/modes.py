@@ -117,7 +117,16 @@ class ModesEnv(RenderedEnv):
             raise error.ResetNeeded(ENDED)
         action = self._validator.check(action, self.action_space.shape or ())
         before = np.mean(self._peak_ratio)
-        self._propose(posed, action[:-1], float(action[-1]))
+        poses, translations = posed.problem.decode(action[None, :-1])
+        self._cost, self._pose = float(posed.problem.cost(poses, translations)[0]), poses[0]
+        self._evaluations += 1
+        if action[-1] > 0.0:
+            self._reported.append(poses[0])
+            self._weights.append(float(action[-1]))
+            places = np.tile(posed.problem.space.anchor, (len(self._reported), 1))
+            scores = scored(posed, Posterior(np.array(self._reported), places, np.array(self._weights)))
+            self._peak_ratio = np.array([scores.peak_ratio[level] for level in LEVELS_MM])
+            self._brier, self._log_score = scores.brier, scores.log_score
         reward = float(np.mean(self._peak_ratio) - before)
         terminated = len(self._weights) >= self._max_reports
         truncated = not terminated and self._evaluations >= self._budget
@@ -133,19 +142,6 @@ class ModesEnv(RenderedEnv):
             info |= {"peak_ratio": self._peak_ratio, "brier": self._brier, "log_score": self._log_score}
         self._update_window()
         return self._picture(posed), reward, terminated, truncated, info
-
-    def _propose(self, posed: NicheInstance, proposal: Array, weight: float) -> None:
-        """Evaluate a proposal (d,), and report it where its weight is above 0."""
-        poses, translations = posed.problem.decode(proposal[None])
-        self._cost, self._pose = float(posed.problem.cost(poses, translations)[0]), poses[0]
-        self._evaluations += 1
-        if weight > 0.0:
-            self._reported.append(poses[0])
-            self._weights.append(weight)
-            places = np.tile(posed.problem.space.anchor, (len(self._reported), 1))
-            scores = scored(posed, Posterior(np.array(self._reported), places, np.array(self._weights)))
-            self._peak_ratio = np.array([scores.peak_ratio[level] for level in LEVELS_MM])
-            self._brier, self._log_score = scores.brier, scores.log_score
 
     def _current(self) -> NicheInstance:
         if self._posed is None:

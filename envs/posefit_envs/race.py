@@ -82,7 +82,6 @@ class RaceVectorEnv(SearchVectorEnv):
         return draw_population(self._episodes[i].problem.space, self._rngs[i], shape[0] * shape[1]).reshape(shape)
 
     def _clear(self, i: int, search: int | slice = slice(None)) -> None:
-        """Forget what searches of an environment know."""
         swarms = self._swarms
         swarms.velocities[i, search], swarms.best_costs[i, search], swarms.costs[i, search] = 0.0, np.inf, np.inf
         self._slopes[i, search], self._used[i, search] = MAX_SLOPE, 0

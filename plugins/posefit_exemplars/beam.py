@@ -176,7 +176,7 @@ class Transition:
     exemplars: Exemplars
     before: Beam  # n states of a frame
     beam: Beam  # m states of the next one
-    seconds: float  # between them
+    seconds: float  # between them; negative where a track goes back in time
     root: Array | None  # (3,) metres: where the root is in the next one, if it is known
     eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
 

@@ -160,10 +160,10 @@ class Exemplars:
         """Return codes (n, D) of what came `seconds` after some states, how far they turned (n,) and went (n, 3).
 
         Displacements are those of a body whose yaw was 0. Between two poses all is interpolated; a clip that has
-        ended stays in its last pose.
+        ended stays in its last pose, and, with negative seconds, one that has not begun in its first.
         """
         last, (length, line) = self.lasts[self.clips[states]], self._line
-        times = np.minimum(self.times[states] + seconds, self.times[last])
+        times = np.clip(self.times[states] + seconds, 0.0, self.times[last])
         before = np.searchsorted(line, self.clips[states] * length + times, "right") - 1
         following = np.minimum(before + 1, last)
         gap = np.maximum(self.times[following] - self.times[before], 1e-9)

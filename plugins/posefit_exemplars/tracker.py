@@ -52,7 +52,8 @@ MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 WIDTH = 400  # states of a beam
 FULL = 0.6  # share of the beam's evaluations that is for full-size costs of states
 FITTED = 0.8  # share of the budget that is for fitting hypotheses
-AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere
+AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere,
+SEARCHES = 10.0  # so many times a second
 GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated; in the first frame more
 FIRST_GROUPS = 200
 OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a search everywhere
@@ -126,7 +127,10 @@ class ExemplarTracker:
         intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
         slack, turning = math.sqrt(intervals), math.radians(turning_degrees)
         fastest = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
-        self.task, self.exemplars = task, exemplars_of(task.training, task.body.skeleton, mirrored)
+        # one set of states serves both directions
+        training = [motion.reversed() for motion in task.training] if task.backwards else task.training
+        self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
+        self.seconds = (-1.0 if task.backwards else 1.0) / task.fps  # from a frame to the next one
         self.steps = Steps(spread * slack, turning * slack, jump, straying, depth, pace * intervals, fastest)
         self.transitions: Transitions = partial(transition_costs, steps=self.steps)
         if transitions != "clips":
@@ -171,10 +175,11 @@ class ExemplarTracker:
             sampler = Sampler(self.samples, self.power, rng.spawn(1)[0])
         else:
             delay -= self.hypotheses.delay
-        for observation in observations:
+        every = max(round(self.task.fps / SEARCHES), 1)
+        for number, observation in enumerate(observations):
             start, cpu_start = time.perf_counter(), time.process_time()
             look = FrameCosts(self.task, observation)
-            latest, used = self._evaluated(look, latest, rng)
+            latest, used = self._evaluated(look, latest, number % every == 0, rng)
             seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
             waiting.append(_PendingFrame(latest, look, used, seconds, cpu_seconds))
             if len(waiting) > delay:
@@ -195,10 +200,10 @@ class ExemplarTracker:
             yield Estimate(frame.pose, frame.translation, FrameCosts(self.task, observation), *effort)
 
     def _evaluated(
-        self, look: FrameCosts, before: FrameStates[Beam] | None, rng: np.random.Generator
+        self, look: FrameCosts, before: FrameStates[Beam] | None, everywhere: bool, rng: np.random.Generator
     ) -> tuple[FrameStates[Beam], float]:
-        """Return the states of a frame, and the evaluations that they took."""
-        latest, seconds, root = None if before is None else before.beam, 1.0 / self.task.fps, look.root
+        """Return the states of a frame, searched `everywhere` or where clips go on, and the evaluations it took."""
+        latest, seconds, root = None if before is None else before.beam, self.seconds, look.root
         if latest is not None and not look.usable:
             beam = next_states(self.exemplars, latest, seconds, self.steps, WIDTH, root)
             if root is not None:
@@ -212,9 +217,10 @@ class ExemplarTracker:
         full = int(min(FULL * evaluations, (evaluations - last) / (1.0 + look.share)))
         small = int((evaluations - full - last) / look.share)
         around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
-        search = small - around
-        elsewhere, looked = self._elsewhere(look, latest, search, rng)
-        beams = [elsewhere]
+        beams, looked = list[Beam](), 0
+        if everywhere or latest is None:
+            elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
+            beams.append(elsewhere)
         if latest is not None:
             beams.append(next_states(self.exemplars, latest, seconds, self.steps, around, root))
         elif self.task.first_pose is not None:
@@ -240,7 +246,7 @@ class ExemplarTracker:
         """Return a frame, joined to the one before."""
         if before is None:
             return frame_states(beam, fits, None, None)
-        transition = Transition(self.exemplars, before.beam, beam, 1.0 / self.task.fps, look.root, look.eye)
+        transition = Transition(self.exemplars, before.beam, beam, self.seconds, look.root, look.eye)
         return frame_states(beam, fits, before, self.transitions(transition))
 
     def _elsewhere(

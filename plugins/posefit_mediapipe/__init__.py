@@ -86,7 +86,6 @@ def _landmarks(landmarks: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _model(confidence: float) -> Any:
-    """Return MediaPipe's pose model."""
     with _silent(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from mediapipe.python.solutions.pose import Pose

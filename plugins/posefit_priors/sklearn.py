@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
-from posefit.fitting.check import at_least
+from posefit.fitting.check import at_least, one_of
 from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
 from posefit.reading import cut, parsed_json, quoted
@@ -136,8 +136,7 @@ class Transformed:
 
 def _built(variant: str, components: int, options: str, seed: int) -> Any:
     """Return the transformer. Raises ValueError where there is none of that name, or its parameters are others."""
-    if variant not in VARIANTS:
-        raise InputError(f"variant must be one of {', '.join(VARIANTS)}, got {quoted(variant)}")
+    one_of("variant", variant, VARIANTS)
     kind = getattr(importlib.import_module("sklearn.decomposition"), variant)
     try:
         parameters = json.loads(options)

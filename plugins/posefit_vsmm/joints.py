@@ -63,7 +63,6 @@ def lines_of(mask: Mask) -> Lines | None:
 
 
 def _pieces(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return a mask without its specks."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0

@@ -17,7 +17,7 @@ from posefit.geometry.rotation import (
     rotation_from_joint_angles,
     rotation_from_root_angles,
 )
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angle_index
+from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, turns_of
 
 BONES = (
     "lfemur",
@@ -37,8 +37,7 @@ FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and 
 # vector has them in the order x, y, z.
 YAW_PITCH_ROLL = (4, 3, 5)
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
-HELD_ANGLES = np.array([angle_index(joint) + k for joint in HELD for k in range(3)])
-OTHER_ANGLES = np.array([angle_index(j) + k for j in INNER if j not in HELD for k in range(3)])
+HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[j] for j in INNER if j not in HELD])
 
 
 def bone_errors(bone: str) -> slice:

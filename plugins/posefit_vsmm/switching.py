@@ -348,7 +348,6 @@ class Models:
         self._rivalry = Rivalry(self._how, old=groups[self.group], new=groups[newcomer])
 
     def _keep(self, group: str, belief: Belief) -> Belief:
-        """Let one group alone go on."""
         models = tuple(self.topology.groups[group])
         kept = normalised(regrouped(belief, self.active, models, {}))
         self.active, self.group, self.newcomer, self._rested = models, group, None, 0

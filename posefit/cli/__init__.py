@@ -31,10 +31,6 @@ GROUPS: dict[str, tuple[click.Command, ...]] = {
 }
 
 
-def _sentence(command: click.Command) -> str:
-    return " ".join((command.help or "").split("\n\n")[0].split())
-
-
 class _Commands(Group):
     """Has plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors have a traceback."""
 
@@ -46,7 +42,8 @@ class _Commands(Group):
         """Write the commands by what they are for, each with its whole first sentence; those of plugins last."""
         for heading, commands in (GROUPS | {"From plugins": tuple(_added().values())}).items():
             with formatter.section(heading):
-                formatter.write_dl([(command.name or "", _sentence(command)) for command in commands])
+                first = [" ".join((command.help or "").split("\n\n")[0].split()) for command in commands]
+                formatter.write_dl([(command.name or "", text) for command, text in zip(commands, first, strict=True)])
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
         """Return a command; plugins are looked at for those alone that posefit does not have itself."""
@@ -66,9 +63,9 @@ class _Commands(Group):
 
 
 def _added() -> dict[str, click.Command]:
-    from posefit.registry import command_plugins
+    from posefit.registry import plugins_of
 
-    added = command_plugins(tuple(main.commands))
+    added = plugins_of("commands", tuple(main.commands))
     return {command.name or "": command for plugin in added for command in plugin.offers}
 
 

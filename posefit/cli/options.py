@@ -145,8 +145,9 @@ class TrackCommand(click.Command):
         flags = [one for one in self.get_params(context) if isinstance(one, click.Option)]
         records = {one.name: record for one in flags if (record := one.get_help_record(context))}
         for heading, names in HEADINGS.items():
-            with formatter.section(heading):
-                formatter.write_dl([records.pop(name) for name in names.split() if name in records])
+            if rows := [records.pop(name) for name in names.split() if name in records]:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
         with formatter.section("Others"):
             formatter.write_dl(list(records.values()))
 

@@ -51,12 +51,12 @@ def doctor(context: click.Context, verbose: bool) -> None:
     import warnings
 
     from posefit.cli.inspection import diagnosis
-    from posefit.registry import claim_plugins, command_plugins, registry
+    from posefit.registry import plugins_of, registry
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the report below says the same
-        mine = command_plugins(_own(context))
-        lines, well = diagnosis([*registry().plugins, *mine, *claim_plugins()], verbose)
+        mine = plugins_of("commands", _own(context))
+        lines, well = diagnosis([*registry().plugins, *mine, *plugins_of("claims")], verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

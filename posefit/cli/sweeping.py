@@ -1,8 +1,7 @@
 """`posefit sweep` and `posefit report`."""
 
 import json
-from collections.abc import Iterator
-from contextlib import nullcontext, suppress
+from contextlib import closing, nullcontext, suppress
 from itertools import islice
 from typing import Any
 
@@ -47,26 +46,26 @@ def sweep(
     from posefit.sweep import command
     from posefit.sweep.engines.engine import Limits
     from posefit.sweep.estimate import TRIAL_SECONDS
+    from posefit.sweep.plan import Plan
 
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
     start = command.engine(Limits(min(seconds, TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
     if dry_run:
-        lines = command.preview(plan, out, start, as_json)
-        while some := _next(lines, as_json):
+        lines, some = command.preview(plan, out, start, as_json), ""
+        while True:
+            with results_alone() if as_json else nullcontext():  # a plugin may print, too
+                some = "\n".join(islice(lines, LINES))
+            if not some:
+                return
             click.echo(some)
-        return
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        tally = command.run_plan(plan, out, start, say, retry_quarantined=retry_quarantined, keep_old=keep_old)
+        cells = Plan.read(plan)
+        with closing(start()) as engine:  # without an engine there is no folder either
+            tally = command.swept(cells, out, engine, say, retry_quarantined=retry_quarantined, keep_old=keep_old)
     click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
-    context.exit(command.exit_status(tally))
-
-
-def _next(lines: Iterator[str], as_json: bool) -> str:
-    """Return the next lines as one text, "" at their end; not mixed with what a plugin prints."""
-    with results_alone() if as_json else nullcontext():
-        return "\n".join(islice(lines, LINES))
+    context.exit(130 if tally.stopped else 1 if tally.quarantined else 0)
 
 
 @click.command()
@@ -92,7 +91,12 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
         given = {"out": out, **others, "json": as_json or None}
         if twice := [name for name, value in given.items() if value is not None]:
             raise click.UsageError(f"--serve must be given without --{twice[0]}, which it does not write")
-        return _serve(ledger, port or 0)
+        from posefit.report.live import address_of, serving
+
+        with suppress(KeyboardInterrupt), serving(ledger, port or 0, say) as server:
+            click.echo(f"showing {ledger} at {address_of(server)} until Ctrl-C")
+            server.serve_forever()
+        return
     if port is not None:
         raise click.UsageError("--port must be given with --serve, got it without")
     from posefit.report.write import leaderboard_lines, write_report
@@ -100,11 +104,3 @@ def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json:
     summary = write_report(ledger, out, warn=say, **others)
     for line in [json.dumps(summary)] if as_json else leaderboard_lines(summary):
         click.echo(line)
-
-
-def _serve(ledger: str, port: int) -> None:
-    from posefit.report.live import address_of, serving
-
-    with suppress(KeyboardInterrupt), serving(ledger, port, say) as server:
-        click.echo(f"showing {ledger} at {address_of(server)} until Ctrl-C")
-        server.serve_forever()

@@ -11,9 +11,10 @@ from typing import Literal
 
 from posefit.errors import InputError
 from posefit.files import new_folder
+from posefit.fitting.check import one_of
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
-from posefit.registry import KINDS, Kind, command_plugins, registry
+from posefit.registry import KINDS, Kind, plugins_of, registry
 
 COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
 TAKEN = {"Frame"}  # names that a template's module has already
@@ -27,8 +28,7 @@ def write_plugin(
     `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
     be a plugin's, or the folder is there already.
     """
-    if kind not in (*KINDS, COMMAND):
-        raise InputError(f"kind must be one of {', '.join((*KINDS, COMMAND))}, got {quoted(kind)}")
+    one_of("kind", kind, (*KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}")
     if name in (known := _taken(kind, own)):
@@ -72,5 +72,7 @@ def _taken(kind: Kind | Literal["command"], own: Sequence[str]) -> dict[str, str
     """Return the names that a new plugin cannot have, each with the distribution that has it."""
     if kind != "command":
         return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
-    theirs = {str(one.name): plugin.distribution for plugin in command_plugins(tuple(own)) for one in plugin.offers}
+    theirs = {
+        str(one.name): plugin.distribution for plugin in plugins_of("commands", tuple(own)) for one in plugin.offers
+    }
     return dict.fromkeys(own, PROJECT) | theirs

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Start
+from posefit.fitting.check import one_of
 from posefit.fitting.kernels import unpack_proposals, within
 from posefit.fitting.prior import Latents, Tilt
 from posefit.geometry.rotation import wrapped, yaw_first
@@ -46,8 +47,7 @@ class SearchSpace:
     periodic: NDArray[np.bool_] = field(init=False, repr=False)  # (d,) coordinates that wrap around
 
     def __post_init__(self) -> None:
-        if self.translation not in TRANSLATIONS:
-            raise InputError(f"translation must be one of {', '.join(TRANSLATIONS)}, got {quoted(self.translation)}")
+        one_of("translation", self.translation, TRANSLATIONS)
         if self.root_order == "xyz" and self.tilt is not None:
             raise InputError('tilt must be "box" where the root is in the order xyz, got a learned one')
         for name in ("root_range", "translation_range"):

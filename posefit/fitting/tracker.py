@@ -207,7 +207,10 @@ class Follower:
             self._space = space
             return space
         if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
-            space = self._narrowed(space)
+            reach = np.radians(self._how.root_range_degrees)
+            if self._tilt is not None:
+                reach[1:] = self._tilt.around(space.root_centre[1:], reach[1:])[1]
+            space = replace(space, root_range=reach)
         space = space.around(latest[-1], anchor=anchor)
         # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
         back = 1 if self._how.prediction == "latest" else 2
@@ -235,12 +238,6 @@ class Follower:
         if self._task.yaw is None:
             spread[0] = 1.0
         return Start(away, spread, np.zeros(space.dimensions))
-
-    def _narrowed(self, space: SearchSpace) -> SearchSpace:
-        reach = np.radians(self._how.root_range_degrees)
-        if self._tilt is not None:
-            reach[1:] = self._tilt.around(space.root_centre[1:], reach[1:])[1]
-        return replace(space, root_range=reach)
 
 
 @dataclass(frozen=True, eq=False)

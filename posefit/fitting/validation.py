@@ -146,14 +146,11 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
     """Return the error that names the plugin which raised another."""
     if isinstance(error, SystemExit):
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
-    return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}{_place_of(error)}")
-
-
-def _place_of(error: BaseException) -> str:
-    """Return the file and line of the plugin where an error was raised, or passed on from a library; "" of none."""
+    # where the plugin raised it, or passed it on from a library
     frames = [frame for frame in extract_tb(error.__traceback__) if POSEFIT not in Path(frame.filename).parents]
     own = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
-    return f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+    place = f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+    return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}")
 
 
 class CheckedPrior:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, frozen, writeable
 from posefit.errors import InputError
 from posefit.geometry import kernels
+from posefit.geometry.rotation import rotation_from_joint_angles, rotation_from_root_angles
 
 # The chains of bones between the joints where several begin; l and r are left and right.
 LIMBS: Mapping[str, Sequence[str]] = {
@@ -136,6 +137,18 @@ class Skeleton:
     def chain(self) -> kernels.Chain:
         """The constant arrays that the kinematics kernel wants."""
         return kernels.chain(_STARTS, _TURNING, self.axes, self.offsets)
+
+    def turns(self, poses: Array) -> Array:
+        """Return how each bone, named by the joint it ends in, turns (27, T, 3, 3) from rest in poses (T, 66).
+
+        That is in the frame of the bone before it; the root's turn is in the world, and end bones have none.
+        """
+        turns = np.tile(np.eye(3), (len(JOINTS), len(poses), 1, 1))
+        turns[0] = rotation_from_root_angles(poses[:, :3])
+        for joint in INNER:
+            first, axes = angle_index(joint), self.axes[joint - 1]
+            turns[joint] = axes @ rotation_from_joint_angles(poses[:, first : first + 3]) @ axes.T
+        return turns
 
     def joints(self, poses: Array, translations: Array | None = None) -> Array:
         """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).

@@ -85,7 +85,6 @@ def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:
 
 
 def _section(groups: dict[str, dict[str, Any]]) -> bytes:
-    """Return the parameters as whole blocks."""
     records = b""
     for number, (group, parameters) in enumerate(groups.items(), 1):
         records += struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0)

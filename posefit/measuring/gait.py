@@ -165,7 +165,6 @@ def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float
 
 
 def _leg(motion: Motion) -> float:
-    """Return how long a leg is from hip to ankle, the mean of both."""
     bones = [BONES.index(bone) for kind in ("femur", "tibia") for bone in both(kind)]
     return float(motion.skeleton.lengths[bones].sum()) / 2.0
 

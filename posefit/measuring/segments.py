@@ -9,8 +9,7 @@ feet and face forwards, arms out with the palms down, legs apart and the soles a
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.rotation import rotation_from_joint_angles, rotation_from_root_angles
-from posefit.geometry.skeleton import BONES, PARENTS, Skeleton, angle_index, both
+from posefit.geometry.skeleton import BONES, PARENTS, Skeleton, both
 
 SIDES = ("left", "right")
 # In the pose of rest the body faces along z, and its right is at -x.
@@ -25,15 +24,10 @@ def bone_rotations(skeleton: Skeleton, poses: Array) -> Array:
 
     Entry 0 is the root, and entry j the bone that ends in joint j.
     """
-    poses = np.asarray(poses, dtype=np.float64)
-    turned = np.empty((len(poses), 1 + len(BONES), 3, 3))
-    turned[:, 0] = rotation_from_root_angles(poses[:, :3])
-    for joint in range(1, 1 + len(BONES)):
-        turned[:, joint] = turned[:, PARENTS[joint]]
-        if (start := angle_index(joint)) > 0:
-            axes = skeleton.axes[joint - 1]
-            turned[:, joint] @= axes @ rotation_from_joint_angles(poses[:, start : start + 3]) @ axes.T
-    return turned
+    turned = skeleton.turns(poses)
+    for joint in range(1, len(turned)):
+        turned[joint] = turned[PARENTS[joint]] @ turned[joint]
+    return np.swapaxes(turned, 0, 1)
 
 
 def segment_rotations(skeleton: Skeleton, poses: Array) -> dict[str, Array]:

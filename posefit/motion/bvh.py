@@ -181,9 +181,8 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
         lines.append(f"{tab}}}")
 
     visit(0, 0)
-    angles = np.degrees(
-        angles_about((2, 0, 1), motion.turns()[order])
-    )  # ZXY; at a gimbal lock any of the solutions will do
+    turns = motion.skeleton.turns(motion.poses)[order]
+    angles = np.degrees(angles_about((2, 0, 1), turns))  # ZXY; at a gimbal lock any of the solutions will do
     angles = np.swapaxes(angles.reshape(len(order), len(motion), 3), 0, 1).reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
     lines += [_plain(row) for row in np.hstack([motion.translations, angles])]

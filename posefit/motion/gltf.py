@@ -44,7 +44,7 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
         }
         meshes.append({"name": name, "primitives": [primitive]})
     times = data.add(np.arange(len(motion))[:, None] / motion.fps, None, True)
-    turns = motion.turns()
+    turns = motion.skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]
     samplers = [{"input": times, "output": data.add(values, None)} for _, _, values in moved]

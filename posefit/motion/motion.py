@@ -7,12 +7,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
-from posefit.geometry.rotation import (
-    root_angles_from_rotation,
-    rotation_from_joint_angles,
-    rotation_from_root_angles,
-)
-from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, angle_index
+from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
+from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.limits import RATES
 from posefit.reading import quoted
 
@@ -48,23 +44,15 @@ class Motion:
         """The joints (T, 27, 3) in the world, in metres."""
         return self.skeleton.joints(self.poses, self.translations)
 
-    def turns(self) -> Array:
-        """Return how each bone, named by the joint it ends in, turns (27, T, 3, 3) from where it is at rest.
-
-        That is in the frame of the bone before it; the root's turn is in the world, and end bones have none.
-        """
-        turns = np.tile(np.eye(3), (len(JOINTS), len(self), 1, 1))
-        turns[0] = rotation_from_root_angles(self.poses[:, :3])
-        for joint in INNER:
-            first, axes = angle_index(joint), self.skeleton.axes[joint - 1]
-            turns[joint] = axes @ rotation_from_joint_angles(self.poses[:, first : first + 3]) @ axes.T
-        return turns
-
     def frames(self, start: int, stop: int) -> "Motion":
         """Return frames start to stop - 1 as a motion. Raises ValueError where that leaves the clip or is empty."""
         if not 0 <= start < stop <= len(self):
             raise InputError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
         return Motion(self.name, self.skeleton, self.poses[start:stop], self.translations[start:stop], self.fps)
+
+    def reversed(self) -> "Motion":
+        """Return the motion with its last frame first."""
+        return Motion(self.name, self.skeleton, self.poses[::-1], self.translations[::-1], self.fps)
 
     def resampled(self, fps: float) -> "Motion":
         """Return the motion at another rate, over the times k / fps that lie within it.

@@ -40,7 +40,13 @@ def animations_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None], first
             origins[instance] = np.round(truth[0, 0], 3)
             scenes[instance] = _scene(runs.places[instance], truth, step, origins[instance])
             used += len(scenes[instance]["truth"]) + 500
-        tracks[row] = _track(truth, estimate, origins[instance])
+        errors = metrics.mpjpe_mm(truth, estimate)
+        tracks[row] = {
+            "estimate": in_16_bits(estimate - origins[instance]),
+            "mpjpe": np.round(errors).astype(int).tolist(),
+            "lost": np.flatnonzero(errors > metrics.LOST_MM).tolist(),
+            "swapped": np.flatnonzero(metrics.swapped(truth, estimate)).tolist(),
+        }
         used += len(tracks[row]["estimate"]) + 8 * len(truth)
         if used > MAX_CHARACTERS:
             break
@@ -72,13 +78,3 @@ def _scene(place: Mapping[str, Any], truth: Array, step: int, origin: Array) -> 
         return {**scene, "cameras": [], "radii": []}
     cameras = [camera_from_origin(camera, origin) for camera in made.cameras]
     return {**scene, "cameras": cameras, "radii": np.round(made.body.radii, 4).tolist()}
-
-
-def _track(truth: Array, estimate: Array, origin: Array) -> dict[str, Any]:
-    errors = metrics.mpjpe_mm(truth, estimate)
-    return {
-        "estimate": in_16_bits(estimate - origin),
-        "mpjpe": np.round(errors).astype(int).tolist(),
-        "lost": np.flatnonzero(errors > metrics.LOST_MM).tolist(),
-        "swapped": np.flatnonzero(metrics.swapped(truth, estimate)).tolist(),
-    }

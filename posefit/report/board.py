@@ -1,9 +1,10 @@
 """The leaderboard of a suite: a page about bundles whose every claim was verified, beside posefit's own methods."""
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import as_file, files
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from posefit.report.runs import runs_of_searches
 from posefit.report.write import check_page, write_page
 from posefit.suites.bundles import method_text
 from posefit.suites.running import SuiteRun
-from posefit.suites.verification import Bundle, verified
+from posefit.suites.verification import verified
 
 OWN = "methods.zip"  # in `posefit.suites`, of `docs/studies/make_bundles.py`
 ITSELF = "posefit itself"
@@ -39,7 +40,8 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
         bundles = {ITSELF: verified(own)}
     budgets = {_problem(run): run.budget for run in bundles[ITSELF].runs}
     unranked, notes = [], []
-    for path in _listed(paths):
+    listed = [sorted(path.glob("*.zip")) if path.is_dir() else [path] for path in map(Path, paths)]
+    for path in chain.from_iterable(listed):
         try:
             bundle = verified(path, repeat, lambda text: say(f"repeats {text}"))
             if twice := [name for name, known in bundles.items() if known.digest == bundle.digest]:
@@ -54,7 +56,10 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
         say("expected bundles to rank, got none: the board shows posefit's own methods alone")
     ranked = []
     for name, bundle in bundles.items():
-        for of_method in _by_method(bundle.runs):
+        methods: dict[str, list[SuiteRun]] = {}
+        for run in bundle.runs:
+            methods.setdefault(method_text(run), []).append(run)
+        for of_method in methods.values():
             try:
                 ranked += [(name, run) for run in _complete(of_method, budgets)]
             except InputError as error:
@@ -66,11 +71,15 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
     for method in data["methods"]:
         method["settings"] = "; ".join(filter(None, [method["settings"], method["bundle"]]))
     points = sum(bundle.evaluated for bundle in bundles.values())
+    proof = "Points prove costs, but neither seeds nor how many evaluations were used."
+    if repeat:
+        count = sum(bundle.repeated for bundle in bundles.values())
+        proof += f" Searches repeated from their seeds, which the bundles' digests chose: {count}."
     searches = f"{len(runs):,} searches by {counted(len(runs.methods), 'method')}"
     data["header"] |= {
         "summary": f"{searches}; {points:,} points were evaluated again, and each has the cost that was claimed.",
         "unranked": unranked,
-        "notes": [*data["header"]["notes"], *notes, _repeats(bundles.values(), repeat)],
+        "notes": [*data["header"]["notes"], *notes, proof],
     }
     data["header"]["facts"] += [["bundles", "; ".join(f"{name} {one.digest[:12]}" for name, one in bundles.items())]]
     write_page(data, out)
@@ -79,13 +88,6 @@ def write_board(paths: Sequence[str], out: str, repeat: int, say: Callable[[str]
 
 def _problem(run: SuiteRun) -> Problem:
     return run.function, run.dimension, run.instance
-
-
-def _by_method(runs: Iterable[SuiteRun]) -> Iterable[list[SuiteRun]]:
-    methods: dict[str, list[SuiteRun]] = {}
-    for run in runs:
-        methods.setdefault(method_text(run), []).append(run)
-    return methods.values()
 
 
 def _complete(runs: Sequence[SuiteRun], budgets: Mapping[Problem, int]) -> list[SuiteRun]:
@@ -104,16 +106,3 @@ def _complete(runs: Sequence[SuiteRun], budgets: Mapping[Problem, int]) -> list[
             f"instance {instance}, got none, nor on {len(missing) - 1} more of {len(budgets)} problems"
         )
     return list(chosen.values())
-
-
-def _repeats(bundles: Iterable[Bundle], repeat: int) -> str:
-    """Return what is known of seeds and of the evaluations between improvements, in words."""
-    count = sum(bundle.repeated for bundle in bundles)
-    known = f" Searches repeated from their seeds, which the bundles' digests chose: {count}." if repeat else ""
-    return f"Points prove costs, but neither seeds nor how many evaluations were used.{known}"
-
-
-def _listed(paths: Iterable[str]) -> list[Path]:
-    """Return the files that are named, and those that end in .zip of the folders that are."""
-    listed = [sorted(path.glob("*.zip")) if path.is_dir() else [path] for path in map(Path, paths)]
-    return [path for several in listed for path in several]

@@ -12,7 +12,7 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
 from posefit.motion.built_in import average_skeleton
 from posefit.reading import counted
-from posefit.registry import claimed_orders
+from posefit.registry import plugins_of
 from posefit.report import curves
 from posefit.report.animations import animations_of
 from posefit.report.columns import COLUMNS, SEARCH_COLUMNS
@@ -45,6 +45,7 @@ from posefit.tracking.measures import BASELINES
 REASONS = 5  # of failures, the most frequent ones, that the first screen names
 MAX_SEEDS = 50  # that the facts list
 FEW_RUNS = 20  # of a method, below which intervals are called wide
+POINTS = max(curves.POINTS, len(JOINTS))  # at which very many runs are drawn by some of them
 
 _NOT_WORSE = "Methods in bold are not shown to be worse than the best one."
 TRACK_SCORE = {  # what the first figure shows of methods, and the texts of the page that depend on it
@@ -159,7 +160,7 @@ def _tracks(ledger: Ledger, runs: Runs, data: dict[str, Any], warn: Callable[[st
 
 
 def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
-    drawn = _drawn(contest)
+    drawn = contest.fewer(POINTS)
     evaluations = curves.grid(drawn)
     convergence = {
         "id": "convergence",
@@ -172,7 +173,7 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     title = "Targets reached, of all runs and 51 costs an instance"
     return {
         "examples": three_tracks(contest, leader),
-        "claims": published_claims(contest, claimed_orders()),
+        "claims": published_claims(contest, [claim for one in plugins_of("claims") for claim in one.offers]),
         "selection": selection_of(contest),
         "evaluations": evaluations,
         "charts": [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]
@@ -195,11 +196,6 @@ def _shares_chart(chart_id: str, title: str, under: str, series: Sequence[Any], 
     }
 
 
-def _drawn(contest: Contest) -> Contest:
-    """Return the contest whose curves are drawn: all of it, unless it has very many runs."""
-    return contest.fewer(max(curves.POINTS, len(JOINTS)))
-
-
 def _search_curves(contest: Contest) -> dict[str, Any]:
     evaluations = curves.search_grid(contest)
     charts = curves.search_curves(contest, evaluations)
@@ -219,7 +215,6 @@ def _search_curves(contest: Contest) -> dict[str, Any]:
 
 
 def _searches(runs: Runs, data: dict[str, Any]) -> dict[str, Any]:
-    """Return what the page needs to show single searches."""
     interval = "; one instance of a function says nothing about others, so there are no intervals."
     if any(row["low"] is not None and np.isfinite(row["low"]) for row in data.get("leaderboard", [])):
         interval = " with the 95 % interval that other instances would give."
@@ -263,7 +258,6 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
 
 
 def _track_facts(runs: Runs) -> dict[str, Any]:
-    """Return names and texts of what was run."""
     frames = np.array([place["frames"] for place in runs.places], dtype=int)[runs.instance]
     hours = float(np.nansum(runs.figures["ms"] * frames) / 3.6e6)
     seeds = ", ".join(map(str, runs.seeds[:MAX_SEEDS]))
@@ -296,7 +290,6 @@ def _search_facts(runs: Runs) -> dict[str, Any]:
 
 
 def _all(runs: Runs, field: str) -> list[Any]:
-    """Return the distinct values of a field of instances."""
     return sorted({place[field] for place in runs.places})
 
 
@@ -305,7 +298,6 @@ def _of_methods(runs: Runs, field: str) -> list[Any]:
 
 
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:
-    """Return the notes on what can be concluded."""
     notes = []
     if contest is None:
         notes.append("No run has an error: nothing can be compared.")
@@ -327,7 +319,7 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
                 notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
             if resamples(size) < 2000:
                 notes.append(f"So many runs have {resamples(size)} bootstrap resamples instead of 2,000.")
-            drawn = _drawn(contest).rows.shape
+            drawn = contest.fewer(POINTS).rows.shape
             if drawn[1] * drawn[2] < instances * seeds:
                 notes.append(f"Curves and joints use {drawn[1]:,} instances with {drawn[2]:,} seeds each, not all.")
     if len(_of_methods(runs, "budget" if runs.is_search else "evaluations")) > 1:

@@ -187,7 +187,9 @@ def baseline_rows(contest: Contest, board: Sequence[dict[str, Any]]) -> list[dic
         random = [row["reached"] for row in board if row["taking_part"] and is_random(contest.runs, row["method"])]
         return [{"baseline": RANDOM, "reached": max(random)}] if random else []
     rows = []
-    errors = {name: _means(contest.of(f"baseline_{name}")) for name in BASELINES}
+    # of each the means (instances, seeds) over the methods that have a value
+    values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
+    errors = {name: np.asarray(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
     for name, own in errors.items():
         row: dict[str, Any] = {"baseline": name, "error": interquartile_mean(own)}
         for other, theirs in errors.items():
@@ -244,8 +246,3 @@ def mean(values: Array) -> float | None:
     """Return the mean of the finite values; None if there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if len(finite) else None
-
-
-def _means(values: Array) -> Array:
-    """Return the mean over methods (instances, seeds), of those that have a value."""
-    return np.asarray(np.ma.masked_invalid(values).mean(axis=0).filled(np.nan))

@@ -34,23 +34,22 @@ def convergence(contest: Contest, evaluations: Array) -> list[Intervals | None]:
     nan before all its runs have one and after the last has ended; None if a run has no trace.
     """
     count = resamples(contest.rows.size * max(len(evaluations), 1))
-    return [_curve(_traces(contest, rows), rows.shape, evaluations, count) for rows in contest.rows]
 
+    def curve(traces: list[Trace], shape: tuple[int, ...]) -> Intervals | None:
+        if not all(len(used) for used, _ in traces):
+            return None
+        first, last = max(used[0] for used, _ in traces), max(used[-1] for used, _ in traces)
+        known = (evaluations >= first) & (evaluations <= last)
+        values = np.full((3, len(evaluations)), np.nan)
+        if known.any():
+            points = evaluations[known]
+            costs = np.array([best[np.searchsorted(used, points, side="right") - 1] for used, best in traces])
+            rng = np.random.default_rng(BOOTSTRAP_SEED)
+            part = iqm_intervals(costs.T.reshape(-1, *shape), rng, resamples=count)
+            values[:, known] = part.values, part.low, part.high
+        return Intervals(*values)
 
-def _curve(traces: list[Trace], shape: tuple[int, ...], evaluations: Array, count: int) -> Intervals | None:
-    """Return the curve of the traces of so many (instances, seeds)."""
-    if not all(len(used) for used, _ in traces):
-        return None
-    first, last = max(used[0] for used, _ in traces), max(used[-1] for used, _ in traces)
-    known = (evaluations >= first) & (evaluations <= last)
-    values = np.full((3, len(evaluations)), np.nan)
-    if known.any():
-        points = evaluations[known]
-        costs = np.array([best[np.searchsorted(used, points, side="right") - 1] for used, best in traces])
-        rng = np.random.default_rng(BOOTSTRAP_SEED)
-        curve = iqm_intervals(costs.T.reshape(-1, *shape), rng, resamples=count)
-        values[:, known] = curve.values, curve.low, curve.high
-    return Intervals(*values)
+    return [curve(_traces(contest, rows), rows.shape) for rows in contest.rows]
 
 
 def reached(contest: Contest, evaluations: Array) -> Array:

@@ -66,15 +66,8 @@ def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
         spec, trace = row["spec"], row["trace"]
         if not trace["evaluations"]:
             continue
-        conditions = [
-            spec["motion"],
-            "view",
-            *views(spec),
-            *damage(spec),
-            "frames",
-            spec["frames"],
-            spec["translation"],
-        ]
+        seen = spec["motion"], "view", *views(spec), *damage(spec)
+        conditions = *seen, "frames", spec["frames"], spec["translation"]
         more = {name: spec[name] for name in ("evaluations", "hypotheses", "version")}
         yield LoggedRun(
             spec["method"],
@@ -112,7 +105,12 @@ def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:
     written.
     """
     algorithms = _grouped(runs)
-    names = _algorithm_names([method for method, _ in algorithms])
+    methods = [method for method, _ in algorithms]
+    numbers = [methods[: k + 1].count(method) for k, method in enumerate(methods)]
+    names = [
+        f"{method} #{number}" if methods.count(method) > 1 else method
+        for method, number in zip(methods, numbers, strict=True)
+    ]
     problems = sorted({run.problem for runs in algorithms.values() for run in runs})
     with new_folder(path) as folder:
         for (_, info), name, place, own in zip(algorithms, names, _file_names(names), algorithms.values(), strict=True):
@@ -214,15 +212,6 @@ def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]
     return dict(sorted(groups.items()))
 
 
-def _algorithm_names(methods: list[str]) -> list[str]:
-    """Return the methods' names, numbered where one has several settings."""
-    numbers = [methods[: k + 1].count(method) for k, method in enumerate(methods)]
-    return [
-        f"{method} #{number}" if methods.count(method) > 1 else method
-        for method, number in zip(methods, numbers, strict=True)
-    ]
-
-
 def _file_names(names: list[str]) -> list[str]:
     """Return distinct names that every file system accepts, even where case does not count."""
     file_names: dict[str, str] = {}  # by their lower case
@@ -261,18 +250,9 @@ def latex_table(header: Sequence[str], rows: Sequence[Sequence[str | float | Non
         "l" if any(isinstance(cell, str) for cell in column) else "r" for column in zip(*rows, strict=True)
     )
     lines = [" & ".join(map(_cell, row)) + r" \\" for row in (header, *rows)]
-    return "\n".join(
-        [
-            f"\\begin{{tabular}}{{{columns}}}",
-            r"\hline",
-            lines[0],
-            r"\hline",
-            *lines[1:],
-            r"\hline",
-            r"\end{tabular}",
-            "",
-        ]
-    )
+    rule = r"\hline"
+    table = [f"\\begin{{tabular}}{{{columns}}}", rule, lines[0], rule, *lines[1:], rule, r"\end{tabular}", ""]
+    return "\n".join(table)
 
 
 def _cell(value: str | float | None) -> str:

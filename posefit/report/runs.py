@@ -131,19 +131,13 @@ def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
     """Return searches as `runs_of` does, each with the name of the bundle it is of, which makes another method."""
     rows = []
     for bundle, run in named:
-        spec = _bundled_spec(bundle, run)
+        spec = {**vars(run), "evaluations": run.budget, "bundle": bundle}
         figures, *data = _search_data(run)
         rows.append(_Row(_text(_place(spec)), _text(_variant(spec)), "", run.seed, "", (), figures, tuple(data)))
     return _sorted_runs(posefit_build().removeprefix("posefit "), True, rows, (), ())
 
 
-def _bundled_spec(bundle: str, run: SuiteRun) -> dict[str, Any]:
-    names = ("suite", "function", "dimension", "instance", "method", "settings", "infeasible", "version", "seed")
-    return {**{name: getattr(run, name) for name in names}, "evaluations": run.budget, "bundle": bundle}
-
-
 def _search_data(run: SuiteRun) -> tuple[Any, ...]:
-    """Return the figures of a search, its run, and its hits."""
     evaluations = hits((run.evaluations, run.costs), run.targets)
     reached = 100.0 * float(np.isfinite(evaluations).mean())
     return [100.0 - reached, reached, run.cost - run.truth_cost], run, evaluations
@@ -226,7 +220,6 @@ def _bad_row(reason: str) -> dict[str, Any]:
 
 
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a spec that make a method."""
     if is_search(spec):
         fields = {
             name: spec[name] for name in ("method", "settings", "infeasible", "version", "bundle") if name in spec
@@ -247,7 +240,6 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a spec that make an instance."""
     if is_search(spec):
         return {name: spec[name] for name in _PROBLEM_FIELDS}
     return {name: value for name, value in spec.items() if name not in (*_METHOD_FIELDS, "seed")}

@@ -49,7 +49,11 @@ def selection_of(contest: Contest) -> dict[str, Any] | None:
     names, features = features_of(contest.runs, contest.instances)
     # drawn at random: instances come in the order of a plan, so that every k-th of them could have the same view
     drawn = np.sort(np.random.default_rng(FOLD_SEED).permutation(instances)[:MAX_INSTANCES])
-    why, selector, picks = _why_not(instances, names), None, Counter[int]()
+    why, selector, picks = "", None, Counter[int]()
+    if instances < MIN_INSTANCES:
+        why = f"{instances} instances are too few to train a selector: at least {MIN_INSTANCES}"
+    elif not names:
+        why = "the plan is the same for every instance, so that a selector has no features"
     if not why:
         chosen = selected(features[drawn], errors[drawn])
         # its gain on the drawn instances, relative to the mean over all
@@ -116,13 +120,6 @@ def _fields(place: Mapping[str, Any]) -> dict[str, float | str]:
             name: value for name, value in place.items() if name not in _UNUSED and isinstance(value, str | int | float)
         },
     }
-
-
-def _why_not(instances: int, names: Sequence[str]) -> str:
-    """Return why there is no selector; "" if there is one."""
-    if instances < MIN_INSTANCES:
-        return f"{instances} instances are too few to train a selector: at least {MIN_INSTANCES}"
-    return "" if names else "the plan is the same for every instance, so that a selector has no features"
 
 
 def _folds(count: int, folds: int) -> Iterator[tuple[Array, Array]]:

@@ -37,7 +37,9 @@ def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests
         others = others_clause(contest.runs.methods, first["method"], tests, paired)
     sentence = f"{first['name']} {'has' if alone else 'leads with'} {score}{ahead} on {where}{others}."
     if searches:
-        return sentence + _random_sentence(contest, first, baselines)
+        if is_random(contest.runs, first["method"]):
+            return f"{sentence} That is random search: no method does better."
+        return sentence + "".join(f" Random search reached {row['reached']:.1f} %." for row in baselines)
     compared = [row for row in board if row["method"] in contest.methods]
     close = {*(row["method"] for row in compared[:2]), *not_worse(tests, first["method"])}
     rows = [row for row in compared if row["method"] in close]
@@ -45,14 +47,12 @@ def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests
 
 
 def _motions(contest: Contest) -> str:
-    """Return the instances of tracks in words."""
     motions = sorted({str(place["motion"]) for place in contest.places()})
     names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
     return f"{counted(len(contest.instances), 'instance')} of {names} with {_seeds(contest)}"
 
 
 def _problems(contest: Contest) -> str:
-    """Return the problems of single searches in words."""
     places = contest.places()
     functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
     instances = counted(len({(place["function"], place["instance"]) for place in places}), "instance")
@@ -87,12 +87,6 @@ def _baseline_sentence(first: Mapping[str, Any], baselines: Rows) -> str:
     best = min(known, key=lambda row: float(row["error"]))
     text = f"best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°."
     return f" The {text}" if best["error"] > first["error"] else f" It does not beat the baselines: the {text}"
-
-
-def _random_sentence(contest: Contest, first: Mapping[str, Any], baselines: Rows) -> str:
-    if is_random(contest.runs, first["method"]):
-        return " That is random search: no method does better."
-    return "".join(f" Random search reached {row['reached']:.1f} %." for row in baselines)
 
 
 def others_clause(names: Sequence[str], method: int, tests: Tests, paired: str) -> str:
@@ -219,7 +213,6 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _series(values: Sequence[Any]) -> str:
-    """Return all values as a sentence lists them."""
     texts = [str(value) for value in values]
     return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))
 

@@ -126,7 +126,6 @@ def write_page(data: dict[str, Any], out: str) -> None:
 
 
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:
-    """Raise ValueError where something could not be written."""
     if out is not None:
         check_page(out)
     places = [place for place in (out, *others) if place is not None]

@@ -45,7 +45,15 @@ def areas(
     nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`. They are made on
     the silhouette's device.
     """
-    poses, translations = _checked(camera, silhouette, poses, translations)
+    # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
+    poses, translations = writeable(poses), writeable(translations)
+    n = len(poses)
+    if poses.ndim != 2 or poses.shape[1] != ANGLES:
+        raise InputError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
+    if translations.shape != (n, 3):
+        raise InputError(f"translations must have shape {(n, 3)}, got {translations.shape}")
+    if silhouette.mask.shape != (camera.height, camera.width):
+        raise InputError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     drawn.count_poses(len(poses), silhouette)
     if silhouette.device == "cuda":
         from posefit.silhouette.cuda.areas import areas_on_device
@@ -63,20 +71,6 @@ def areas(
 
     work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
-
-
-def _checked(camera: Camera, silhouette: Silhouette, poses: Array, translations: Array) -> tuple[Array, Array]:
-    """Return poses and translations as the loops need them. Raises ValueError where a shape does not fit."""
-    # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
-    poses, translations = writeable(poses), writeable(translations)
-    n = len(poses)
-    if poses.ndim != 2 or poses.shape[1] != ANGLES:
-        raise InputError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
-    if translations.shape != (n, 3):
-        raise InputError(f"translations must have shape {(n, 3)}, got {translations.shape}")
-    if silhouette.mask.shape != (camera.height, camera.width):
-        raise InputError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
-    return poses, translations
 
 
 def pose_costs(

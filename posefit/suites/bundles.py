@@ -47,8 +47,7 @@ def write_bundle(runs: Sequence[SuiteRun], path: str | Path) -> str:
     """
     if len(suites := {run.suite for run in runs}) != 1:
         raise InputError(f"runs must be of one suite, got {', '.join(sorted(suites)) or 'none'}")
-    methods = {method_text(run): None for run in runs}
-    numbers = {text: k for k, text in enumerate(sorted(methods))}
+    numbers = {text: k for k, text in enumerate(sorted({method_text(run) for run in runs}))}
     order = sorted(runs, key=lambda run: (numbers[method_text(run)], *_place(run)))
     listed = []
     for k, run in enumerate(order):
@@ -58,36 +57,18 @@ def write_bundle(runs: Sequence[SuiteRun], path: str | Path) -> str:
             raise InputError(f"{label(run)}: expected instances that are held out, from {HELD_OUT[0]} on")
         if k and _place(order[k - 1]) == _place(run) and method_text(order[k - 1]) == method_text(run):
             raise InputError(f"{label(run)}: expected each run once, got it twice")
-        listed.append(
-            {
-                "method": numbers[method_text(run)],
-                "function": run.function,
-                "dimension": run.dimension,
-                "instance": run.instance,
-                "seed": run.seed,
-                "budget": run.budget,
-                "evaluations": int(run.evaluations[-1]),
-                "improvements": len(run.points),
-            }
-        )
-    manifest = {
-        "format": FORMAT,
-        "suite": suites.pop(),
-        "methods": [json.loads(text) for text in numbers],
-        "runs": listed,
-    }
+        entry = {"method": numbers[method_text(run)]}
+        entry |= {name: getattr(run, name) for name in ("function", "dimension", "instance", "seed", "budget")}
+        listed.append({**entry, "evaluations": int(run.evaluations[-1]), "improvements": len(run.points)})
+    methods = [json.loads(text) for text in numbers]
+    manifest: Manifest = {"format": FORMAT, "suite": suites.pop(), "methods": methods, "runs": listed}
     arrays = {
         "costs": np.concatenate([run.costs[: len(run.points)] for run in order if run.points is not None]),
         "evaluations": np.concatenate([run.evaluations[: len(run.points)] for run in order if run.points is not None]),
         "points": np.concatenate([run.points.ravel() for run in order if run.points is not None]),
     }
     arrays = {name: np.ascontiguousarray(array, dtype=TYPES[name]) for name, array in arrays.items()}
-    return write_contents(manifest, arrays, path)
-
-
-def write_contents(manifest: Manifest, arrays: Arrays, path: str | Path) -> str:
-    """Write a manifest and its arrays to a new file, with their digest, and return that."""
-    manifest = {**manifest, "digest": digest_of(manifest, arrays)}
+    manifest["digest"] = digest = digest_of(manifest, arrays)
     with new_file(path) as building, zipfile.ZipFile(building, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         text = json.dumps(manifest, indent=1, ensure_ascii=False, allow_nan=False)
         archive.writestr(zipfile.ZipInfo(MANIFEST, _DATE), text, zipfile.ZIP_DEFLATED)
@@ -95,7 +76,6 @@ def write_contents(manifest: Manifest, arrays: Arrays, path: str | Path) -> str:
             buffer = io.BytesIO()
             np.lib.format.write_array(buffer, array, version=(1, 0), allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy", _DATE), buffer.getvalue(), zipfile.ZIP_DEFLATED)
-    digest: str = manifest["digest"]
     return digest
 
 
@@ -198,7 +178,6 @@ def method_text(run: SuiteRun) -> str:
 
 
 def _canonical(value: Any) -> str:
-    """Return the one JSON text of a value."""
     try:
         text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
         text.encode()  # half of a character that takes two raises

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from posefit.fitting.tracker import Frame
     from posefit.footage.scene import Scene
     from posefit.geometry.skeleton import Skeleton
-    from posefit.motion.motion import Motion
 
 MAX_TRACE_POINTS = 64
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
@@ -135,7 +134,8 @@ class TrackCell(_Spec):
         values = {name: getattr(self, name) for name in shared}
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, options)
-        truth, estimate = (_joints(motion) for motion in (result.truth, result.motion))
+        assert result.truth is not None
+        truth, estimate = result.truth.joints, result.motion.joints
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
         measured = result.measures.as_dict()
         row = {
@@ -239,7 +239,6 @@ def other_version(origin: str) -> str | None:
 
 @lru_cache(maxsize=1)
 def _installed() -> frozenset[str]:
-    """Return the versions of posefit and of all plugins."""
     from posefit.registry import registry
 
     offers = (offer for named in registry().offers.values() for offer in named.values())
@@ -326,11 +325,6 @@ def _spent(frame: "Frame") -> "Array":
         return np.asarray(frame.spent)
     count = len(frame.history)
     return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
-
-
-def _joints(motion: "Motion | None") -> "Array":
-    assert motion is not None
-    return motion.skeleton.joints(motion.poses, motion.translations)
 
 
 def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:

@@ -20,18 +20,10 @@ from posefit.sweep.engines.engine import Engine, Limits, Run
 from posefit.sweep.ledger import INDEX, Ledger
 from posefit.sweep.plan import Plan
 
-DONE, QUARANTINED, STOPPED = 0, 1, 130  # exit statuses
 VALUES = 12  # of a field, that a preview lists
 WARNINGS = 5  # of a preview
 
 Say = Callable[[str], None]
-
-
-def run_plan(plan: str, out: str, start: Callable[[], Engine], say: Say, **choices: bool) -> Tally:
-    """Return how the sweep of a plan to a folder ended; `choices` as for `swept`."""
-    cells = Plan.read(plan)
-    with closing(start()) as running:  # without an engine there is no folder either
-        return swept(cells, out, running, say, **choices)
 
 
 def swept(
@@ -79,7 +71,6 @@ def swept(
 
 
 def _unversioned(spec: Mapping[str, Any]) -> str:
-    """Return a spec without its version, as JSON."""
     return json_of({name: value for name, value in spec.items() if name != "version"})
 
 
@@ -166,11 +157,6 @@ def engine(
         return Processes(workers or cores(), limits, run)
 
     return start
-
-
-def exit_status(tally: Tally) -> int:
-    """Return the exit status of a sweep."""
-    return STOPPED if tally.stopped else QUARANTINED if tally.quarantined else DONE
 
 
 def tally_text(tally: Tally, out: str) -> str:

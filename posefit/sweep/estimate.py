@@ -58,7 +58,6 @@ def estimate_of(workload: Workload, engine: Engine, workers: int) -> Estimate:
 
 
 def _run(cells: Sequence[Cell], engine: Engine) -> list[float] | str:
-    """Return the seconds that each cell took, or why one failed."""
     times = []
     for cell in cells:
         engine.submit(cell)

@@ -199,7 +199,11 @@ class Ledger:
         path = (self.path / ROWS / self._places[key][0]).with_suffix(JOINTS)
         data = joints_at(path, start, length)
         try:
-            if zlib.crc32(data) == checksum and _unpacked_bytes(data) <= MAX_JOINTS_BYTES:
+            if zlib.crc32(data) != checksum:
+                raise ValueError
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                unpacked = sum(one.file_size for one in archive.infolist())
+            if unpacked <= MAX_JOINTS_BYTES:
                 with np.load(io.BytesIO(data), allow_pickle=False) as stored:
                     joints: dict[str, Any] = {
                         name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")
@@ -258,7 +262,6 @@ class Ledger:
             self._say(f"warning: {damage}; put aside as {aside}, to be run again")
 
     def _logs(self) -> dict[str, int]:
-        """Return the logs with their sizes."""
         sizes = {}
         for entry in os.scandir(self.path / ROWS):
             with suppress(FileNotFoundError):  # an empty one that went away
@@ -288,11 +291,6 @@ def _aside_name(log: str, offset: int) -> str:
     return f"{Path(log).stem}-{offset}.txt"
 
 
-def _unpacked_bytes(data: bytes) -> int:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        return sum(one.file_size for one in archive.infolist())
-
-
 def create(path: Path) -> None:
     """Make a folder a ledger, if it is none yet. Raises ValueError where it cannot be one."""
     try:
@@ -312,7 +310,6 @@ def create(path: Path) -> None:
 
 
 def _check_format(path: Path) -> None:
-    """Raise ValueError where a folder is no ledger."""
     if os.path.isfile(path):
         raise InputError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
     try:

@@ -152,7 +152,6 @@ class Product:
 
 
 def _piece(name: str, value: Any) -> str:
-    """Return a field as JSON holds it in a key."""
     return f'"{name}":{json_of(value)}'
 
 

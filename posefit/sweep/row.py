@@ -29,13 +29,6 @@ _SCALARS = (str, int, float, bool, type(None))
 Check = Callable[[str, Any], object]
 
 
-def _refuse(constant: str) -> None:
-    raise InputError(f"expected finite numbers, got {constant}")
-
-
-_DECODER = json.JSONDecoder(parse_constant=_refuse)
-
-
 def checked_row(key: str, text: bytes) -> dict[str, Any]:
     """Return the finished row of a key from its JSON. Raises InputError saying what was expected instead."""
     row = _parsed(key, text)
@@ -89,8 +82,12 @@ def check_spec(spec: Any) -> bool:
 
 def _parsed(key: str, text: bytes) -> dict[str, Any]:
     """Return an object of JSON whose key is right, with a spec."""
+
+    def refuse(constant: str) -> None:
+        raise InputError(f"expected finite numbers, got {constant}")
+
     try:
-        row = _DECODER.decode(text.decode())
+        row = json.loads(text.decode(), parse_constant=refuse)
     except RecursionError:
         raise InputError("expected values that are not nested so deeply, got too many brackets") from None
     if not isinstance(row, dict) or row.get("key") != key or "spec" not in row:
@@ -108,11 +105,6 @@ def _number(name: str, value: Any) -> None:
         raise InputError(f"{name} must be a number, got {quoted(value)}")
 
 
-def _figure(name: str, value: Any) -> None:
-    if value is not None:
-        _number(name, value)
-
-
 def _figures(name: str, value: Any) -> None:
     if not isinstance(value, dict):
         raise InputError(f"{name} must be figures by their names, got {quoted(value)}")
@@ -120,7 +112,6 @@ def _figures(name: str, value: Any) -> None:
 
 
 def _check_figures(figures: Mapping[str, Any]) -> None:
-    """Check that each figure is a number or null."""
     try:
         quick = (
             _KINDS.issuperset(map(type, figures.values())) and sum(map(abs, filter(None, figures.values()))) < LARGEST
@@ -129,22 +120,22 @@ def _check_figures(figures: Mapping[str, Any]) -> None:
         quick = False
     if not quick:
         for name, value in figures.items():
-            _figure(name, value)
+            if value is not None:
+                _number(name, value)
 
 
-def _text(name: str, value: Any) -> None:
-    if not isinstance(value, str):
-        raise InputError(f"{name} must be a text, got {quoted(value)}")
+def _check(what: str, holds: Callable[[Any], bool]) -> Check:
+    """Return the check that a value, which must be `what`, is so."""
+
+    def check(name: str, value: Any) -> None:
+        if not holds(value):
+            raise InputError(f"{name} must be {what}, got {quoted(value)}")
+
+    return check
 
 
-def _texts(name: str, value: Any) -> None:
-    if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-        raise InputError(f"{name} must be a list of texts, got {quoted(value)}")
-
-
-def _files(name: str, value: Any) -> None:
-    if not isinstance(value, dict) or not all(isinstance(one, str) for one in value.values()):
-        raise InputError(f"{name} must be digests by the names of files, got {quoted(value)}")
+_text = _check("a text", lambda value: isinstance(value, str))
+_texts = _check("a list of texts", lambda value: isinstance(value, list) and all(isinstance(one, str) for one in value))
 
 
 def _settings(name: str, value: Any) -> None:
@@ -160,11 +151,6 @@ def _are_numbers(value: Any) -> bool:
     if type(value) is not list or not _NUMBERS.issuperset(map(type, value)):
         return False
     return not value or 0 <= min(value) <= max(value) < LARGEST
-
-
-def _joint_errors(name: str, value: Any) -> None:
-    if not _are_numbers(value) or len(value) != len(JOINTS):
-        raise InputError(f"{name} must be {len(JOINTS)} numbers, got {quoted(value)}")
 
 
 def _trace(name: str, value: Any) -> None:
@@ -188,23 +174,23 @@ def _search_trace(name: str, value: Any) -> None:
         raise InputError(f"{name} of a search must hold a cost, got none")
 
 
-def _reliability(name: str, value: Any) -> None:
-    bins: list[Any] = value if isinstance(value, list) else [None]
-    if not all(_are_numbers(one) and len(one) == 3 and 0 <= one[1] <= 1 for one in bins):
-        raise InputError(f"{name} must be triples of frames, probability and share, got {quoted(value)}")
+def _are_bins(value: Any) -> bool:
+    return isinstance(value, list) and all(_are_numbers(one) and len(one) == 3 and 0 <= one[1] <= 1 for one in value)
 
 
-def _place(name: str, value: Any) -> None:
+def _is_place(value: Any) -> bool:
     whole_numbers = isinstance(value, list) and len(value) == 3 and set(map(type, value)) == {int}
-    if not whole_numbers or min(value) < 0 or max(value) > LARGEST_PLACE:
-        raise InputError(f"{name} must be start, length and checksum of the joints, got {quoted(value)}")
+    return whole_numbers and min(value) >= 0 and max(value) <= LARGEST_PLACE
 
 
 def _made_of(kind: type, checks: Mapping[str, Check]) -> dict[str, Check]:
-    """Return the check of each field of a cell."""
     return {one.name: checks[one.name] for one in fields(kind)}
 
 
+_files = _check(
+    "digests by the names of files",
+    lambda value: isinstance(value, dict) and all(isinstance(one, str) for one in value.values()),
+)
 _NAMES = {"method": _text, "version": _text, "settings": _settings}
 _TRACK_SPEC = _made_of(TrackCell, {**CHECKS, **_NAMES, "motion": _text, "train": _texts, "files": _files})
 _SEARCH_SPEC = _made_of(
@@ -226,8 +212,14 @@ _ROW: dict[str, Check] = {
     "status": lambda name, value: one_of(name, value, ("done",)),
     "warnings": _texts,
     "trace": _trace,
-    "joints": _place,
+    "joints": _check("start, length and checksum of the joints", _is_place),
 }
-_TRACK_ROW = {**_ROW, "joint_errors_mm": _joint_errors, "mode_reliability": _reliability}
+_TRACK_ROW = {
+    **_ROW,
+    "joint_errors_mm": _check(
+        f"{len(JOINTS)} numbers", lambda value: _are_numbers(value) and len(value) == len(JOINTS)
+    ),
+    "mode_reliability": _check("triples of frames, probability and share", _are_bins),
+}
 _SEARCH_ROW: dict[str, Check] = {**_ROW, "trace": _search_trace, "cost": _number, "truth_cost": _number}
 _SEVERAL, _TRACK_SEVERAL = {*_FIGURES, *_SEARCH_ROW}, {*_FIGURES, *_TRACK_ROW}

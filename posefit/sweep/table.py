@@ -40,20 +40,15 @@ def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
     count = 0
     for row in rows:
-        _add(columns, count, flat(row))
+        for name, value in flat(row).items():
+            column = columns.setdefault(name, [])
+            column.extend([None] * (count - len(column)))
+            column.append(value)
         count += 1
     for values in columns.values():
         values.extend([None] * (count - len(values)))
     table: pd.DataFrame = pandas.DataFrame({name: pandas.Series(values) for name, values in columns.items()})
     return table.sort_values(list(ORDER), ignore_index=True) if count else table
-
-
-def _add(columns: dict[str, list[Any]], count: int, values: Mapping[str, Any]) -> None:
-    for name, value in values.items():
-        column = columns.setdefault(name, [])
-        if len(column) < count:
-            column.extend([None] * (count - len(column)))
-        column.append(value)
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -98,19 +93,11 @@ def search_run(row: Mapping[str, Any], points: Array | None = None) -> SuiteRun:
     """Return the run of a row of a single search, with the points of `Ledger.points`."""
     spec, trace = row["spec"], row["trace"]
     return SuiteRun(
-        spec["suite"],
-        spec["method"],
-        spec["settings"],
-        spec["version"],
-        spec["function"],
-        spec["dimension"],
-        spec["instance"],
-        spec["seed"],
-        spec["evaluations"],
-        spec["infeasible"],
-        row["truth_cost"],
-        row["truth_cost"] + TARGETS,
-        np.array(trace["evaluations"], dtype=np.float64),
-        np.array(trace["cost"], dtype=np.float64),
-        points,
+        **{name: value for name, value in spec.items() if name != "evaluations"},
+        budget=spec["evaluations"],
+        truth_cost=row["truth_cost"],
+        targets=row["truth_cost"] + TARGETS,
+        evaluations=np.array(trace["evaluations"], dtype=np.float64),
+        costs=np.array(trace["cost"], dtype=np.float64),
+        points=points,
     )

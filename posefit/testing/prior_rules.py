@@ -62,7 +62,6 @@ class Case(PluginCase):
 
 
 def _same(first: Prior, second: Prior, latents: Array) -> bool:
-    """Return whether two priors make the same of latents."""
     angles = np.array_equal(first.inverse_transform(latents), second.inverse_transform(latents))
     return angles and np.array_equal(first.feasible(latents), second.feasible(latents))
 

@@ -19,8 +19,8 @@ from typing import Any
 
 from posefit import testing
 from posefit.errors import InputError
+from posefit.fitting.check import one_of
 from posefit.limits import end_with_parent, memory
-from posefit.reading import quoted
 from posefit.testing import results
 from posefit.testing.results import Check, Report, Result, not_run
 
@@ -108,7 +108,6 @@ def _check() -> None:
 
 
 def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> tuple[str, list[Check]]:
-    """Return a plugin's label and its checks."""
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
@@ -126,8 +125,7 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     checks: list[Check] = getattr(testing, f"{kind}_checks")(offer.factory, settings=settings, **options)
     names = [check.name for check in checks]
     for rule in only:
-        if rule not in names:
-            raise InputError(f"--only must be one of {', '.join(names)}, got {quoted(rule)}")
+        one_of("--only", rule, names)
     return offer.label, [check for check in checks if not only or check.name in only]
 
 

@@ -112,10 +112,6 @@ def _degrees(name: str, value: Any) -> tuple[float, ...]:
     return tuple(_between(-360.0, 360.0, " degrees")(name, degrees) for degrees in (value if several else [value]))
 
 
-def _cameras(_name: str, value: Any) -> tuple[Any, ...]:
-    return tuple(value) if isinstance(value, list | tuple) else (value,)
-
-
 def _sources(name: str, value: Any) -> Sequence[Any]:
     if isinstance(value, str | Path) or not isinstance(value, Sequence):
         raise InputError(f"{name} must be a list of motions, got {quoted(value)}")
@@ -179,7 +175,11 @@ class TrackOptions:
     )
     asf: str | Path | None = option(None, "Skeleton of SOURCE; by default the only .asf beside an .amc.", None, "FILE")
     camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
-        (), "Calibration, one a view; guessed where absent.", _cameras, "FILE", repeated=True
+        (),
+        "Calibration, one a view; guessed where absent.",
+        lambda _, value: tuple(value) if isinstance(value, list | tuple) else (value,),
+        "FILE",
+        repeated=True,
     )
     up: "Up | None" = option(None, "Axis that points up in the calibration's world.", _one_of("x", "y", "z"), "x|y|z")
     view_degrees: float | Sequence[float] = option(

@@ -217,7 +217,6 @@ def _encoded(value: Any) -> Any:
 
 
 def _decoded(mapping: dict[str, Any]) -> Any:
-    """Return a mapping of JSON, or the array that it holds."""
     if mapping.keys() == {"dtype", "values"}:
         return np.array(mapping["values"], dtype=mapping["dtype"])
     return mapping

@@ -167,7 +167,6 @@ def _draw_border(image: Image, width: int) -> None:
 
 
 def _write_legend(image: Image, row: int, scale: float = 0.5) -> None:
-    """Write what the colours of an overlay on masks mean."""
     at = 12
     for name, colour in (("both", BOTH), ("observed only", MISSED), ("body only", SPILLED)):
         write(image, name, (at, row), colour, scale)
@@ -188,7 +187,6 @@ def _zoomed(camera: Camera, panel: Image) -> Camera:
 
 
 def _grid(panels: list[Image], columns: int, background: int) -> Image:
-    """Return pictures of one size in one, so many beside each other."""
     panels = panels + [np.full_like(panels[0], background)] * (-len(panels) % columns)
     return np.vstack([np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)])
 

@@ -77,12 +77,11 @@ def track_scene(
             hypotheses = follow(scene, task, method, options, output, progress)
             tracked = cheapest(scene, hypotheses, task.training)
             if scene.truth is None and method.looks_ahead(task):
-                frames, start = retrack_spins(task, scene.observations, tracked.frames, method.follow, options.seed)
-                tracked = tracked._replace(frames=frames, start=start)
-                if start is not None:
-                    progress.log(
-                        f"the body turned faster than a person can: tracked again both ways from frame {start}"
-                    )
+                frames, stay = retrack_spins(task, scene.observations, tracked.frames, method.follow, options.seed)
+                tracked = tracked._replace(frames=frames, stay=stay)
+                if stay is not None:
+                    outside = "tracked again before frame {} and after frame {}".format(*stay)
+                    progress.log(f"the body turned faster than a person can: {outside}")
                     task = replace(task, fastest_turn=MAX_TURN_RATE)
         smoothed = Pass(scene, tracked.frames, shape, 1)
         if options.smooth:

@@ -5,7 +5,7 @@
 | before the first frame | `best_restart`: searches of the first frame, followed over a few more | the cheapest |
 | after a gap, or while costs are high | `RelocalisingTracker`: such restarts beside the track as it is | the cheapest |
 | with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
-| where the body spins | `retrack_spins`: all frames again, both ways from the surest | the new one, if about as cheap |
+| where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
 | with several passes | `smoothing.smooth`: all frames again, their path known | the new one, if about as cheap |
 """
 
@@ -45,6 +45,7 @@ SPIN_TOLERANCE = 1.5  # a track without spins that costs more is wrong: the pers
 MAX_TURN_RATE = np.radians(450.0)  # a second: the fastest that a person turns on the spot
 SPIN_SECONDS = 0.1
 SPIN_ANGLE = np.radians(60.0)  # within that time: more is no turn of a person, even in a smoothed track
+SURE_SECONDS = 0.5  # from the ends of what is without spins, where it goes on from
 VOTES_PER_SECOND = 30.0
 EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
 SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
@@ -240,12 +241,13 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
 
 def retrack_spins(
     task: Task, observations: Sequence[Observation], frames: Sequence[Frame], follow: Follow, seed: int
-) -> tuple[list[Frame], int | None]:
-    """Return a track without spins, and the frame from which it was tracked again; None where it is as it was.
+) -> tuple[list[Frame], tuple[int, int] | None]:
+    """Return a track without spins, and the first and last frame of those that stay; None where all do.
 
-    That frame is the surest of those that face as most do, see `facing_consensus`. From there the person is
-    followed onward, and backwards by training motions in reverse. The old track is kept where the new one spins as
-    often, or costs half as much again. The frames have the effort of both tracks.
+    Those are of the longest run that faces as most frames do, see `facing_consensus`, between its surest ends. The
+    person is followed onward from the last, and backwards from the first by training motions in reverse. The old track
+    is kept where the new one spins as often, or costs half as much again. Frames that are tracked again have the effort
+    of both tracks.
     """
     usable = np.array([observation.usable for observation in observations])
 
@@ -253,23 +255,31 @@ def retrack_spins(
         return int(spin_mask(np.array([frame.pose[0] for frame in track]), usable, task.fps).sum())
 
     before = spins(frames)
-    start = anchor_frame(frames, facing_consensus(frames, task.cameras, usable, task.fps)) if before else None
-    if start is None:
+    every = runs(facing_consensus(frames, task.cameras, usable, task.fps)) if before else []
+    if not every:
         return list(frames), None
-    sure = replace(after(task, frames[start]), before=(), fastest_turn=MAX_TURN_RATE)
-    back = backwards(sure)
-    ahead = list(follow(sure, (observations[k] for k in range(start, len(frames))), stream(seed, "spin", 0)))
-    behind = list(follow(back, (observations[k] for k in range(start, -1, -1)), stream(seed, "spin", 1)))
-    again = [*joined(task.body.skeleton, behind, ahead[0])[:0:-1], *ahead]
-    cheap = mean_cost(again, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
-    better = cheap and spins(again) < before
-    return with_total_effort([frames, again], int(better)), start if better else None
+    first, last = stay = surest_ends(frames, *max(every, key=lambda run: run[1] - run[0]), task.fps)
+    steady = replace(task, fastest_turn=MAX_TURN_RATE)
+
+    def again(number: int, steady: Task, rows: range) -> list[Frame]:
+        """Return the frames after the first of some rows, followed from there."""
+        begun = replace(after(steady, frames[rows[0]]), before=())
+        followed = list(follow(begun, (observations[k] for k in rows), stream(seed, "spin", number)))
+        return joined(task.body.skeleton, followed, frames[rows[0]])[1:]
+
+    ahead = again(0, steady, range(last, len(frames)))
+    behind = again(1, backwards(steady), range(first, -1, -1))
+    new = [*behind[::-1], *frames[first : last + 1], *ahead]
+    cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
+    better = cheap and spins(new) < before
+    new = with_total_effort([frames, new], int(better))
+    new[first : last + 1] = frames[first : last + 1]
+    return new, stay if better else None
 
 
 def backwards(task: Task) -> Task:
     """Return a task whose observations go back in time."""
-    reverse = [replace(one, poses=one.poses[::-1], translations=one.translations[::-1]) for one in task.training]
-    return replace(task, training=reverse, backwards=True)
+    return replace(task, training=[motion.reversed() for motion in task.training], backwards=True)
 
 
 def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Frame]:
@@ -336,14 +346,15 @@ def facing_consensus(
     return agrees
 
 
-def anchor_frame(frames: Sequence[Frame], agrees: NDArray[np.bool_]) -> int | None:
-    """Return the frame from which to track again: in the longest run of flags, the best one that most cameras see.
+def surest_ends(frames: Sequence[Frame], start: int, stop: int, fps: float) -> tuple[int, int]:
+    """Return a frame near the beginning of a run, and one near its end: the best that most cameras see.
 
-    None where no flag is true.
+    The first and the last of all frames need not be sure, as nothing goes on from there.
     """
-    every = runs(agrees)
-    if not every:
-        return None
-    start, stop = max(every, key=lambda run: run[1] - run[0])
-    inner = range(start, stop) if stop - start < 3 else range(start + 1, stop - 1)
-    return min(inner, key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost))
+    near = min(max(round(SURE_SECONDS * fps), 1), (stop - start + 1) // 2)
+
+    def surest(rows: range) -> int:
+        return min(rows, key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost))
+
+    first = surest(range(start, start + near)) if start else 0
+    return first, surest(range(stop - 1, stop - 1 - near, -1)) if stop < len(frames) else stop - 1

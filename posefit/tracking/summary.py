@@ -88,7 +88,7 @@ def evaluate(
         "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
         "lost_frames": _numbers(rows, "lost", LOST),
         "relocalised": [k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
-        "retracked_from": tracked.start,
+        "retracked_outside": tracked.stay,
         "backwards_share": round(float(walks_back.mean()), 6),
         "trust": None if scene.truth is not None else trust_of(scene, tracked.frames, frames, rows, measures.iou),
         "gait": gait_of(estimate, unseen(rows)).as_dict(),

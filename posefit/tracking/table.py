@@ -1,6 +1,6 @@
 """The table a track prints: the method beside trivial ones, what was not determined, and the budget."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from posefit.errors import printable
@@ -63,7 +63,11 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
-    lines += [_chosen(summary["hypotheses"])] if summary["hypotheses"] else []
+    if tracks := summary["hypotheses"]:
+        kept = next(k for k, track in enumerate(tracks) if track["kept"])
+        costs = [f"{track['guess']} {track['cost'] + track['motion']:.2f}" for track in tracks]
+        chosen = f"kept track {kept + 1} of {len(tracks)}"
+        lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
     speed = MEASURES["evaluations_per_second"].number(summary["evaluations_per_second"])
     lines.append(f"{_effort(summary)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the names of files are among them
@@ -110,10 +114,3 @@ def _frames(count: int, of: str) -> str:
 
 def _shown(summary: Mapping[str, Any], name: str) -> str:
     return MEASURES[name].shown(summary[name])
-
-
-def _chosen(tracks: Sequence[Mapping[str, Any]]) -> str:
-    """Return which of several tracks was kept, and what each costs as a whole."""
-    kept = next(k for k, track in enumerate(tracks) if track["kept"])
-    costs = [f"{track['guess']} {track['cost'] + track['motion']:.2f}" for track in tracks]
-    return f"kept track {kept + 1} of {len(tracks)}; trajectory cost by initial guess: {', '.join(costs)}"

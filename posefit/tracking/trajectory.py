@@ -32,7 +32,8 @@ class Tracked(NamedTuple):
 
     frames: list[Frame]
     hypotheses: list[dict[str, Any]]  # of each of several: its initial guess, cost and motion term, and whether kept
-    start: int | None = None  # the frame from which it was tracked again because it spun
+    # the first and last frame that stayed where the others were tracked again because the body spun
+    stay: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

@@ -226,7 +226,6 @@ def _moved(
     temperature: float,
     rng: np.random.Generator,
 ) -> tuple[_State, float]:
-    """Return a chain's next state, and the share of its moves that was accepted."""
     (proposals, costs, starts), box = state, landscape.box
     tried = wrap(box, proposals + rng.standard_normal(proposals.shape) @ walk.T)
     new_costs, new_starts = landscape.costs(tried), start.log_density(box, tried)

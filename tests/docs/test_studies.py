@@ -80,8 +80,6 @@ def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
 
 
 def test_an_interval_holds_the_median() -> None:
-    import numpy as np
-
     table = importlib.import_module("table")
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     low, high = table.interval(values, "abcde")
@@ -90,8 +88,6 @@ def test_an_interval_holds_the_median() -> None:
 
 
 def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target() -> None:  # Interpretation V5
-    import numpy as np
-
     rng, models = np.random.default_rng(1), importlib.import_module("make_models")
     before = np.column_stack([np.zeros((90, 3)), rng.normal(0.0, 0.3, (90, 40))])
     after = before + rng.normal(0.0, 0.05, before.shape)

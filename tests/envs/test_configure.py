@@ -5,7 +5,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium import error
 from gymnasium.utils.seeding import np_random
 
 import posefit_envs  # noqa: F401, registers it
@@ -165,18 +164,3 @@ def test_differences_and_draws_are_those_of_their_formulas() -> None:
     drawn = normal(space, rng, bests, np.arange(40), 20_000, 1.2)
     np.testing.assert_allclose(drawn.mean(axis=0), bests[:20].mean(axis=0), atol=3e-3)
     np.testing.assert_allclose(np.cov(drawn.T), 4.0 * np.cov(bests[:20].T, bias=True), atol=8e-4)
-
-
-@each(
-    ("arguments", "message"),
-    [
-        ({"population_size": 3}, "population_size must be at least 4, got 3"),
-        ({"iterations": 1}, "iterations must be at least 2, got 1"),
-        ({"iterations": 7, "every": 2}, "iterations must be a multiple of every 2, got 7"),
-    ],
-)
-def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(error.Error, match=message):
-        made(**arguments)
-    with pytest.raises(error.Error, match=message):
-        gym.make_vec(NAME, num_envs=2, **arguments)

@@ -172,9 +172,9 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     assert len({float(pose[0]) for pose in poses}) == 3  # the box moved on with each frame
 
 
-@each(
-    ("arguments", "message"),
-    [
+TWO = r"generations must be two whole numbers such as \(100, 220\), got "
+WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
+    "posefit/Track-v0": [
         ({"motion": "wakl"}, "did you mean 'walk'"),
         ({"prior": "pcb"}, "prior must be one of .* did you mean 'pca'"),
         ({"train": ["wakl"]}, "did you mean 'walk'"),
@@ -187,9 +187,33 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
         ({"train": "walk"}, r"train must be a list of motions such as \['walk-a'\], got 'walk'"),
         ({"errors": "no"}, "errors must be true or false, got 'no'"),
     ],
-)
-def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
-    name = "posefit/Track-v0"
+    "posefit/FitState-v0": [
+        ({"image": "yes"}, "image must be true or false, got 'yes'"),
+        ({"max_evaluations": 1}, "max_evaluations must be at least 2, got 1"),
+    ],
+    "posefit/Configure-v0": [
+        ({"population_size": 3}, "population_size must be at least 4, got 3"),
+        ({"iterations": 1}, "iterations must be at least 2, got 1"),
+        ({"iterations": 7, "every": 2}, "iterations must be a multiple of every 2, got 7"),
+    ],
+    "posefit/Race-v0": [
+        ({"searches": 1}, "searches must be at least 2, got 1"),
+        ({"population_size": 1}, "population_size must be at least 2, got 1"),
+        ({"generations": 50}, f"{TWO}50"),
+        ({"generations": "ab"}, f"{TWO}'ab'"),
+        ({"generations": (1, 2, 3)}, rf"{TWO}\(1, 2, 3\)"),
+        ({"generations": (0, 5)}, "generations must be at least 1, got 0"),
+        ({"generations": (5, 4)}, "generations must be the least and the largest, got 5 and 4"),
+    ],
+    MODES: [
+        ({"split": "both"}, "split must be .*, got 'both'"),
+        ({"max_reports": 11}, "max_reports must be .*, got 11"),
+    ],
+}
+
+
+@each(("name", "arguments", "message"), [(name, *one) for name, many in WRONG.items() for one in many])
+def test_wrong_arguments_are_named(name: str, arguments: dict[str, Any], message: str) -> None:
     for make in (gym.make, lambda name, **arguments: gym.make_vec(name, num_envs=2, **arguments)):
         with pytest.raises(error.Error, match=message) as caught:
             make(name, **arguments)

@@ -5,12 +5,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium import error
 
 import posefit_envs  # noqa: F401, registers it
 from posefit.niching import niche_instance
 from posefit_envs.fit import ProposalMemory
-from posefit_envs.instance import ArgumentError
 from posefit_envs.policies import constant_policy, gaussian_policy, random_search_policy, rollout, uniform_policy
 
 NAME = "posefit/FitState-v0"
@@ -75,10 +73,6 @@ def test_the_picture_comes_beside_the_search_if_asked_for() -> None:
     assert sorted(observation) == ["image", "search"]
     assert observation["image"].shape == (48, 64, 2)
     assert observation["image"][..., 1].any()  # the middle of the box, which was proposed
-    with pytest.raises(error.Error, match="image must be true or false, got 'yes'"):
-        gym.make(NAME, image="yes")
-    with pytest.raises(error.Error, match="max_evaluations must be at least 2, got 1"):
-        gym.make(NAME, max_evaluations=1)
 
 
 def test_policies_act_in_their_environment() -> None:
@@ -129,9 +123,3 @@ def test_an_episode_without_a_report_ends_with_the_worst_brier_score() -> None:
     env.step(np.append(np.zeros(8), -1.0))
     _, reward, terminated, truncated, info = env.step(np.append(np.zeros(8), -1.0))
     assert (reward, terminated, truncated, info["brier"]) == (-2.0, False, True, 2.0)
-
-
-def test_wrong_arguments_are_named() -> None:
-    for name, value in (("split", "both"), ("max_reports", 11)):
-        with pytest.raises(ArgumentError, match=f"{name} must be .*, got '?{value}"):
-            gym.make(NICHES, **{name: value})

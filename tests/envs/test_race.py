@@ -7,7 +7,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium import error
 
 import posefit_envs  # noqa: F401, registers it
 from posefit_envs.policies import (
@@ -20,7 +19,6 @@ from posefit_envs.policies import (
     rollout,
     round_robin_policy,
 )
-from tests.cases import each
 
 NAME = "posefit/Race-v0"
 LOG_101 = math.log(101.0)
@@ -233,22 +231,3 @@ def test_policies_take_the_observations_of_a_vector() -> None:
         actions = policy(observations, 1)
         np.testing.assert_array_equal(actions, [policy(observation, 1) for observation in observations])
         assert actions.shape == (3, 9)
-
-
-@each(
-    ("arguments", "message"),
-    [
-        ({"searches": 1}, "searches must be at least 2, got 1"),
-        ({"population_size": 1}, "population_size must be at least 2, got 1"),
-        ({"generations": 50}, r"generations must be two whole numbers such as \(100, 220\), got 50"),
-        ({"generations": "ab"}, r"generations must be two whole numbers such as \(100, 220\), got 'ab'"),
-        ({"generations": (1, 2, 3)}, r"generations must be two whole numbers such as \(100, 220\), got \(1, 2, 3\)"),
-        ({"generations": (0, 5)}, "generations must be at least 1, got 0"),
-        ({"generations": (5, 4)}, "generations must be the least and the largest, got 5 and 4"),
-    ],
-)
-def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(error.Error, match=message):
-        made(**arguments)
-    with pytest.raises(error.Error, match=message):
-        gym.make_vec(NAME, num_envs=2, **arguments)

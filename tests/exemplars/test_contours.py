@@ -8,11 +8,12 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
-from posefit.tracking.smoothing import contours, kernels
+from posefit.tracking.smoothing.contours import MaskContours
 from posefit_exemplars.contours import SPACING, FrameContours, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
+from tests.tracking.contour_twin import moved_bodies, pull_of_view
 
 REACHES = (0.09, 0.065, 0.045, 0.045, 0.033, 0.033)
 LOOSE = precisions(np.radians(8.0), 0.003)
@@ -26,28 +27,14 @@ def off(walk: Walk, k: int, radians: float, seed: int = 0) -> tuple[Array, Array
 
 
 def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, reach: float) -> Array:
-    """Return the step of Gauss and Newton (69,) by the smoothing's derivatives of a drawn body, joint by joint."""
+    """Return the step of Gauss and Newton (69,) by the derivatives of a drawn body, number by number."""
     curve, slope = np.diag(LOOSE), LOOSE * np.append(np.zeros(3), pose - mean)
     for number, camera in enumerate(walk.task.cameras):
-        view = contours.MaskContours.of(camera, number, [walk.observations[k]], place[None])
-        here = walk.task.body.skeleton.joints(pose[None], place[None])
-        body = contours.projected_body(walk.task.body, view.camera, here)[0]
-        joints = 1 + len(contours.BONE_STARTS)
-        drawn = body[: 2 * joints].reshape(1, -1, 2), body[2 * joints :].reshape(1, -1, 2)
-        count = contours.BODY_NUMBERS
-        out = np.zeros((1, count, count)), np.zeros((1, count))
-        scale = np.array([max(reach * view.metres[0], contours.MIN_ROBUST_SCALE)])
-        every = round(SPACING * view.metres[0] / view.step)
-        points = view.points[::every]
-        mask = view.fields, view.corners, view.sizes, points, np.array([0, len(points)]), every * view.step, scale
-        kernels.pull_to_borders(contours.BONE_STARTS, *drawn, *mask, out)
-        curves, slopes = out[0][0], out[1][0]
-        deviation = contours.BORDER_DEVIATION**2 + (contours.PIXEL_DEVIATION / view.metres[0]) ** 2
-        worth = 1.0 / (view.metres[0] ** 3 * contours.CORRELATION_LENGTH * deviation)
-        turned = contours.turned_joints(walk.task.body, pose[None], place[None], range(ANGLES))
-        ways = contours.jacobian(body[None], contours.projected_body(walk.task.body, view.camera, turned))[0]
-        curve += worth * ways.T @ curves @ ways
-        slope += worth * ways.T @ slopes
+        view = MaskContours.of(camera, number, [walk.observations[k]], place[None])
+        numbers = moved_bodies(walk.task.body, view.camera, pose, place)
+        curves, slopes = pull_of_view(view, 0, *numbers, reach, round(SPACING * view.metres[0] / view.step))
+        curve += curves
+        slope += slopes
     free = np.append([True] * 3, walk.motion.skeleton.free)
     steps = np.zeros(ANGLES + 3)
     steps[free] = np.linalg.solve(curve[np.ix_(free, free)], slope[free])

@@ -19,6 +19,7 @@ from posefit_exemplars.exemplars import (
     mirror_image,
     thinned_frames,
 )
+from tests.cases import each
 
 SKELETON = average_skeleton()
 
@@ -50,17 +51,19 @@ def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> Non
         assert (two.owners[two.group_members(group)] == group).all()
 
 
-def test_a_pose_goes_on_as_its_clip_and_stops_at_its_end(two: Exemplars) -> None:
+@each("backwards", [False, True])
+def test_a_pose_goes_on_as_its_clip_and_stops_at_its_end(two: Exemplars, backwards: bool) -> None:
     walk = built_in.motion("walk-a", frames=40)
+    walk, begin, end = (walk.reversed(), two.lasts[0], 0) if backwards else (walk, 0, two.lasts[0])
     for seconds in (1.0 / 30.0, 0.5, 1.0):
-        codes, turns, ways = two.after(np.array([0]), seconds)
+        codes, turns, ways = two.after(np.array([begin]), -seconds if backwards else seconds)
         k = round(30.0 * seconds)
         assert np.linalg.norm(codes - two.coding.coded(walk.poses[k : k + 1])) < SAME
         assert turns[0] == pytest.approx(walk.poses[k, 0] - walk.poses[0, 0], abs=0.01)
         displacement = about_vertical(ways, walk.poses[:1, 0])[0]
         np.testing.assert_allclose(displacement, walk.translations[k] - walk.translations[0], atol=0.02)
-    last, *_ = two.after(np.array([0]), 99.0)
-    np.testing.assert_allclose(last[0], two.codes[two.lasts[0]], atol=1e-6)
+    last, *_ = two.after(np.array([begin]), -99.0 if backwards else 99.0)
+    np.testing.assert_allclose(last[0], two.codes[end], atol=1e-6)
 
 
 def test_states_are_interpolated_between_frames_and_not_between_clips(two: Exemplars) -> None:

@@ -185,7 +185,7 @@ def test_a_root_may_jump_a_thousand_kilometres(walker: Walk) -> None:
 def test_the_budget_holds_and_small_pictures_count_by_their_pixels(
     size: tuple[int, int], first: bool, budget: int
 ) -> None:
-    motion = built_in.motion("walk-a", frames=6)  # the first have few hypotheses that go on
+    motion = built_in.motion("walk-a", frames=10)  # the first have few hypotheses that go on; others search nearby
     known = {"first_pose": motion.poses[0, 3:]} if first else {}
     used = [frame.evaluations for frame in walk_of(motion, size=size).track(evaluations=budget, **known)]
     assert 0.5 * budget < max(used) <= budget

@@ -73,22 +73,6 @@ def test_people_are_chosen_by_name() -> None:
     assert recorded.leaving_out("library:02,16", ["16"]) == "library:02,16,-16"
 
 
-@each(
-    ("name", "message"),
-    [
-        ("library:3", "a subject of the library must be one of 02, .*, got '3'"),
-        ("library:16,-16", "the library must keep at least one person, got all left out"),
-        *[
-            (name, f"a library must be library, library:02,16 or library:-16, got '{name}'")
-            for name in ("library:", "library:,", "library:02,,16", "library:16,", "library:-", "library:02,-,16")
-        ],
-    ],
-)
-def test_people_that_are_not_there_are_named(name: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        recorded.named(name)
-
-
 def test_the_command_lists_what_there_is() -> None:
     listing: dict[str, Any] = json.loads(CliRunner().invoke(main, ["motions", "--json"]).stdout)
     assert listing["recorded"][0]["name"] == "02_01"

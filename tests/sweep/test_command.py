@@ -133,7 +133,6 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
 @each(
     ("words", "message"),
     [
-        (["none.toml", "--out", "OUT"], "none.toml: expected a plan (.toml) or default, got no file of that name"),
         (["PLAN"], "--out must name a folder for the results, got none"),
         (["PLAN", "--out", "OUT", "--workers", "0"], "--workers must be at least 1, got 0"),
         (["PLAN", "--out", "OUT", "--dask-local", "-1"], "--dask-local must be at least 1, got -1"),
@@ -142,19 +141,11 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
         (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must lie in 0.001 to 1e+08, got 0.0"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "inf"], "the limit of seconds must lie in 0.001 to 1e+08, got inf"),
         (["PLAN", "--out", "OUT", "--cell-gigabytes", "1e30"], "limit of gigabytes must lie in 0.001 to 1e+06, got 1e+30"),
-        (["PLAN", "--out", "OUT", "--scheduler", "nonsense"], "scheduler must be one that answers, got nonsense"),
         (["BAD", "--out", "OUT"], "bad.toml: defaults must be of"),
         (["BAD", "--out", "OUT", "--dry-run"], "bad.toml: defaults must be of"),
-        (["PLAN", "--out", "PLAN"], "expected a folder for the ledger, got a file"),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line_and_write_nothing(
-    words: list[str], message: str, plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if "--scheduler" in words:
-        cluster = pytest.importorskip("posefit.sweep.engines.cluster")
-        pytest.importorskip("distributed")
-        monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str, plan: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("[defaults]\nframe = 3\n")
     places = {"PLAN": plan, "OUT": tmp_path / "out", "BAD": tmp_path / "bad.toml"}
     assert message in error_of("sweep", *(places.get(word, word) for word in words))

@@ -134,13 +134,6 @@ def test_a_damaged_lease_holds_nothing(content: bytes, tmp_path: Path) -> None:
     assert progress_of(Ledger(folder)).running == 0
 
 
-def test_a_damaged_note_of_a_plan_is_passed_over(tmp_path: Path) -> None:
-    folder = filled(tmp_path / "ledger", 1)
-    (folder / "plans").mkdir(exist_ok=True)
-    (folder / "plans" / "bad.cells").write_bytes(DEEP)
-    assert Ledger(folder).plans() == []
-
-
 def test_folders_and_pipes_among_the_files_of_a_ledger_are_left_alone(tmp_path: Path) -> None:
     folder = filled(tmp_path / "ledger", 1)
     first, second = (cell.key for cell in cells(2))
@@ -160,14 +153,6 @@ def test_folders_and_pipes_among_the_files_of_a_ledger_are_left_alone(tmp_path: 
     assert len(list(ledger.rows())) == 2
     assert ledger.quarantined() == []
     assert progress_of(ledger).running == 0
-
-
-def test_a_disk_without_hard_links_takes_a_sweep(tmp_path: Path, monkeypatch: Any) -> None:
-    def refuse(*_: object) -> None:
-        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
-
-    monkeypatch.setattr(os, "link", refuse)
-    assert len(Ledger(filled(tmp_path / "ledger", 3))) == 3
 
 
 @each("step", [-86_400.0, 86_400.0])

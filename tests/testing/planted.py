@@ -397,22 +397,12 @@ class SpendsInSecret(Holds):
         return replace(super().frame(observation), evaluations=100)
 
 
-class CostsNothing(Holds):
-    def frame(self, observation: Any) -> Frame:
-        return replace(super().frame(observation), cost=0.0, history=np.zeros(1))
-
-
 class ChangesTheMask(Holds):
     """Makes the mask what it has drawn."""
 
     def frame(self, observation: Any) -> Frame:
         observation.silhouettes[0].mask[:] = True
         return super().frame(observation)
-
-
-class InventsAreas(Holds):
-    def frame(self, observation: Any) -> Frame:
-        return replace(super().frame(observation), areas=np.array([[0, 0, 100]]))
 
 
 class GivesFramesTwice(Holds):
@@ -488,8 +478,6 @@ TRACKERS: dict[type, tuple[str, ...]] = {
     SpendsAndSaysSo: ("audit",),
     SpendsInSecret: ("audit",),
     ChangesTheMask: ("one_frame_each",),
-    CostsNothing: ("audit",),
-    InventsAreas: ("audit",),
     GivesFramesTwice: ("one_frame_each",),
     ExitsInTrack: ("one_frame_each",),
 }

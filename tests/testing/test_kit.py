@@ -158,12 +158,6 @@ def test_a_traceback_begins_in_the_plugins_own_code_and_is_there_once_a_cause() 
     assert str(report).count("sys.exit(0)") == 1
 
 
-def test_a_skipped_check_is_listed_with_its_reason() -> None:
-    report = check_optimiser(registry().optimiser("random"), next_frame="forget")
-    assert [result.detail for result in report.of("skipped")].count("it is the baseline itself") == 2
-    assert "skipped  start" in str(report)
-
-
 def test_a_check_that_fails_raises_its_rule_and_what_came() -> None:
     check = next(check for check in optimiser_checks(planted.AsksOneRow) if check.name == "shape")
     with pytest.raises(AssertionError, match=r"returns an array \(n, d\): ask must return \(n, 9\), got \(9,\)"):

@@ -54,8 +54,8 @@ def test_an_honest_tracker_is_left_as_it_is() -> None:
     [
         (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
         (planted.SpendsInSecret, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
-        (planted.CostsNothing, ", got 0 (12 such frames)"),
-        (planted.InventsAreas, ", got [[0, 0, 100]] (12 such frames)"),
+        (reporting(cost=0.0, history=np.zeros(1)), ", got 0 (12 such frames)"),
+        (reporting(areas=np.array([[0, 0, 100]])), ", got [[0, 0, 100]] (12 such frames)"),
         (ChangesTheBits, "(12 such frames)"),
     ],
 )

@@ -11,6 +11,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
@@ -18,20 +19,17 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.smoothing import contours, kernels
 from posefit.tracking.smoothing.contours import (
-    BONE_STARTS,
     MaskContours,
     distances_outside,
     fit_contours,
-    grown_bodies,
-    jacobian,
-    projected_body,
-    turned_joints,
+    growth,
 )
 from posefit.tracking.smoothing.path import Visibility
 from posefit.tracking.smoothing.smooth import smoothed
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
+from tests.tracking.contour_twin import BONE_STARTS, COUNT, STEP, drawn_body, moved_bodies, pull_of_view, pulled
 
 CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
 
@@ -107,43 +105,54 @@ def test_the_border_of_a_mask_is_where_it_meets_known_background() -> None:
     assert borders.metres == pytest.approx([camera.focal[0] / 4.0] * 2)
 
 
-def test_jacobians_are_the_change_with_poses_places_and_builds() -> None:
-    body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(2)
-    poses, places = rng.normal(0.0, 0.3, (3, 66)), rng.normal(0.0, 0.2, (3, 3)) + [0.0, 0.9, 0.0]
-    angles = [0, 1, 9, 30]
-    joints = body.skeleton.joints(poses, places)
-    here = projected_body(body, CAMERA, joints)
-    np.testing.assert_allclose(here[:, :54].reshape(3, 27, 2), CAMERA.project(joints)[0])
-    step = rng.normal(0.0, 1e-3, (3, 7))
-    turned = poses.copy()
-    turned[:, angles] += step[:, 3:]
-    there = projected_body(body, CAMERA, body.skeleton.joints(turned, places + step[:, :3]))
-    slopes = jacobian(here, projected_body(body, CAMERA, turned_joints(body, poses, places, angles)))
-    np.testing.assert_allclose(there - here, np.einsum("tqn,tn->tq", slopes, step), atol=2e-3)
-    growth = rng.normal(0.0, 1e-3, len(NAMES))
-    tall = body.scaled(1.7 / body.stature, 1.7 / body.stature)
-    here, there, *grown = (
-        projected_body(one, CAMERA, one.skeleton.joints(poses, places))
-        for one in (tall, shaped(body, np.exp(growth), 1.7), *grown_bodies(tall, 1.7))
+def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> None:
+    scene, motion = footage(3, (60.0, 150.0))
+    body, skeleton = scene.body, scene.body.skeleton
+    poses = estimate_of(motion).poses
+    moving = replace(motion, poses=poses)
+    changes = growth(body, body.stature, moving)
+    by_factors = np.zeros((1 + len(NAMES), 1 + len(NAMES)))
+    bones = np.zeros((3, 27, 6, 6)), np.zeros((3, 27, 6, 1 + len(NAMES)))
+    views = [
+        MaskContours.of(camera, k, scene.observations, motion.translations) for k, camera in enumerate(scene.cameras)
+    ]
+    for view in views:
+        camera = tuple(np.array(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
+        borders = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
+        moved = body.radii, camera, poses, motion.translations.copy()
+        kernels.add_frames(kinematics(), *skeleton.chain, *moved, borders, 0.09, (*changes, by_factors), bones)
+    matrices, slopes = np.empty((3, 69, 69)), np.empty((3, 69, 1 + len(NAMES)))
+    kernels.add_all_bones(kinematics(), *skeleton.chain, poses, motion.translations.copy(), *bones, matrices, slopes)
+    expected = np.zeros((3, 69 + len(NAMES), 69 + len(NAMES))), np.zeros((3, 69 + len(NAMES)))
+    grown = [shaped(body, np.exp(STEP * row), body.stature) for row in np.eye(len(NAMES))]
+    for k in range(3):
+        for view in views:
+            here, there = moved_bodies(body, view.camera, poses[k], motion.translations[k])
+            joints = [one.skeleton.joints(poses[k : k + 1], motion.translations[k : k + 1])[0] for one in grown]
+            each = zip(grown, joints, strict=True)
+            there = np.concatenate([there, [drawn_body(one, view.camera, points) for one, points in each]])
+            for whole, part in zip(expected, pull_of_view(view, k, here, there, 0.09), strict=True):
+                whole[k] += part
+    free = np.append([True] * 3, skeleton.free)
+    scale = np.abs(expected[0]).max()
+    np.testing.assert_allclose(
+        matrices[:, free][:, :, free], expected[0][:, :69, :69][:, free][:, :, free], atol=1e-3 * scale
     )
-    slopes = jacobian(here, np.array(grown))
-    np.testing.assert_allclose(there - here, slopes @ growth, atol=2e-3)
+    np.testing.assert_allclose(slopes[:, free, 1:], expected[0][:, :69, 69:][:, free], atol=1e-3 * scale)
+    np.testing.assert_allclose(by_factors[1:, 1:], expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
+    scale = np.abs(expected[1]).max()
+    np.testing.assert_allclose(slopes[:, free, 0], expected[1][:, :69][:, free], atol=1e-3 * scale)
+    np.testing.assert_allclose(by_factors[1:, 0], expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
 
 
 def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(3)
-    numbers = projected_body(body, CAMERA, body.skeleton.joints(np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]])))
+    numbers = drawn_body(body, CAMERA, body.skeleton.joints(np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))[0])
     points = rng.uniform(40.0, 160.0, (30, 2))
-    nothing = np.zeros((1, 1, 1), np.float32), np.zeros((1, 2), np.int64), np.ones((1, 2), np.int64)
-
-    def pulled(numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        out = np.zeros((1, 106, 106)), np.zeros((1, 106))
-        drawn = numbers[:, :54].reshape(1, 27, 2), numbers[:, 54:].reshape(1, 26, 2)
-        kernels.pull_to_borders(BONE_STARTS, *drawn, *nothing, points, np.array([0, 30]), 1.0, np.array([1e9]), out)
-        return out
+    mask = np.zeros((1, 1), np.float32), np.zeros(2, np.int64), np.ones(2, np.int64), points, 1.0
 
     def half_sum(numbers: np.ndarray) -> float:
-        (joints,), (radii,), total = numbers[:, :54].reshape(1, 27, 2), numbers[:, 54:].reshape(1, 26, 2), 0.0
+        joints, radii, total = numbers[:54].reshape(27, 2), numbers[54:].reshape(26, 2), 0.0
         for x, y in points:
             total += 0.5 * min(
                 kernels.cone_distance(x, y, *joints[p], r[0], *joints[b + 1], r[1])[0]
@@ -151,12 +160,12 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
             ) ** 2  # fmt: skip
         return total
 
-    curves, slopes = pulled(numbers)
-    for k in range(0, 106, 3):
-        step = 1e-4 * np.eye(106)[k]
+    curves, slopes = pulled(numbers, mask, 1e9)
+    for k in range(0, COUNT, 3):
+        step = 1e-4 * np.eye(COUNT)[k]
         expected = (half_sum(numbers + step) - half_sum(numbers - step)) / 2e-4
-        assert slopes[0, k] == pytest.approx(expected, abs=1e-3 + 1e-3 * abs(expected))
-    assert np.linalg.eigvalsh(curves[0]).min() > -1e-6
+        assert slopes[k] == pytest.approx(expected, abs=1e-3 + 1e-3 * abs(expected))
+    assert np.linalg.eigvalsh(curves).min() > -1e-6
 
 
 def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:

@@ -59,11 +59,6 @@ def test_arrays_that_are_no_masks_are_named(masks: Any, words: str) -> None:
         posefit.track(masks, **QUICK)
 
 
-def test_a_camera_of_another_size_is_named() -> None:
-    with pytest.raises(InputError, match="camera must be calibrated for 80x60, got 160x120"):
-        posefit.track(MASKS, camera=posefit.Camera.pinhole(160, 120, fx=150), **QUICK)
-
-
 def test_warnings_are_shown_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     posefit.track(~MASKS, camera=CAMERA, **QUICK)
     assert "warning: " in capsys.readouterr().err

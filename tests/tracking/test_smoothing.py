@@ -7,11 +7,13 @@ import pytest
 
 import posefit
 from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
 from posefit.motion import recorded
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.tracking.smoothing import path
 from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path
+from posefit.tracking.smoothing.smooth import steadied
 
 EYE = np.array([0.0, 1.0, 6.0])
 
@@ -86,6 +88,20 @@ def test_a_track_that_shakes_becomes_smooth_and_its_feet_stand() -> None:
     assert off < 0.6 * was
     others = np.setdiff1d(np.arange(66), path.LEGS)
     np.testing.assert_array_equal(smooth.poses[:, others], estimate.poses[:, others])
+
+
+def test_angles_that_one_camera_sees_are_filtered_over_a_thirtieth_of_a_second() -> None:
+    motion = walk()
+    poses, eyes = np.zeros((40, 66)), np.full((40, 3), np.nan)
+    poses[10, 5] = poses[30, 5] = 1.0
+    poses[:, 0] = [np.pi - 0.01, 0.01 - np.pi] * 20  # to either side of half a turn
+    eyes[:20] = EYE
+    for fps in (30.0, 60.0):
+        steady = steadied(Motion("", motion.skeleton, poses, np.zeros((40, 3)), fps), Visibility(eyes[:, 0] > 1, eyes))
+        weights = np.exp(-0.5 * (np.arange(-9, 10) * 30.0 / fps) ** 2)
+        np.testing.assert_allclose(steady.poses[8:13, 5], (weights / weights.sum())[7:12], atol=2e-4)
+        np.testing.assert_array_equal(steady.poses[20:], poses[20:])  # several cameras see it
+        np.testing.assert_allclose(np.abs(wrapped(steady.poses[:, 0])), np.pi, atol=0.011)
 
 
 def test_depth_counts_much_where_several_cameras_see_and_little_where_one_does() -> None:

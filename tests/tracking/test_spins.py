@@ -19,11 +19,11 @@ from posefit.tracking.outputs import Output
 from posefit.tracking.pipeline import follow
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
-    anchor_frame,
     facing_consensus,
     initial_guess,
     retrack_spins,
     spin_mask,
+    surest_ends,
 )
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
@@ -99,16 +99,27 @@ def test_a_frame_has_a_vote_for_each_camera_that_sees_the_person() -> None:
     assert all(agrees[:9])
     assert not any(agrees[9:])
     assert consensus(frames_facing([0.0] * 4), visible=False) == [False] * 4
-    assert anchor_frame(frames_facing([0.0] * 4), np.zeros(4, dtype=bool)) is None
 
 
-def test_the_anchor_is_of_the_longest_run_with_most_cameras_and_least_cost() -> None:
-    frames = [frame(0.0, cost) for cost in (0.1, 0.1, 9.0, 5.0, 2.0, 3.0, 0.1)]
-    agrees = np.array([True, False, True, True, True, True, True])
-    assert anchor_frame(frames, agrees) == 4
-    frames[5] = frame(0.0, 3.0, cameras=2)
-    assert anchor_frame(frames, agrees) == 5
-    assert anchor_frame(frames[:2], np.array([True, False])) == 0
+@each(
+    ("start", "stop", "ends"),
+    [
+        (0, 60, (0, 59)),  # all of the track
+        (0, 40, (0, 33)),
+        (20, 60, (33, 59)),
+        (30, 36, (32, 33)),
+        (40, 42, (40, 41)),
+    ],
+)
+def test_what_stays_lies_between_the_surest_frames_near_both_ends(start: int, stop: int, ends: tuple[int, int]) -> None:
+    costs = {4: 0.5, 32: 0.6, 33: 0.4, 57: 0.5}
+    frames = [frame(0.0, costs.get(k, 1.0)) for k in range(60)]
+    assert surest_ends(frames, start, stop, FPS) == ends
+
+
+def test_the_surest_frame_is_one_that_most_cameras_see() -> None:
+    frames = [frame(0.0, 9.0 if k in (5, 50) else 1.0, cameras=1 + (k in (5, 50))) for k in range(60)]
+    assert surest_ends(frames, 1, 59, FPS) == (5, 50)
 
 
 def posterior(offset: float) -> Posterior:
@@ -117,9 +128,9 @@ def posterior(offset: float) -> Posterior:
     return Posterior(poses, np.array([[offset, 0.0, 0.0], [-offset, 0.0, 0.0]]), np.ones(2), coherent=True)
 
 
-def test_a_track_that_spins_is_tracked_again_both_ways_from_the_anchor() -> None:
-    frames, calls = frames_facing(SPINNING), list[tuple[Task, list[int]]]()
-    frames[20] = frame(30.0, 0.5)
+def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spins() -> None:
+    degrees = [150.0] * 5 + [30.0] * 18 + [150.0] * 5
+    frames, calls = [frame(yaw, posterior=posterior(0.2)) for yaw in degrees], list[tuple[Task, list[int]]]()
 
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         rows = rows_of(observations)
@@ -127,40 +138,41 @@ def test_a_track_that_spins_is_tracked_again_both_ways_from_the_anchor() -> None
         for row in rows:
             yield frame(30.0 + 0.1 * row, posterior=posterior(0.2 if rows[-1] else -0.2))
 
-    retracked, start = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
-    assert start == 20
-    assert [np.degrees(f.pose[0]) for f in retracked] == pytest.approx([30.0 + 0.1 * k for k in range(28)])
+    retracked, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
+    assert stay == (8, 19)  # frames of a spin have no vote
+    new = [30.0 if 8 <= k <= 19 else 30.0 + 0.1 * k for k in range(28)]
+    assert [np.degrees(f.pose[0]) for f in retracked] == pytest.approx(new)
     (onward, ahead), (back, behind) = calls
-    assert (ahead, behind) == (list(range(20, 28)), list(range(20, -1, -1)))
+    assert (ahead, behind) == (list(range(19, 28)), list(range(8, -1, -1)))
     assert onward.fastest_turn == back.fastest_turn == MAX_TURN_RATE
     assert np.degrees(onward.yaw or 0.0) == pytest.approx(30.0)
     np.testing.assert_array_equal(back.training[0].poses, WALK.poses[::-1])
-    assert {f.evaluations for f in retracked} == {20}
-    # a trajectory goes on backwards as the nearest one: the first of these is the other's second
+    assert [f.evaluations for f in retracked] == [10 if 8 <= k <= 19 else 20 for k in range(28)]
+    # a trajectory goes on as the nearest one on either side: the first of these is the other's second
     places = [f.posterior.translations[0, 0] for f in retracked if f.posterior is not None]
     np.testing.assert_allclose(places, 0.2)
 
 
 @each(
-    ("degrees", "again", "cost", "evaluations"),
+    ("degrees", "again", "cost", "tried"),
     [
-        (SPINNING, SPINNING, 1.0, 20),  # it spins as often
-        (SPINNING, [30.0] * 28, 1.6, 20),  # it costs too much
-        ([30.0] * 28, None, 1.0, 10),  # there is no spin
+        (SPINNING, SPINNING, 1.0, True),  # it spins as often
+        (SPINNING, [30.0] * 28, 2.6, True),  # it costs too much
+        ([30.0] * 28, None, 1.0, False),  # there is no spin
     ],
 )
 def test_a_track_that_gets_no_better_is_kept(
-    degrees: list[float], again: list[float], cost: float, evaluations: int
+    degrees: list[float], again: list[float], cost: float, tried: bool
 ) -> None:
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         for row in rows_of(observations):
             yield frame(again[row], cost)
 
     frames = frames_facing(degrees)
-    kept, start = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
-    assert start is None
+    kept, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
+    assert stay is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
-    assert {f.evaluations for f in kept} == {evaluations}
+    assert [f.evaluations for f in kept] == [20 if tried and k < 11 else 10 for k in range(28)]
 
 
 def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_first_back_and_then_on() -> None:

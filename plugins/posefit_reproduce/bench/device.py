@@ -117,7 +117,6 @@ def _frame(problem: PoseProblem, device: str, particles: int, iterations: int) -
 
 
 def _memory() -> dict[str, Any]:
-    """Return the GPU's name and how much of its memory is in use."""
     from numba import cuda
 
     free, total = cuda.current_context().get_memory_info()

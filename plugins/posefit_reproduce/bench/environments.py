@@ -75,7 +75,6 @@ def _pair(name: str, arguments: dict[str, Any], threads: int = 1) -> dict[str, A
 
 
 def _steps(env: Any, count: int) -> Callable[[], None]:
-    """Return what makes so many random steps."""
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (count, *env.action_space.shape)).astype(np.float32)
 
     def job() -> None:

@@ -40,7 +40,6 @@ def optimiser_us(space: SearchSpace, names: Sequence[str] = ()) -> dict[str, flo
 
 
 def _ask_and_tell(space: SearchSpace, offer: Offer) -> float:
-    """Return the seconds of a proposal."""
     known = {setting.name for setting in offer.settings}
     carries = offer.next_frame == "carry"
     turns = POPULATIONS if "layers" not in known else POPULATIONS // 10  # populations, or a filter's frames

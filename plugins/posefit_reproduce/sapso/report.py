@@ -11,7 +11,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import JOINTS, angle_index
+from posefit.geometry.skeleton import turns_of
 from posefit.tracking.measures import BASELINES
 from posefit.tracking.restarts import RESTARTS
 from posefit.version import __version__
@@ -34,8 +34,7 @@ from posefit_reproduce.sapso.paper import (
 )
 
 # LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding
-_ANGLES = np.array([angle_index(JOINTS.index(bone)) for bone in ("lfemur", "rfemur", "ltibia", "rtibia")])
-_ANGLES = (_ANGLES[:, None] + np.arange(3)).ravel()
+_ANGLES = turns_of(("lfemur", "rfemur", "ltibia", "rtibia"))
 
 
 def paper_report(

@@ -106,7 +106,6 @@ def patent_text(figures: Mapping[str, Any]) -> str:
 
 
 def _table(corner: str, labels: Sequence[str], rows: Mapping[str, Sequence[str]]) -> str:
-    """Return rows of cells below a line of labels."""
     first = max(len(name) for name in (corner, *rows))
     widths = [max(len(label), 6) + 2 for label in labels]
     return "\n".join(

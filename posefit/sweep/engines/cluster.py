@@ -81,14 +81,19 @@ class Cluster:
         name = f"{cell.key}-{secrets.token_hex(4)}"
         future = self._client.submit(called, *arguments, key=name, workers=[worker], pure=False, retries=0)
         self._running[future] = _Sent(cell, worker)
-        future.add_done_callback(self._wake)
+        future.add_done_callback(lambda _: self._woken.set())
 
     def wait(self, seconds: float) -> list[Outcome]:
         """Return the cells that ended."""
         self._woken.wait(seconds if self._running else 0.0)
         self._woken.clear()
         if self._client.status != "running":
-            return self._lost()
+            lost = [
+                Outcome(sent.cell) for sent in self._running.values()
+            ]  # with the scheduler, once there is one again
+            self._running.clear()
+            self._connect()
+            return lost
         self._check_workers()
         outcomes = [self._outcome(future) for future in tuple(self._running)]
         return [outcome for outcome in outcomes if outcome is not None]
@@ -103,7 +108,6 @@ class Cluster:
             self._local.close(timeout=CONNECT_SECONDS)
 
     def _outcome(self, future: Any) -> Outcome | None:
-        """Return what became of a cell, if anything has."""
         sent = self._running[future]
         try:
             if future.status == "finished":
@@ -133,15 +137,7 @@ class Cluster:
             return Outcome(sent.cell, None, "its worker was lost", own=False)
         return Outcome(sent.cell, None, f"its worker could not run it: {text_of(error)}", own=False)
 
-    def _lost(self) -> list[Outcome]:
-        """Return all cells as lost with the scheduler, once there is one again."""
-        lost = [Outcome(sent.cell) for sent in self._running.values()]
-        self._running.clear()
-        self._connect()
-        return lost
-
     def _check_workers(self) -> None:
-        """Check which workers there are, once a second."""
         if time.monotonic() - self._checked < POLL_SECONDS:
             return
         try:
@@ -169,9 +165,6 @@ class Cluster:
                     cause = " ".join(str(error).split())
                     raise EngineError(f"scheduler must be one that answers, got {self._address}: {cause}") from None
                 time.sleep(min(POLL_SECONDS, self._patience))
-
-    def _wake(self, _: Any) -> None:
-        self._woken.set()
 
 
 def _local(distributed: Any, workers: int, dashboard: bool) -> Any:

@@ -153,7 +153,6 @@ class Children:
                 self._idle.pop().end()
 
     def _taken(self) -> Child:
-        """Return a process that has no job."""
         with self._lock:
             child = self._idle.pop() if self._idle else Child()
             while not child.usable:

@@ -120,7 +120,6 @@ def _verdict(summary: dict[str, Any]) -> str:
 
 
 def _facts(summary: dict[str, Any]) -> list[list[str]]:
-    """Return names and values of the track's method and scene."""
     return [
         *([] if summary["mpjpe_mm"] is None else [["MPJPE", f"{summary['mpjpe_mm']:.0f} mm"]]),
         ["method", str(summary["method"])],

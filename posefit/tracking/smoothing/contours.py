@@ -12,18 +12,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
+from posefit.arrays import Array, writeable
 from posefit.fitting.shape import NAMES, REACH, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.kernels import kinematics
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
+from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
 from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
-from posefit.silhouette.rasteriser import NEAR
 from posefit.tracking.smoothing import kernels
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
 
@@ -101,52 +101,19 @@ def _between(mask: Mask, around: Mask) -> Array:
     return np.column_stack([columns + 1.0, rows + 0.5])
 
 
-BONE_STARTS = np.array(PARENTS[1:])  # the joint that each bone starts from
-BODY_NUMBERS = 2 * len(JOINTS) + 2 * len(BONES)  # of a drawn body: pixels of joints, then radii of bones
-DIFFERENCE = 1e-4  # radians, metres, or of the logarithm of a factor: of a difference quotient
+DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
 
 
-def projected_body(body: Body, camera: Camera, joints: Array) -> Array:
-    """Return where joints (..., 27, 3) are in the picture, and how wide the bones' ends (..., 106), in pixels.
-
-    A joint that is nearer than 5 cm, or behind the camera, counts as that far.
-    """
-    points = joints @ camera.rotation.T + camera.translation
-    far = np.maximum(points[..., 2:], NEAR)
-    pixels = points[..., :2] / far * camera.focal + camera.centre
-    metres = np.sqrt(camera.focal.prod()) / far[..., 0]
-    radii = np.stack([metres[..., BONE_STARTS] * body.radii[:, 0], metres[..., 1:] * body.radii[:, 1]], axis=-1)
-    lead = joints.shape[:-2]
-    return np.concatenate([pixels.reshape(*lead, -1), radii.reshape(*lead, -1)], axis=-1)
+def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
+    """Return how joints (T, 17, 27, 3) and radii (17, 26, 2), metres, change with the logarithms of factors."""
+    bodies = [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
+    joints = [one.skeleton.joints(motion.poses, motion.translations) - motion.joints for one in bodies]
+    return np.stack(joints, axis=1) / DIFFERENCE, np.stack([one.radii - body.radii for one in bodies]) / DIFFERENCE
 
 
-def turned_joints(body: Body, poses: Array, places: Array, angles: Sequence[int]) -> Array:
-    """Return the joints (3 + angles, T, 27, 3) of poses (T, 66), of each an axis of the place or an angle off."""
-    count = 3 + len(angles)
-    turned, moved = np.repeat(poses[None], count, axis=0), np.repeat(places[None], count, axis=0)
-    for k in range(3):
-        moved[k, :, k] += DIFFERENCE
-    for k, angle in enumerate(angles, 3):
-        turned[k, :, angle] += DIFFERENCE
-    return body.skeleton.joints(turned, moved)
-
-
-def grown_bodies(body: Body, height: float | None) -> list[Body]:
-    """Return 17 bodies, of each of which the logarithm of a factor of the build is off by `DIFFERENCE`."""
-    return [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
-
-
-def jacobian(here: Array, there: Array) -> Array:
-    """Return how numbers (T, q) change (T, q, n) that are `there` (n, T, q) where each of n is off by `DIFFERENCE`."""
-    return np.ascontiguousarray(np.moveaxis(there - here, 0, 2)) / DIFFERENCE
-
-
-BORDER_DEVIATION = 0.01  # metres that a point of the border may be off: standard deviation, as all that follow
-PIXEL_DEVIATION = 0.5  # pixels, besides
-CORRELATION_LENGTH = 0.09  # metres of the border that are off together, so that they are one measurement
-ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)  # metres, step by step: what is
-MIN_ROBUST_SCALE = 3.0  # pixels           farther off counts less, and at last is another person's, or a bag's
-ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate
+# metres, step by step: what is farther off counts less, and at last is another person's, or a bag's
+ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
+ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
 MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
@@ -229,36 +196,24 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
     """Return a window one step of Gauss and Newton farther, towards the borders of all views."""
-    count, factors = len(part.fitted), len(part.factors)
-    angles = np.flatnonzero(part.fitted.skeleton.free).tolist()
-    numbers, joints = 3 + len(angles), 1 + len(BONE_STARTS)
-    curves, slopes = np.zeros((count, numbers, numbers)), np.zeros((count, numbers))
-    mixed, curve, slope = np.zeros((count, numbers, factors)), np.zeros((factors, factors)), np.zeros(factors)
-    poses, places = part.fitted.poses, part.fitted.translations
-    here, turned = part.fitted.joints, turned_joints(part.body, poses, places, angles)
-    bodies = grown_bodies(part.body, part.height) if factors else []
-    built = [body.skeleton.joints(poses, places) for body in bodies]
+    count, factors, skeleton = len(part.fitted), len(part.factors), part.fitted.skeleton
+    angles = np.flatnonzero(skeleton.free).tolist()
+    numbers, poses, places = 3 + len(angles), part.fitted.poses, part.fitted.translations
+    grown = np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2))
+    if factors:
+        grown = growth(part.body, part.height, part.fitted)
+    by_factors = np.zeros((1 + factors, 1 + factors))
+    bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
     for view in borders:
-        drawn = projected_body(part.body, view.camera, here)
-        centres, radii = drawn[:, : 2 * joints].reshape(count, -1, 2), drawn[:, 2 * joints :].reshape(count, -1, 2)
-        out = np.zeros((count, BODY_NUMBERS, BODY_NUMBERS)), np.zeros((count, BODY_NUMBERS))
-        scales = np.maximum(scale * view.metres, MIN_ROBUST_SCALE)
+        camera = tuple(writeable(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
         contours = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        drawn_body = BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii)
-        kernels.pull_to_borders(*drawn_body, *contours, scales, out)
-        deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / view.metres) ** 2
-        worth = 1.0 / (view.metres**3 * CORRELATION_LENGTH * deviation)
-        curvature, gradient = out[0] * worth[:, None, None], out[1] * worth[:, None]
-        ways = jacobian(drawn, projected_body(part.body, view.camera, turned))
-        across = ways.transpose(0, 2, 1)
-        curves += across @ (curvature @ ways)
-        slopes += (across @ gradient[..., None])[..., 0]
-        if factors:
-            each = zip(bodies, built, strict=True)
-            grown = jacobian(drawn, np.stack([projected_body(body, view.camera, joints) for body, joints in each]))
-            mixed += across @ (curvature @ grown)
-            curve += np.einsum("tqi,tqj->ij", grown, curvature @ grown)
-            slope += np.einsum("tqi,tq->i", grown, gradient)
+        moved = part.body.radii, camera, writeable(poses), writeable(places)
+        kernels.add_frames(kinematics(), *skeleton.chain, *moved, contours, scale, (*grown, by_factors), bones)
+    sums = np.empty((count, kernels.NUMBERS, kernels.NUMBERS)), np.empty((count, kernels.NUMBERS, 1 + factors))
+    kernels.add_all_bones(kinematics(), *skeleton.chain, writeable(poses), writeable(places), *bones, *sums)
+    slope, curve = by_factors[1:, 0], by_factors[1:, 1:]
+    free = [0, 1, 2, *(3 + angle for angle in angles)]
+    curves, slopes, mixed = sums[0][:, free][:, :, free], sums[1][:, free, 0], sums[1][:, free, 1:]
     fitted, estimate, turns, spread = part.fitted, part.estimate, np.zeros(factors), part.spread
     squares, some = Squares(count, numbers), slice(3, numbers)
     squares.add(slice(None), curves, slopes)

@@ -1,7 +1,8 @@
 """How far the border of a drawn body is from that of a mask, and what would bring them together, in numba.
 
-A drawn body is, in pixels, where its joints are and the two radii of each bone: J joints and B bones are
-2 J + 2 B numbers, all that its border hangs on. Shapes are checked by the callers.
+The border of a drawn body depends on two joints and two radii of each bone. What moves them is a twist: an angle
+turns everything beyond its joint. So the squares of a bone's distances are a 6 x 6 matrix over twists, and an angle
+meets the sum of those of the bones that it moves. Shapes are checked by the callers.
 """
 
 import math
@@ -9,7 +10,15 @@ import math
 import numpy as np
 
 from posefit.arrays import inlined, jit
+from posefit.geometry.kernels import Chain, place_frames
+from posefit.geometry.skeleton import ANGLES
+from posefit.silhouette.rasteriser import NEAR
 
+NUMBERS = 3 + ANGLES  # of a place and a pose
+BORDER_DEVIATION = 0.01  # metres that a point of the border may be off: standard deviation, as the next
+PIXEL_DEVIATION = 0.5  # pixels, besides
+CORRELATION_LENGTH = 0.09  # metres of the border that are off together, so that they are one measurement
+MIN_ROBUST_SCALE = 3.0  # pixels: what is farther off counts less
 CAP = 2  # points of a quarter, about, of the disc at a bone's end
 COVERED = 0.25  # pixels within another bone from which on a point of a bone's border is hidden
 TINY = 1e-9
@@ -181,28 +190,216 @@ def pull(parents, centres, radii, field, corner, size, points, step, scale, bloc
 
 
 @jit
-def pull_to_borders(parents, centres, radii, fields, corners, sizes, points, starts, step, scales, out):
-    """Add, frame by frame, half the second derivative and half the gradient of the squares of all distances, in pixels.
+def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forces):
+    """Add the squares of one view to those of the bones: curves (27, 6, 6) and forces (27, 6, 1 + F), over twists.
 
-    `centres` (T, J, 2) and `radii` (T, B, 2) are the drawn body; `fields` (T, h, w), `corners` and `sizes` (T, 2),
-    `points` (n, 2) and `starts` (T + 1,) are `MaskContours`, whose points stand for `step` pixels of the border each. A
-    distance counts by the pixels that it stands for, and the less the farther it is off, beyond `scales` (T,). `out`
-    is curves (T, 2 J + 2 B, 2 J + 2 B) and slopes (T, 2 J + 2 B).
+    The first force is half the gradient, the others are half the second derivatives by a twist and F factors of the
+    build. `frames` (27, 4, 3) are of the joints. `contour` is the field, its corner and size, the points (n, 2) and how
+    many pixels each stands for; a distance counts less beyond `reach` metres. `grown` is how joints (F, 27, 3) and
+    radii (F, 26, 2) change with factors, and a matrix (1 + F, 1 + F) to whose first column the gradient by these is
+    added, and to the rest the second derivatives.
     """
-    curves, slopes = out
-    joints, bones = centres.shape[1], parents.size
-    blocks, forces, columns = np.empty((bones, 6, 6)), np.empty((bones, 6)), np.empty(6, np.int64)
-    for k in range(centres.shape[0]):
-        if starts[k] == starts[k + 1]:
+    rotation, translation, focal, centre = camera
+    field, corner, size, points, step = contour
+    bones = parents.size
+    centres, depth, wide = np.empty((bones + 1, 2)), np.empty(bones + 1), np.empty((bones, 2))
+    moves = np.empty((bones + 1, 3, 3))  # of each joint: how its pixel and its size change with its place
+    for j in range(bones + 1):
+        x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
+        a = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
+        b = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
+        c = max(rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2], NEAR)
+        centres[j, 0], centres[j, 1] = a / c * focal[0] + centre[0], b / c * focal[1] + centre[1]
+        depth[j] = math.sqrt(focal[0] * focal[1]) / c
+        for i in range(3):
+            moves[j, 0, i] = focal[0] / c * (rotation[0, i] - a / c * rotation[2, i])
+            moves[j, 1, i] = focal[1] / c * (rotation[1, i] - b / c * rotation[2, i])
+            moves[j, 2, i] = -depth[j] / c * rotation[2, i]
+    metres = depth[0]  # pixels of one, where the root is
+    for b in range(bones):
+        wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
+    blocks, slopes = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
+    pull(
+        parents, centres, wide, field, corner, size, points, step, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes
+    )
+    deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
+    worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
+    rows, turned = np.empty((6, 6)), np.empty((6, 6))
+    for b in range(bones):
+        p = parents[b]
+        for k in range(6):  # how each of the six numbers changes with a twist: velocity, then rotation
+            j = p if k in (0, 1, 4) else b + 1
+            size = radii[b, 0] if k == 4 else radii[b, 1]
+            which = k % 2 if k < 4 else 2
+            factor = 1.0 if k < 4 else size
+            mx, my, mz = factor * moves[j, which, 0], factor * moves[j, which, 1], factor * moves[j, which, 2]
+            x, y, z = frames[j, 3, 0], frames[j, 3, 1], frames[j, 3, 2]
+            rows[k, 0], rows[k, 1], rows[k, 2] = mx, my, mz
+            rows[k, 3], rows[k, 4], rows[k, 5] = y * mz - z * my, z * mx - x * mz, x * my - y * mx
+        for i in range(6):
+            for j in range(6):
+                total = 0.0
+                for k in range(6):
+                    total += blocks[b, i, k] * rows[k, j]
+                turned[i, j] = total
+        for i in range(6):
+            total = 0.0
+            for k in range(6):
+                total += rows[k, i] * slopes[b, k]
+            forces[b + 1, i, 0] += worth * total
+            for j in range(6):
+                total = 0.0
+                for k in range(6):
+                    total += rows[k, i] * turned[k, j]
+                curves[b + 1, i, j] += worth * total
+        if len(grown[0]):
+            _add_growth(b, p, rows, depth, blocks[b], slopes[b], worth, grown, forces[b + 1])
+
+
+@jit
+def _add_growth(b, p, rows, depth, block, slope, worth, grown, forces):
+    """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
+    wider, larger, growth = grown
+    factors = len(wider)
+    changes, changed = np.zeros((6, 1 + factors)), np.zeros((6, 1 + factors))
+    for k in range(6):
+        j = p if k in (0, 1, 4) else b + 1
+        for f in range(factors):
+            for i in range(3):
+                changes[k, 1 + f] += rows[k, i] * wider[f, j, i]
+            if k > 3:
+                changes[k, 1 + f] += depth[j] * larger[f, b, k - 4]
+    for k in range(6):
+        changed[k, 0] = worth * slope[k]
+        for i in range(6):
+            for f in range(factors):
+                changed[k, 1 + f] += worth * block[k, i] * changes[i, 1 + f]
+    for k in range(6):
+        for f in range(1 + factors):
+            for g in range(1 + factors):
+                growth[f, g] += changes[k, f] * changed[k, g]
+            for i in range(6 if f else 0):
+                forces[i, f] += rows[k, i] * changed[k, f]
+
+
+@jit
+def write_screws(chain, frames, sines, cosines, screws):
+    """Write the twist (69, 6) of the place's axes, velocity then rotation, and of each angle."""
+    screws[:] = 0.0
+    root = frames[0, 3]
+    axes = np.empty((3, 3))
+    axes[0, 0], axes[0, 1], axes[0, 2] = 0.0, 1.0, 0.0
+    axes[1, 0], axes[1, 1], axes[1, 2] = cosines[0], 0.0, -sines[0]
+    axes[2, 0], axes[2, 1], axes[2, 2] = frames[0, 2, 0], frames[0, 2, 1], frames[0, 2, 2]
+    for k in range(3):
+        screws[k, k] = 1.0
+        _screw(screws[3 + k], axes[k], root)
+    for b in range(chain.parents.size):
+        a = chain.angles[b]
+        if a < 0:
             continue
-        blocks[:], forces[:] = 0.0, 0.0
-        mask = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step, scales[k]
-        pull(parents, centres[k], radii[k], *mask, blocks, forces)
-        for b in range(bones):
-            for i in range(2):
-                columns[i], columns[2 + i] = 2 * parents[b] + i, 2 * (b + 1) + i
-                columns[4 + i] = 2 * (joints + b) + i
+        pivot, frame = frames[chain.parents[b], 3], frames[b + 1]
+        for i in range(3):
+            u, v, w = frame[0, i], frame[1, i], frame[2, i]
+            axes[0, i] = u
+            axes[1, i] = v * cosines[a] - w * sines[a]
+            before = w * cosines[a] + v * sines[a]
+            axes[2, i] = before * cosines[a + 1] - u * sines[a + 1]
+        for k in range(3):
+            _screw(screws[3 + a + k], axes[k], pivot)
+
+
+@inlined
+def _screw(screw, axis, pivot):
+    screw[0] = pivot[1] * axis[2] - pivot[2] * axis[1]
+    screw[1] = pivot[2] * axis[0] - pivot[0] * axis[2]
+    screw[2] = pivot[0] * axis[1] - pivot[1] * axis[0]
+    screw[3], screw[4], screw[5] = axis[0], axis[1], axis[2]
+
+
+@jit
+def add_bones(chain, screws, curves, forces, matrix, slopes):
+    """Write the second derivatives (69, 69), their lower half, and the gradient and those by factors (69, 1 + F).
+
+    They are by a place and a pose, whose twists are `screws` (69, 6). `curves` and `forces` of bones are summed up.
+    """
+    parents = chain.parents
+    for b in range(parents.size - 1, -1, -1):
+        p = parents[b]
+        for i in range(6):
+            for j in range(6):
+                curves[p, i, j] += curves[b + 1, i, j]
+            for f in range(slopes.shape[1]):
+                forces[p, i, f] += forces[b + 1, i, f]
+    matrix[:], slopes[:] = 0.0, 0.0
+    force = np.empty(6)
+    for joint in range(parents.size + 1):
+        first, count = _numbers(chain, joint)
+        for a in range(first, first + count):
             for i in range(6):
-                slopes[k, columns[i]] += forces[b, i]
+                total = 0.0
                 for j in range(6):
-                    curves[k, columns[i], columns[j]] += blocks[b, i, j]
+                    total += curves[joint, i, j] * screws[a, j]
+                force[i] = total
+                for f in range(slopes.shape[1]):
+                    slopes[a, f] += screws[a, i] * forces[joint, i, f]
+            other = joint
+            while True:
+                start, many = _numbers(chain, other)
+                for c in range(start, min(start + many, a + 1)):
+                    total = 0.0
+                    for i in range(6):
+                        total += screws[c, i] * force[i]
+                    matrix[a, c] = total
+                if other == 0:
+                    break
+                other = parents[other - 1]
+
+
+@inlined
+def _numbers(chain, joint):
+    """Return the first of the numbers that turn or move a joint, and how many there are."""
+    if joint == 0:
+        return 0, 6
+    a = chain.angles[joint - 1]
+    return (3 + a, 3) if a >= 0 else (0, 0)
+
+
+@jit
+def add_frames(
+    kinematics, parents, angles, turns, turned, offsets, radii, camera, poses, places, contours, reach, grown, out
+):
+    """Add the squares of one view of T frames to those of the bones, see `add_view`.
+
+    The address of `place_lanes` and the fields of `Chain` come first. `contours` are the fields (T, h, w), corners and
+    sizes (T, 2), points and starts (T + 1,) of `MaskContours`, and the pixels that a point stands for; `grown` is as in
+    `add_view`, its joints (T, F, 27, 3). `out` is curves (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
+    """
+    chain = Chain(parents, angles, turns, turned, offsets)
+    fields, corners, sizes, points, starts, step = contours
+    wider, larger, growth = grown
+    curves, forces = out
+    frames, sines, cosines = np.empty((parents.size + 1, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
+    for k in range(len(poses)):
+        if starts[k] < starts[k + 1]:
+            place_frames(kinematics, chain, poses[k : k + 1], places[k : k + 1], sines, cosines, frames)
+            contour = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step
+            add_view(parents, radii, camera, frames, contour, reach, (wider[k], larger, growth), curves[k], forces[k])
+
+
+@jit
+def add_all_bones(kinematics, parents, angles, turns, turned, offsets, poses, places, curves, forces, matrices, slopes):
+    """Write `add_bones` of T frames, after the address and the fields as in `add_frames`.
+
+    They go to matrices (T, 69, 69) and slopes (T, 69, 1 + F).
+    """
+    chain = Chain(parents, angles, turns, turned, offsets)
+    frames, sines, cosines = np.empty((parents.size + 1, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
+    screws = np.empty((NUMBERS, 6))
+    for k in range(len(poses)):
+        place_frames(kinematics, chain, poses[k : k + 1], places[k : k + 1], sines, cosines, frames)
+        write_screws(chain, frames, sines, cosines, screws)
+        add_bones(chain, screws, curves[k], forces[k], matrices[k], slopes[k])
+        for a in range(NUMBERS):
+            for c in range(a):
+                matrices[k, c, a] = matrices[k, a, c]

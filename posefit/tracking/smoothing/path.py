@@ -14,7 +14,7 @@ from scipy.linalg import solveh_banded
 
 from posefit.arrays import Array
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS, angle_index
+from posefit.geometry.skeleton import turns_of
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, runs
 from posefit.silhouette.cost import only_camera
@@ -140,8 +140,8 @@ GAUSS_NEWTON_STEPS = 4  # of Gauss and Newton
 DIFFERENCE = 1e-4  # radians: of a difference quotient
 WINDOW_FRAMES, OVERLAP_FRAMES = 900, 60  # frames that are solved for at once, and those that two windows share
 
-_LEG_JOINTS = [JOINTS.index(side + bone) for side in "lr" for bone in ("femur", "tibia", "foot")]
-LEGS = tuple(angle_index(joint) + axis for joint in _LEG_JOINTS for axis in range(3))  # the angles of both
+# the angles of both
+LEGS = tuple(turns_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
 
 
 @dataclass(frozen=True, eq=False)

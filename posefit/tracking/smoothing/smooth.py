@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task
@@ -25,6 +26,7 @@ from posefit.tracking.trajectory import mean_cost, motion_of, with_total_effort
 
 # metres, on each axis, that a joint may be off the root because a fitted build is: seeds 3 to 5 of composites.py
 BUILD_DEVIATION = 0.008
+STEADY_SECONDS = 1.0 / 30.0  # standard deviation of the filter of angles that a single camera sees
 PASS_TOLERANCE = 1.125  # times what the pass before costs: a pass that costs more is not kept
 
 
@@ -67,7 +69,7 @@ def smoothed(scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: f
     Costs and areas are those of the smoothed frames, and their posteriors move as far as the pose and the root did.
     """
     visibility = Visibility.of(scene)
-    motion = smooth_path(motion_of(scene, frames), visibility)
+    motion = smooth_path(steadied(motion_of(scene, frames), visibility), visibility)
     motion, shape = fit_contours(scene, motion, visibility, shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
     scene = scene if shape is None else replace(scene, body=shape.body)
@@ -75,6 +77,15 @@ def smoothed(scene: Scene, frames: Sequence[Frame], shape: Shape | None, beta: f
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smooth, visibility.usable))
     return Pass(scene, smooth, shape, number)
+
+
+def steadied(motion: Motion, visibility: Visibility) -> Motion:
+    """Return a motion whose angles are filtered over time, by a Gaussian, in the frames that a single camera sees.
+
+    Its silhouettes leave most open, and angles shake from one frame to the next.
+    """
+    angles = gaussian_filter1d(np.unwrap(motion.poses, axis=0), STEADY_SECONDS * motion.fps, axis=0, mode="nearest")
+    return replace(motion, poses=np.where(np.isfinite(visibility.eyes[:, :1]), angles, motion.poses))
 
 
 def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float, fitted: bool) -> Frame:
