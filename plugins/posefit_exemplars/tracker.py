@@ -53,7 +53,7 @@ WIDTH = 400  # states of a beam
 FULL = 0.6  # share of the beam's evaluations that is for full-size costs of states
 FITTED = 0.8  # share of the budget that is for fitting hypotheses
 AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere,
-SEARCHES = 10.0  # so many times a second, and after frames that show too little
+SEARCHES = 10.0  # so many times a second
 GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated; in the first frame more
 FIRST_GROUPS = 200
 OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a search everywhere
@@ -175,12 +175,11 @@ class ExemplarTracker:
             sampler = Sampler(self.samples, self.power, rng.spawn(1)[0])
         else:
             delay -= self.hypotheses.delay
-        every, missed = max(round(self.task.fps / SEARCHES), 1), False
+        every = max(round(self.task.fps / SEARCHES), 1)
         for number, observation in enumerate(observations):
             start, cpu_start = time.perf_counter(), time.process_time()
             look = FrameCosts(self.task, observation)
-            latest, used = self._evaluated(look, latest, missed or number % every == 0, rng)
-            missed = not look.usable
+            latest, used = self._evaluated(look, latest, number % every == 0, rng)
             seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
             waiting.append(_PendingFrame(latest, look, used, seconds, cpu_seconds))
             if len(waiting) > delay:
