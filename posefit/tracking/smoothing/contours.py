@@ -107,7 +107,8 @@ DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
 def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
     """Return how joints (T, 17, 27, 3) and radii (17, 26, 2), metres, change with the logarithms of factors."""
     bodies = [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
-    joints = [one.skeleton.joints(motion.poses, motion.translations) - motion.joints for one in bodies]
+    here = motion.joints
+    joints = [one.skeleton.joints(motion.poses, motion.translations) - here for one in bodies]
     return np.stack(joints, axis=1) / DIFFERENCE, np.stack([one.radii - body.radii for one in bodies]) / DIFFERENCE
 
 
