@@ -66,16 +66,16 @@ def subject(seed: int) -> Body:
 def builds_lines(workers: int | None) -> Iterator[str]:
     """Yield by how many percent stature and limbs are off, after the fit and before it, for every setup."""
     keys = list(product(SETUPS, range(SUBJECTS)))
-    found = each({(one.label, k): partial(_found, one, k) for one, k in keys}, workers, bar)
+    figures_of = each({(one.label, k): partial(_percent_off, one, k) for one, k in keys}, workers, bar)
     for one in SETUPS:
-        pairs = np.array([found[one.label, k] for k in range(SUBJECTS)])  # (subjects, 2, parts)
+        pairs = np.array([figures_of[one.label, k] for k in range(SUBJECTS)])  # (subjects, 2, parts)
         for k, label in enumerate(("fitted", "average")):
             parts = zip(PARTS, pairs[:, k].mean(axis=0), pairs[:, k].max(axis=0), strict=True)
             figures = [f"{part} {mean:.1f} (at most {most:.1f})" for part, mean, most in parts]
             yield f"{one.label:22} {label:8} % off: {', '.join(figures)}"
 
 
-def _found(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
+def _percent_off(setup: Setup, seed: int) -> tuple[list[float], list[float]]:
     """Return by how many percent a subject's parts are off after the fit, and as they were taken to be before it."""
     options, average, true = TrackOptions(method="@loose"), Body.of(built_in.average_skeleton()), subject(seed)
     walk = replace(built_in.motion(MOTION), skeleton=true.skeleton)

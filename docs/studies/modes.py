@@ -53,8 +53,8 @@ def _rows(number: int) -> list[dict[str, Any]]:
     for k, method in enumerate(METHODS):
         score = scored(posed, reported(posed, *method, np.random.default_rng([SALT, number, k])))
         ratios = [score.peak_ratio[level] for level in LEVELS_MM]
-        told = {"brier": score.brier, "log_score": score.log_score, "reported": score.reported}
-        rows.append({"kind": posed.kind, "peak_ratio": ratios, **told})
+        scores = {"brier": score.brier, "log_score": score.log_score, "reported": score.reported}
+        rows.append({"kind": posed.kind, "peak_ratio": ratios, **scores})
     return rows
 
 
@@ -125,10 +125,10 @@ def _cells(name: str, count: int, rows: Sequence[dict[str, Any]]) -> list[str]:
 def modes_lines(instances: int, workers: int | None) -> Iterator[str]:
     """Yield the table of what every method reaches on so many instances."""
     # the methods of an instance are one job: to make the instance takes longer than most searches
-    found = each({FIRST + k: partial(_rows, FIRST + k) for k in range(instances)}, workers, bar)
+    of_instances = each({FIRST + k: partial(_rows, FIRST + k) for k in range(instances)}, workers, bar)
     levels = [f"peak ratio at {level:g} mm" for level in LEVELS_MM]
     heads = ["method", *levels, "95 % interval", *KINDS, "Brier score", "log score", "reported"]
-    rows = zip(*found.values(), strict=True)
+    rows = zip(*of_instances.values(), strict=True)
     yield from markdown(heads, [_cells(*method, mine) for method, mine in zip(METHODS, rows, strict=True)])
 
 

@@ -66,8 +66,8 @@ def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
         spec, trace = row["spec"], row["trace"]
         if not trace["evaluations"]:
             continue
-        seen = spec["motion"], "view", *views(spec), *damage(spec)
-        conditions = *seen, "frames", spec["frames"], spec["translation"]
+        footage = spec["motion"], "view", *views(spec), *damage(spec)
+        conditions = *footage, "frames", spec["frames"], spec["translation"]
         more = {name: spec[name] for name in ("evaluations", "hypotheses", "version")}
         yield LoggedRun(
             spec["method"],

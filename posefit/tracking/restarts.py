@@ -263,6 +263,8 @@ def retrack_spins(
 
     def again(number: int, steady: Task, rows: range) -> list[Frame]:
         """Return the frames after the first of some rows, followed from there."""
+        if len(rows) == 1:
+            return []
         begun = replace(after(steady, frames[rows[0]]), before=())
         followed = list(follow(begun, (observations[k] for k in rows), stream(seed, "spin", number)))
         return joined(task.body.skeleton, followed, frames[rows[0]])[1:]

@@ -164,14 +164,18 @@ def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spi
 def test_a_track_that_gets_no_better_is_kept(
     degrees: list[float], again: list[float], cost: float, tried: bool
 ) -> None:
+    calls = list[list[int]]()
+
     def follow(task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        for row in rows_of(observations):
+        calls.append(rows_of(observations))
+        for row in calls[-1]:
             yield frame(again[row], cost)
 
     frames = frames_facing(degrees)
     kept, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
     assert stay is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
+    assert calls == ([list(range(11, -1, -1))] if tried else [])  # nothing comes after what stays
     assert [f.evaluations for f in kept] == [20 if tried and k < 11 else 10 for k in range(28)]
 
 
