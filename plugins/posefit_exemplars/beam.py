@@ -124,12 +124,10 @@ def next_states(
     its distance d from where the clip leads costs log(1 + d^2 / 2 / pace^2): a person may be faster than all clips.
     """
     ahead = Continuations.of(exemplars, beam, seconds, steps, root)
-    centres = exemplars.codes[exemplars.centres]
-    near = min(NEAR_GROUPS, len(centres))
-    groups = np.argpartition(squared_distances(ahead.codes[OWN], centres), near - 1, axis=1)[:, :near]
+    groups, tiles = exemplars.near_groups(ahead.codes[OWN], NEAR_GROUPS), exemplars.tiles
     limit, scale = beam.totals.min() + steps.jump + MAX_EXCESS_COST, 1.0 / (2.0 * steps.spread**2)
-    poses = exemplars.grouped, exemplars.bounds, scale, limit
-    least, owners, touched = np.full(len(exemplars), np.inf), *np.empty((2, len(exemplars)), dtype=np.int64)
+    poses = tiles.codes, tiles.bounds, scale, limit
+    least, owners, touched = np.full(len(tiles.states), np.inf), *np.empty((2, len(tiles.states)), dtype=np.int64)
     bins = bins_of(ahead.yaws)
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
@@ -140,7 +138,7 @@ def next_states(
         if count > most // FACINGS:
             best = np.argpartition(total, most // FACINGS)[: most // FACINGS]
             reached, total = reached[best], total[best]
-        by_bin.append((exemplars.members[reached], owners[reached], total))
+        by_bin.append((tiles.states[reached], owners[reached], total))
     states, parents, totals = (np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True))
     turns = np.repeat([0.0, -TURN, TURN], len(states) // 3)
     totals = totals + 0.5 * (turns / steps.turning) ** 2

@@ -12,6 +12,8 @@ from posefit.geometry.kernels import Chain, place_frames
 from posefit.geometry.skeleton import ANGLES
 from posefit.tracking.smoothing.kernels import NUMBERS, add_bones, add_view, write_screws
 
+RIGID = 1e9  # precision of an angle that the person has not
+
 
 @jit
 def _solve(matrix, vector):
@@ -91,6 +93,7 @@ def fit_poses(
                     contour = fields[v], corners[v], sizes[v], points[starts[v] : starts[v + 1]], steps[v]
                     add_view(chain.parents, radii, camera, frames, contour, reach, grown, curves, forces)
             write_screws(chain, frames, sines, cosines, screws)
+            screws[precisions >= RIGID] = 0.0
             add_bones(chain, screws, curves, forces, matrix, slopes)
             for a in range(NUMBERS):
                 off = places[n, a] - start[a] if a < 3 else poses[n, a - 3] - means[n, a - 3]

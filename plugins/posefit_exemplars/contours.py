@@ -17,7 +17,6 @@ from posefit_exemplars import contour_kernels
 
 SPACING = 0.04  # metres, about, between two points of a mask's border
 MAX_TURN = np.radians(20.0)  # of an angle in a step
-RIGID = 1e9  # precision of an angle that the person has not
 SHARE = 27.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures
 
 
@@ -63,7 +62,7 @@ class FrameContours:
         and the place to where it was, with `precisions` (69,): of the place, then of the angles.
         """
         free = task.body.skeleton.free
-        precisions = np.where(np.append([True] * 3, free), precisions, RIGID)
+        precisions = np.where(np.append([True] * 3, free), precisions, contour_kernels.RIGID)
         moved, places = poses.copy(), places.copy()
         contour_kernels.fit_poses(
             kinematics(),

@@ -24,7 +24,6 @@ from posefit_exemplars import kernels
 Codes = NDArray[np.float32]  # (n, D): two of them are as far apart as the joints of their poses, root mean square
 Rows = NDArray[np.int64]
 
-DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
 SAME = 0.02  # metres between the codes of poses that need not both be kept
 
 
@@ -45,7 +44,7 @@ class Coding:
             count, total, squares = count + len(joints), total + joints.sum(axis=0), squares + joints.T @ joints
         mean = total / count
         _, axes = np.linalg.eigh(squares - count * np.outer(mean, mean))
-        return cls(skeleton, mean, axes[:, : -DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)))
+        return cls(skeleton, mean, axes[:, : -kernels.DIMENSIONS - 1 : -1] / np.sqrt(len(JOINTS)))
 
     def coded(self, poses: Array) -> Codes:
         """Return the codes (K, D) of poses (K, 66)."""
@@ -93,6 +92,35 @@ NEAR_CENTRES = 4  # groups among whose poses the nearest ones are looked for
 
 
 @dataclass(frozen=True, eq=False)
+class Tiles:
+    """Codes in groups, as loops over many of them want them: tiles of so many side by side, the last of a group filled
+    up with codes that are infinitely far away."""
+
+    codes: Codes  # (T, D, TILE)
+    states: Rows  # (T TILE,) whose codes they are
+    bounds: Rows  # (G + 1,) where each group begins
+
+    @classmethod
+    def of(cls, codes: Codes, members: Rows, bounds: Rows) -> Self:
+        """Return the tiles of the codes of `members` (K,), in groups that begin at `bounds` (G + 1,)."""
+        sizes, size = np.diff(bounds), kernels.TILE
+        tiles = np.append(0, np.cumsum(-(-sizes // size)))
+        places = np.arange(len(members)) + np.repeat(size * tiles[:-1] - bounds[:-1], sizes)
+        states, filled = np.zeros(size * tiles[-1], np.int64), np.full((size * tiles[-1], codes.shape[1]), np.inf, codes.dtype)
+        states[places], filled[places] = members, codes[members]
+        return cls(np.ascontiguousarray(filled.reshape(-1, size, codes.shape[1]).transpose(0, 2, 1)), states, tiles)
+
+    def nearest(self, codes: Codes, groups: Rows, count: int) -> tuple[Rows, Codes]:
+        """Return the states nearest to codes (n, D) in `groups` (n, g), and squared distances, (n, count) both.
+
+        The nearest comes first; where groups have fewer states, distances are infinite.
+        """
+        squares, places = np.empty((len(codes), count), np.float32), np.empty((len(codes), count), np.int64)
+        kernels.nearest_codes(codes, groups, self.codes, self.bounds, squares, places)
+        return self.states[places], squares
+
+
+@dataclass(frozen=True, eq=False)
 class Exemplars:
     """Poses (K, 66) in the order of their clips. A pose's yaw is free; its pitch and roll are the clip's."""
 
@@ -107,7 +135,8 @@ class Exemplars:
     members: Rows = field(repr=False)  # (K,) all poses, group by group
     bounds: Rows = field(repr=False)  # (G + 1,) where each group begins in `members`
     owners: Rows = field(repr=False)  # (K,) the group of each pose
-    grouped: Codes = field(repr=False)  # (D, K) codes, group by group
+    tiles: "Tiles" = field(repr=False)  # of the codes, group by group
+    centre_tiles: "Tiles" = field(repr=False)  # of the centres', as one group
     kinds: Rows = field(repr=False)  # (K,) which of a few poses that are as unlike as can be each is nearest to
     coding: Coding = field(repr=False)
 
@@ -145,7 +174,8 @@ class Exemplars:
         bounds = np.searchsorted(owners[members], np.arange(len(centres) + 1))
         lasts = np.searchsorted(clips, np.arange(len(thinned)), "right") - 1
         frames = poses, codes, (codes**2).sum(axis=1), paths, times, clips, lasts
-        return cls(*frames, centres, members, bounds, owners, np.ascontiguousarray(codes[members].T), kinds, coding)
+        tiles = Tiles.of(codes, members, bounds), Tiles.of(codes, centres, np.array([0, len(centres)]))
+        return cls(*frames, centres, members, bounds, owners, *tiles, kinds, coding)
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -190,26 +220,30 @@ class Exemplars:
         """Return the poses of a group."""
         return self.members[self.bounds[group] : self.bounds[group + 1]]
 
-    def similar(self, poses: Array, count: int, spread: float) -> tuple[Array, Array]:
-        """Return the mean (n, 66) of up to `count` poses of clips nearest to each of `poses`, whose yaw it has.
+    def nearest(self, poses: Array, count: int) -> tuple[Rows, Codes]:
+        """Return the states nearest to `poses` (n, 66) and their squared distances, both (n, count), nearest first.
 
-        And the squared distance (n,) of the nearest one. Weights fall with squared distances, over the `spread`. Only
-        the groups whose centres are nearest are looked at.
+        Only the groups whose centres are nearest are looked at; where they have fewer poses, distances are infinite.
         """
-        codes, means, squares = self.coding.coded(poses), poses.copy(), np.empty(len(poses))
-        near = min(NEAR_CENTRES, len(self.centres))
-        away = self.squares[self.centres] - 2.0 * (codes @ self.codes[self.centres].T)
-        groups = np.argpartition(away, near - 1, axis=1)[:, :near]
-        for k, code in enumerate(codes):
-            rows = np.concatenate([self.group_members(group) for group in groups[k]])
-            apart = ((self.codes[rows] - code) ** 2).sum(axis=1)
-            best = np.argpartition(apart, min(count, len(rows)) - 1)[:count]
-            squares[k] = apart[best].min()
-            shares = np.exp(-0.5 * (apart[best] - squares[k]) / spread**2)
-            off = wrapped(self.poses[rows[best]] - poses[k])
-            off[:, 0] = 0.0
-            means[k] += shares @ off / shares.sum()
-        return means, squares
+        codes = self.coding.coded(poses)
+        return self.tiles.nearest(codes, self.near_groups(codes, NEAR_CENTRES), count)
+
+    def near_groups(self, codes: Codes, count: int) -> Rows:
+        """Return the groups (n, count) whose centres are nearest to some codes (n, D), or all of fewer."""
+        count = min(count, len(self.centres))
+        rows, _ = self.centre_tiles.nearest(codes, np.zeros((len(codes), 1), np.int64), count)
+        return self.owners[rows]
+
+    def similar(self, poses: Array, count: int, spread: float) -> Array:
+        """Return the mean (n, 66) of the `count` poses of clips nearest to each of `poses`, whose yaw it has.
+
+        Weights fall with squared distances, over the `spread`.
+        """
+        states, squares = self.nearest(poses, count)
+        shares = np.exp(-0.5 * (squares - squares[:, :1]) / spread**2)
+        off = wrapped(self.poses[states] - poses[:, None])
+        off[:, :, 0] = 0.0
+        return np.asarray(poses + np.einsum("nk,nka->na", shares, off) / shares.sum(axis=1, keepdims=True))
 
     def turned(self, states: Rows, yaws: Array) -> Array:
         """Return copies of the poses (n, 66) of some states, turned to yaws (n,)."""

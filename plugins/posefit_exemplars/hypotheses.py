@@ -212,7 +212,7 @@ class HypothesisFilter:
         hypotheses = Hypotheses(poses, places, joints, turns, shifts, rates, exchanged, origins, np.zeros(len(poses)))
         fits, steps = landmarks.min(axis=0), None
         if look.usable:
-            _, squares = self._exemplars.similar(poses, 1, SIMILAR)
+            squares = self._exemplars.nearest(poses, 1)[1][:, 0]
             costs = look.full(poses, places)
             self._costs.append(float(costs.min()))
             fits += costs / (noise * self._temperature)
@@ -261,7 +261,7 @@ class HypothesisFilter:
         """Return what poses (n, 66) are pulled to, between themselves and similar poses of clips, and how (69,)."""
         pulls = precisions(LIBRARY_TURN / noise, np.inf)
         pulls[3] = 0.0  # the yaws of clips are free
-        similar, _ = self._exemplars.similar(poses, SIMILAR_POSES, SIMILAR)
+        similar = self._exemplars.similar(poses, SIMILAR_POSES, SIMILAR)
         both = weights + pulls
         return poses + (pulls / both)[3:] * (similar - poses), both
 

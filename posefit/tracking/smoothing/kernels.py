@@ -321,7 +321,8 @@ def _screw(screw, axis, pivot):
 def add_bones(chain, screws, curves, forces, matrix, slopes):
     """Write the second derivatives (69, 69), their lower half, and the gradient and those by factors (69, 1 + F).
 
-    They are by a place and a pose, whose twists are `screws` (69, 6). `curves` and `forces` of bones are summed up.
+    They are by a place and a pose, whose twists are `screws` (69, 6), 0 for what stays as it is. `curves` and `forces`
+    of bones are summed up.
     """
     parents = chain.parents
     for b in range(parents.size - 1, -1, -1):
@@ -336,6 +337,8 @@ def add_bones(chain, screws, curves, forces, matrix, slopes):
     for joint in range(parents.size + 1):
         first, count = _numbers(chain, joint)
         for a in range(first, first + count):
+            if not screws[a].any():
+                continue
             for i in range(6):
                 total = 0.0
                 for j in range(6):
