@@ -93,8 +93,10 @@ NEAR_CENTRES = 4  # groups among whose poses the nearest ones are looked for
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """Codes in groups, as loops over many of them want them: tiles of so many side by side, the last of a group filled
-    up with codes that are infinitely far away."""
+    """Codes in groups, so many side by side, as loops over many of them want them.
+
+    The last tile of a group is filled up with codes that are infinitely far away.
+    """
 
     codes: Codes  # (T, D, TILE)
     states: Rows  # (T TILE,) whose codes they are
@@ -106,7 +108,10 @@ class Tiles:
         sizes, size = np.diff(bounds), kernels.TILE
         tiles = np.append(0, np.cumsum(-(-sizes // size)))
         places = np.arange(len(members)) + np.repeat(size * tiles[:-1] - bounds[:-1], sizes)
-        states, filled = np.zeros(size * tiles[-1], np.int64), np.full((size * tiles[-1], codes.shape[1]), np.inf, codes.dtype)
+        states, filled = (
+            np.zeros(size * tiles[-1], np.int64),
+            np.full((size * tiles[-1], codes.shape[1]), np.inf, codes.dtype),
+        )
         states[places], filled[places] = members, codes[members]
         return cls(np.ascontiguousarray(filled.reshape(-1, size, codes.shape[1]).transpose(0, 2, 1)), states, tiles)
 

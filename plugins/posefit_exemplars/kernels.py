@@ -34,9 +34,7 @@ def _lower_compiled(least, start, code, tile):  # noqa: ARG001
 def _build_lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Write `lower` as instructions for a whole tile at once."""
     vector, index = ir.VectorType(ir.FloatType(), TILE), ir.IntType(64)
-    least, code, tile = (
-        context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 2, 3)
-    )
+    least, code, tile = (context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 2, 3))
 
     def in_all(value: Any) -> Any:
         lane = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.IntType(32)(0))

@@ -9,16 +9,17 @@ from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.exemplars import (
-    DIMENSIONS,
     SAME,
     Coding,
     Exemplars,
+    Tiles,
     about_vertical,
     exemplars_of,
     facing_joints,
     mirror_image,
     thinned_frames,
 )
+from posefit_exemplars.kernels import DIMENSIONS
 from tests.cases import each
 
 SKELETON = average_skeleton()
@@ -44,11 +45,25 @@ def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
 
 def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> None:
     assert sorted(two.members.tolist()) == list(range(len(two)))
-    np.testing.assert_array_equal(two.grouped.T, two.codes[two.members])
     away = np.linalg.norm(two.codes[:, None] - two.codes[two.centres], axis=-1)
     np.testing.assert_allclose(away[np.arange(len(two)), two.owners], away.min(axis=1), atol=1e-6)
     for group in range(len(two.centres)):
         assert (two.owners[two.group_members(group)] == group).all()
+
+
+def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
+    rng = np.random.default_rng(0)
+    codes = rng.normal(size=(200, DIMENSIONS)).astype(np.float32)
+    members, bounds = rng.permutation(200), np.array([0, 3, 100, 100, 200])  # one group is small, and one empty
+    tiles, some = Tiles.of(codes, members, bounds), codes[:5] + np.float32(0.1)
+    for groups, looked_at in (([1, 3], members[3:]), ([2, 0], members[:3])):
+        states, squares = tiles.nearest(some, np.tile(groups, (5, 1)), 4)
+        away = ((some[:, None] - codes[looked_at]) ** 2).sum(axis=2)
+        order = np.argsort(away, axis=1)[:, :4]
+        near = order.shape[1]
+        np.testing.assert_array_equal(states[:, :near], looked_at[order])
+        np.testing.assert_allclose(squares[:, :near], np.take_along_axis(away, order, axis=1), rtol=1e-5)
+        assert np.isinf(squares[:, near:]).all()
 
 
 @each("backwards", [False, True])
