@@ -17,6 +17,7 @@ import numpy as np
 
 from posefit import minimise
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.registry import registry
@@ -413,7 +414,7 @@ def agents_lines(rows: Sequence[Row]) -> Iterator[str]:
         yield ""
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
 @click.option("--quick", is_flag=True, help="Two trainings of 300 steps, four instances: a look, not a measurement.")
 @click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")

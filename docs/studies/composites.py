@@ -28,6 +28,7 @@ from composites_scene import (
 )
 from posefit import clinical_angles
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
@@ -324,7 +325,7 @@ def composites_lines(found: Sequence[Row]) -> Iterator[str]:
         yield f"MediaPipe's landmarks in the first camera, degrees off, medians: {', '.join(medians)}"
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.argument("video")
 @click.option("--situation", "situations", multiple=True, help="One alone, such as stands. Again for more.")
 @click.option("--views", type=int, multiple=True, help="Cameras, 1, 2 or 4. Again for more.")

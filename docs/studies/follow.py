@@ -11,6 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from clips import EVALUATIONS
+from posefit.cli.output import Command
 from posefit.fitting.tracker import Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.motion import recorded
@@ -89,7 +90,7 @@ def _peak_mb() -> float:
     return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.argument("frames", type=click.IntRange(1))
 def main(frames: int) -> None:
     """Print the figures; a thousand frames take one or two minutes."""

@@ -13,7 +13,6 @@ of the sets may be passed on, and none was at hand; HumanEva's calibrations are 
 
 import json
 import re
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +23,7 @@ import cv2
 import numpy as np
 
 from posefit.cli.options import EXTRACTION, FRAMES, JSON, options, track_flags
-from posefit.cli.output import progress, say
+from posefit.cli.output import Command, progress
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
@@ -210,7 +209,7 @@ def lines_of(name: str, film: dict[str, Any]) -> list[str]:
     return lines + [f"  {warning}" for warning in film["warnings"]]
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("films", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--activity", type=click.Choice(["walk", "run"]), help="What films show whose names do not say it.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all random numbers.")
@@ -240,32 +239,28 @@ def main(
     how = {"method": extraction.pop("extraction"), **extraction}
     view = {"height": height, "extraction": Extraction(**{name: how[name] for name in how if how[name] is not None})}
     rows: dict[str, Any] = {}
-    try:
-        recordings = [recording_of(film) for film in films]
-        for recording in recordings:
-            if recording.activity is None and activity is None:
-                raise InputError(f"--activity must be given for films that do not say it, such as {recording.film}")
-        motions = paper_motions(clips, FRAMES_OF_THE_PAPER)
-        with new_folder(out) as folder:
-            for recording in progress(iter(recordings), len(recordings), unit="film"):
-                shows = recording.activity or activity
-                scene, first = filmed_scene(recording, frames, **view)
-                estimates = estimates_of(scene, motions[shows].training, iterations, seed)
-                rows[recording.name] = {
-                    "activity": shows,
-                    "frames": [first, first + scene.count],
-                    "camera": scene.placing,
-                    "warnings": list(scene.warnings),
-                    "estimates": {name: figures_of(each, scene) for name, each in estimates.items()},
-                }
-                shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
-                for figure, each in (("figure-8", single), ("figure-10", estimates)):
-                    cv2.imwrite(str(folder / f"{figure}-{recording.name}.png"), picture(scene, each, shown, first))
-            report = {"seed": seed, "iterations": iterations, "films": rows}
-            (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    except InputError as mistake:
-        say(f"posefit: {mistake}")
-        sys.exit(2)
+    recordings = [recording_of(film) for film in films]
+    for recording in recordings:
+        if recording.activity is None and activity is None:
+            raise InputError(f"--activity must be given for films that do not say it, such as {recording.film}")
+    motions = paper_motions(clips, FRAMES_OF_THE_PAPER)
+    with new_folder(out) as folder:
+        for recording in progress(iter(recordings), len(recordings), unit="film"):
+            shows = recording.activity or activity
+            scene, first = filmed_scene(recording, frames, **view)
+            estimates = estimates_of(scene, motions[shows].training, iterations, seed)
+            rows[recording.name] = {
+                "activity": shows,
+                "frames": [first, first + scene.count],
+                "camera": scene.placing,
+                "warnings": list(scene.warnings),
+                "estimates": {name: figures_of(each, scene) for name, each in estimates.items()},
+            }
+            shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
+            for figure, each in (("figure-8", single), ("figure-10", estimates)):
+                cv2.imwrite(str(folder / f"{figure}-{recording.name}.png"), picture(scene, each, shown, first))
+        report = {"seed": seed, "iterations": iterations, "films": rows}
+        (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     if as_json:
         click.echo(json.dumps(report))
         return

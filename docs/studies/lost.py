@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from clips import FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
 from people import CHANGES
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
@@ -461,7 +462,7 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.option("--store", metavar="FILE.json", help="New file for the fitted models, for exemplars to read.")
 @click.option("--rows", metavar="FILE", help="Fit to rows of --out, without tracking.")
 @click.option("--out", metavar="FILE", help="New file for a row a track, in JSON.")

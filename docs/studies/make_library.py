@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation
 from posefit.geometry.skeleton import Skeleton
@@ -53,7 +54,7 @@ def kept_frames(skeleton: Skeleton, poses: Array, translations: Array) -> NDArra
     return np.array(rows)
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("root", metavar="CMU30_DIR", type=click.Path(path_type=Path))
 def main(root: Path) -> None:
     """Write recorded.npz beside this file. Raises ValueError where CMU30_DIR holds no subject."""

@@ -18,6 +18,7 @@ from sklearn.cluster import KMeans
 from sklearn.covariance import LedoitWolf
 
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, INNER, MIRROR, angle_index
@@ -201,7 +202,7 @@ def normalised_ridge(before: Array, after: Array, target: Array, weight: float) 
     return matrix + target, mean - matrix @ middle
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
 @click.option("--ridge-lambda", type=float, default=LAMBDA, show_default=True, help="Weight of |F|^2, above 0.")
 @click.option("--out", type=click.Path(path_type=Path), help="Another file than the package's models.json.")

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, MIRROR, Skeleton, angle_index
@@ -242,7 +243,7 @@ def grounded(model: dict[str, Any], skeleton: Skeleton) -> None:
     model["series"][1][0] = round(model["series"][1][0] + 0.03 - float(joints[..., 1].min()), DIGITS)
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("root", metavar="CMU_DIR", type=click.Path(path_type=Path), envvar="POSEFIT_CMU")
 def main(root: Path) -> None:
     """Write built_in.json beside this file. Raises ValueError where a file it needs is missing."""

@@ -19,6 +19,7 @@ from clips import GROUPS as CLIPS
 from clips import METHOD, PAIRS, SIDES, Clip, Views, cell_fields, track_of
 from people import CHANGES
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
@@ -576,7 +577,7 @@ def posterior_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         yield f"lost, by the cost of searches: {', '.join(f'{name} {value:.3g}' for name, value in searches.items())}"
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.option("--again", metavar="FILE", help="Tracks that --out wrote, instead of tracking.")
 @click.option("--out", metavar="FILE.npz", help="New file for the frames of all tracks.")
 @click.option("--store", metavar="FILE.json", help="New file for the calibration, for exemplars to read.")

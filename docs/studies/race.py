@@ -15,6 +15,7 @@ import numpy as np
 
 from agents import HELD_OUT, check_learners
 from posefit.arrays import Array
+from posefit.cli.output import Command
 from posefit.evolution.strategy import Strategy
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.policies import (
@@ -236,7 +237,7 @@ def _interval(drawn: Array, value: float) -> str:
     return f"{value:.2f} ({low:.2f} to {high:.2f})"
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.option("--agent", "names", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
 @click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
 @click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")

@@ -19,7 +19,7 @@ import click
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.cli.output import progress, say
+from posefit.cli.output import Command, progress, say
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import cores, swept
 from posefit.sweep.engines.engine import Limits
@@ -145,7 +145,7 @@ def field_text(row: Row, field: str) -> str:
     return f"{value:g}" if isinstance(value, int | float) else "-"
 
 
-@click.command(help=__doc__)
+@click.command(cls=Command, help=__doc__)
 @click.argument("plan", type=click.Path(exists=True, dir_okay=False))
 @click.option("--by", multiple=True, metavar="FIELD", help="A field of cells to group by. Again for more.")
 @click.option("--clips", envvar="POSEFIT_CMU", metavar="DIR", help="Folder of CMU clips that the plan's paths are in.")

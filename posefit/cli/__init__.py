@@ -8,7 +8,6 @@ import os
 import sys
 import threading
 from itertools import chain
-from typing import Any
 
 import click
 
@@ -16,14 +15,12 @@ from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.ambiguity import ambiguity
 from posefit.cli.group import Group
 from posefit.cli.motions import motions
-from posefit.cli.output import say
-from posefit.errors import InputError
+from posefit.cli.output import Command, say
 from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
 
 THREAD_SECONDS = 1.0  # that threads have to end after a command
-MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 GROUPS: dict[str, tuple[click.Command, ...]] = {
     "Follow a person": (tracking.track, tracking.fit, tracking.extract, ambiguity),
     "Compare methods": (sweeping.sweep, sweeping.report, suite.suite),
@@ -31,8 +28,8 @@ GROUPS: dict[str, tuple[click.Command, ...]] = {
 }
 
 
-class _Commands(Group):
-    """Has plugins' commands, too, and shows a user's mistakes in one line on stderr; other errors have a traceback."""
+class _Commands(Command, Group):
+    """Has plugins' commands, too."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
         """Return the names of all commands: those of plugins come last."""
@@ -48,18 +45,6 @@ class _Commands(Group):
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
         """Return a command; plugins are looked at for those alone that posefit does not have itself."""
         return self.commands.get(name) or _added().get(name)
-
-    def invoke(self, context: click.Context) -> Any:
-        """Run a command."""
-        try:
-            return super().invoke(context)
-        except (click.UsageError, InputError, OSError, ImportError) as error:
-            unnamed = isinstance(error, OSError) and error.filename is None  # a fault, no file that a user named
-            if unnamed or context.params.get("debug"):
-                raise
-            message = error.format_message() if isinstance(error, click.UsageError) else str(error)
-            say(f"posefit: {' '.join(message.split())}")
-            context.exit(MISTAKE)
 
 
 def _added() -> dict[str, click.Command]:

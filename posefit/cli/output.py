@@ -8,12 +8,30 @@ from typing import Any
 
 import click
 
-from posefit.errors import printable
+from posefit.errors import InputError, printable
+
+MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 
 
 def say(message: str) -> None:
     """Print a message on stderr."""
     click.echo("\n".join(map(printable, message.split("\n"))), err=True)
+
+
+class Command(click.Command):
+    """Shows a user's mistakes in one line on stderr; other errors have a traceback."""
+
+    def invoke(self, context: click.Context) -> Any:
+        """Run a command."""
+        try:
+            return super().invoke(context)
+        except (click.UsageError, InputError, OSError, ImportError) as error:
+            unnamed = isinstance(error, OSError) and error.filename is None  # a fault, no file that a user named
+            if unnamed or context.params.get("debug"):
+                raise
+            message = error.format_message() if isinstance(error, click.UsageError) else str(error)
+            say(f"posefit: {' '.join(message.split())}")
+            context.exit(MISTAKE)
 
 
 def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
