@@ -10,7 +10,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 from posefit.arrays import Array
 from posefit.footage.scene import Scene
@@ -67,6 +66,8 @@ class Squares:
 
     def steps_for(self, slopes: Array) -> Array:
         """Return the steps (T, n, m) that would be the least ones, were the slopes each of m others (T, n, m)."""
+        from scipy.linalg import solveh_banded
+
         _, count, numbers, _ = self.curves.shape
         band = (BAND_REACH + 1) * numbers
         lines = np.zeros((band, count * numbers))  # scipy's upper form: lines[band - 1 + row - column, column]

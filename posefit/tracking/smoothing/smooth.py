@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task
@@ -84,6 +83,8 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
 
     Its silhouettes leave most open, and angles shake from one frame to the next.
     """
+    from scipy.ndimage import gaussian_filter1d
+
     angles = gaussian_filter1d(np.unwrap(motion.poses, axis=0), STEADY_SECONDS * motion.fps, axis=0, mode="nearest")
     return replace(motion, poses=np.where(np.isfinite(visibility.eyes[:, :1]), angles, motion.poses))
 
