@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _METHOD_FIELDS = ("method", "settings", "evaluations", "hypotheses", "version")  # of a track's spec
 _NAMED_FIELDS = ("motion", "view_degrees", "corruption", "instance")  # that the name of a track's instance has
+NO_MODES: Array = np.zeros((BINS, 3), dtype=np.float32)
 _PROBLEM_FIELDS = ("function", "dimension", "instance", "suite")  # of a search's spec
 
 
@@ -83,7 +84,7 @@ class _Row(NamedTuple):
     seed: int  # of any size
     key: str
     warnings: tuple[str, ...]
-    figures: list[float]
+    figures: Array
     data: tuple[Any, ...]  # joint errors, modes and trace of a track; run and hits of a search
 
 
@@ -97,6 +98,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
     rows: list[_Row] = []
     kinds: set[bool] = set()
     places: dict[tuple[bytes, int], str] = {}  # by a spec without instance and seed, and the instance
+    grids: dict[bytes, Any] = {}  # evaluations of traces, one array for all that have the same
     heads: dict[bytes, tuple[str, str]] = {}  # method and head of a spec without instance and seed
     for row in chain(ledger.rows(), quarantined):
         spec = row["spec"]
@@ -108,7 +110,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
         fields = marshal.dumps({**spec, **dict.fromkeys(LAST_FIELDS)}, 2)
         if fields not in heads:
             heads[fields] = _text(_variant(spec)), "" if searches else command_head(spec)
-        figures, *data = _search_data(search_run(row)) if searches else _track_data(row)
+        figures, *data = _search_data(search_run(row)) if searches else _track_data(row, grids)
         place = fields, spec["instance"]
         if place not in places:
             places[place] = sys.intern(_text(_place(spec)))
@@ -119,12 +121,13 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
     return _sorted_runs(ledger.version, True in kinds, rows, quarantined, ledger.bad())
 
 
-def _track_data(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return the figures of a track, its joints' errors, its modes, and its trace."""
+def _track_data(row: Mapping[str, Any], grids: dict[bytes, Any]) -> tuple[Any, ...]:
+    """Return the figures of a track, its joints' errors, its modes, and its trace, whose evaluations many share."""
     joints = np.array(row["joint_errors_mm"], dtype=np.float32)
-    arrays = np.array(row["trace"]["evaluations"], np.float32), np.array(row["trace"]["cost"], np.float32)
-    figures = [column.value(row) for column in COLUMNS.values()]
-    return figures, joints, _binned(row["mode_reliability"]), arrays
+    evaluations = np.array(row["trace"]["evaluations"], np.float32)
+    trace = grids.setdefault(evaluations.tobytes(), evaluations), np.array(row["trace"]["cost"], np.float32)
+    figures = np.array([column.value(row) for column in COLUMNS.values()], np.float64)
+    return figures, joints, _binned(row["mode_reliability"]), trace
 
 
 def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
@@ -140,7 +143,7 @@ def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
 def _search_data(run: SuiteRun) -> tuple[Any, ...]:
     evaluations = hits((run.evaluations, run.costs), run.targets)
     reached = 100.0 * float(np.isfinite(evaluations).mean())
-    return [100.0 - reached, reached, run.cost - run.truth_cost], run, evaluations
+    return np.array([100.0 - reached, reached, run.cost - run.truth_cost]), run, evaluations
 
 
 def _sorted_runs(
@@ -196,6 +199,8 @@ def _sorted_runs(
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
     """Return a row's likeliest modes by bins (bins, 3) of probability: frames, sum of probabilities, frames right."""
+    if not modes:
+        return NO_MODES
     bins = np.zeros((BINS, 3), dtype=np.float32)
     for count, probability, right in modes:
         bins[min(int(probability * BINS), BINS - 1)] += count * np.array([1.0, probability, right])
