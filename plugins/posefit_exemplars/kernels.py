@@ -8,9 +8,10 @@ from numba import types
 from numba.extending import intrinsic, overload
 
 from posefit.arrays import jit
+from posefit.arrays.instructions import in_all_lanes
 
 DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
-TILE = 32  # codes side by side: four vector registers of AVX2, so that sums need not wait for each other
+TILE = 32  # codes side by side: four vector registers of AVX2, whose sums need not wait for each other
 
 
 def lower(least: Any, start: Any, code: Any, tile: Any) -> None:
@@ -36,16 +37,12 @@ def _build_lower(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     vector, index = ir.VectorType(ir.FloatType(), TILE), ir.IntType(64)
     least, code, tile = (context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 2, 3))
 
-    def in_all(value: Any) -> Any:
-        lane = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.IntType(32)(0))
-        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), TILE), [0] * TILE))
-
     def lanes(data: Any, at: int) -> Any:
         return builder.bitcast(builder.gep(data, [index(at)]), vector.as_pointer())
 
-    away = in_all(arguments[1])
+    away = in_all_lanes(builder, arguments[1], TILE)
     for d in range(DIMENSIONS):
-        middle = in_all(builder.load(builder.gep(code, [index(d)])))
+        middle = in_all_lanes(builder, builder.load(builder.gep(code, [index(d)])), TILE)
         step = builder.fsub(builder.load(lanes(tile, TILE * d), align=4), middle)
         away = builder.fadd(away, builder.fmul(step, step, flags=("contract",)), flags=("contract",))
     before = builder.load(lanes(least, 0), align=4)

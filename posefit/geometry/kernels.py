@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
 from posefit.arrays.calling import address_of, call
+from posefit.arrays.instructions import in_all_lanes
 
 LANES = 4  # poses side by side: one vector register of AVX2; with more, a call for one pose takes longer
 
@@ -119,10 +120,6 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
     def row(first: int, value: Any) -> Any:
         return builder.load(row_of(first, value), align=8)
 
-    def in_all_lanes(value: Any) -> Any:
-        lane = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.IntType(32)(0))
-        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
-
     product = partial(builder.fmul, flags=_FREEDOM)
     total = partial(builder.fadd, flags=_FREEDOM)
     difference = partial(builder.fsub, flags=_FREEDOM)
@@ -140,7 +137,7 @@ def _build_bone(context: Any, builder: Any, signature: Any, arguments: Any) -> A
 
     # a frame is nine vectors: the first coordinate of each axis, then the second, then the third
     def at_rest(frame: Sequence[Any]) -> list[Any]:
-        turn = [in_all_lanes(entry(turns, times(9, b), index(k))) for k in range(9)]
+        turn = [in_all_lanes(builder, entry(turns, times(9, b), index(k)), LANES) for k in range(9)]
         return [
             total(total(product(u, turn[k]), product(v, turn[3 + k])), product(w, turn[6 + k]))
             for u, v, w in (frame[:3], frame[3:6], frame[6:])

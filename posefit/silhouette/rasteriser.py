@@ -21,6 +21,7 @@ from numba.extending import intrinsic, overload
 
 from posefit.arrays import Array, inlined, jit
 from posefit.arrays.calling import call
+from posefit.arrays.instructions import in_all_lanes
 from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, set_offsets, set_view
 
 STRIP_PIXELS = 32  # pixels: bits of a lane
@@ -105,14 +106,10 @@ def _build_steps(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     vector = ir.VectorType(number, LISTED)
     blocks, at, first, step = arguments
 
-    def splat(value: Any) -> Any:
-        lane = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.IntType(32)(0))
-        return builder.shuffle_vector(lane, lane, ir.Constant(ir.VectorType(ir.IntType(32), LISTED), [0] * LISTED))
-
-    steps = builder.mul(splat(step), ir.Constant(vector, list(range(LISTED))))
+    steps = builder.mul(in_all_lanes(builder, step, LISTED), ir.Constant(vector, list(range(LISTED))))
     data = context.make_array(signature.args[0])(context, builder, blocks).data
     place = builder.bitcast(builder.gep(data, [at]), vector.as_pointer())
-    builder.store(builder.add(splat(first), steps), place, align=8)
+    builder.store(builder.add(in_all_lanes(builder, first, LISTED), steps), place, align=8)
     return context.get_dummy_value()
 
 
