@@ -143,6 +143,7 @@ class Sign:
 SIGNS = (
     Sign("lost", 0.0, 0.15, 0.5, "the person is lost in {lost:.0%} of the frames"),
     Sign("held", 0.0, 0.25, 0.6, "the person is gone, or nearly, in {held:.0%} of the frames in between"),
+    Sign("interval_mm", 0.0, 125.0, 300.0, "80% of joints are expected within {interval_mm:.0f} mm only"),
     Sign("unknown", 0.0, 0.2, 1.0, "left and right are unknown in {unknown:.0%} of the frames"),
     Sign("iou", 1.0, 0.35, 0.55, "the body and the mask overlap by {iou:.0%} only"),
     Sign("size_ratio", 1.0, 0.08, 0.3, "the person seems to be {size_m:.2f} m tall, not {height_m:.2f} m"),
@@ -159,6 +160,7 @@ LISTED = {
     "foot_share": "a foot stands in {foot_share:.0%} of frames",
     "stance_spread_m": "at heights {stance_spread_m:.2f} m apart",
     "explained": "the body covers {explained:.0%} of what moves",
+    "interval_mm": "80% of joints expected within {interval_mm:.0f} mm",
     "lost": "lost {lost:.0%}",
     "unknown": "sides unknown {unknown:.0%}",
     "held": "held {held:.0%}",
@@ -232,7 +234,8 @@ def trust_of(
     walks = many and np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() > STAYS
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     ratio = _size(scene, frames, usable) if len(scene.cameras) > 1 else None
-    lost, unknown = (np.array([row[name] for row in rows])[usable] for name in ("lost", "unknown_sides"))
+    columns = ("lost", "unknown_sides", "interval_mm")
+    lost, unknown, radii = (np.array([row[name] for row in rows])[usable] for name in columns)
     figures: dict[str, Any] = {
         "frames": int(usable.sum()),
         "size_ratio": ratio,
@@ -244,6 +247,7 @@ def trust_of(
         "explained": explained_share(scene, frames, usable),
         "lost": mean_known(np.where(np.isnan(lost), lost, lost >= LOST)),
         "unknown": mean_known(unknown),
+        "interval_mm": mean_known(radii),
         "held": held_share(usable, cut),
         "iou": iou,
         "acceleration": mean_known(acceleration(joints, scene.fps)[usable]) if many else None,
@@ -257,6 +261,7 @@ def trust_of(
         "explained": "there are masks alone" if scene.pictures is None else "nothing moves enough",
         "lost": NOT_REPORTED,
         "unknown": NOT_REPORTED,
+        "interval_mm": NOT_REPORTED,
     }
     return {
         "sentence": sentence(figures, signs),

@@ -43,6 +43,7 @@ FINE: dict[str, Any] = {
     "explained": 0.95,
     "lost": 0.0,
     "unknown": 0.05,
+    "interval_mm": 90.0,
     "held": 0.0,
     "iou": 0.88,
     "acceleration": 6.0,
@@ -107,6 +108,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
     ("changes", "words"),
     [
         ({"unknown": 0.92}, "doubtful: left and right are unknown in 92% of the frames"),
+        ({"interval_mm": 160.0}, "doubtful: 80% of joints are expected within 160 mm only"),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
@@ -146,7 +148,7 @@ def test_three_doubtful_signs_together_are_as_bad_as_a_useless_one() -> None:
 def trusted(scene: Scene, tracked: list[Frame] | None = None, reported: float = 0.0) -> dict[str, Any]:
     """Return the trust in the true track of a scene that a tracker estimated as `tracked`."""
     frames = exact_frames(scene)
-    row = {"usable": 1.0, "lost": reported, "unknown_sides": reported}
+    row = {"usable": 1.0, "lost": reported, "unknown_sides": reported, "interval_mm": 1e3 * reported}
     return trust_of(scene, tracked or frames, frames, [row] * len(frames), 0.9)
 
 
@@ -161,7 +163,8 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
     trust = trusted(walk(30), reported=np.nan)
     assert trust["size_ratio"] is None
     assert trust["unknown_signs"]["size_ratio"] == ONE_CAMERA
-    assert trust["unknown_signs"]["lost"] == "the method does not say"
+    for name in ("lost", "unknown", "interval_mm"):
+        assert trust["unknown_signs"][name] == "the method does not say"
     assert ONE_CAMERA in trust_line(trust)
 
 
