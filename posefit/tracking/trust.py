@@ -18,7 +18,7 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.quality import AROUND, LAG, changed_pixels
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
-from posefit.geometry.symmetry import mirrored_poses
+from posefit.geometry.symmetry import facing, mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, acceleration, runs, standing
 from posefit.silhouette.cost import project
@@ -170,7 +170,14 @@ SIGNS = (
         0.0,
         60.0,
         200.0,
-        "one camera leaves depth to the motions learned from, which are {training_mm:.0f} mm away",
+        "one camera leaves depth to the motions learned from, and the nearest are {training_mm:.0f} mm away",
+    ),
+    Sign(
+        "frontal",
+        0.0,
+        0.5,
+        1.0,
+        "one camera sees the front or the back in {frontal:.0%} of the frames, where steps and lean do not show",
     ),
     Sign("unknown", 0.0, 0.2, 1.0, "left and right are unknown in {unknown:.0%} of the frames"),
     Sign("iou", 1.0, 0.35, 0.55, "the body and the mask overlap by {iou:.0%} only"),
@@ -236,6 +243,7 @@ def _listed(figures: Mapping[str, Any]) -> str:
 
 
 SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
+FRONTAL = 0.5  # sine of the angle to the line of sight, 30 degrees, within which a person is seen from the front
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 SEVERAL = "several cameras see the depth"
 NOT_REPORTED = "the method does not say"
@@ -281,6 +289,7 @@ def trust_of(
         "unknown": mean_known(unknown),
         "interval_mm": mean_known(radii),
         "training_mm": None if several else _training_mm(scene, frames, usable, training),
+        "frontal": None if several else _frontal_share(scene, frames, usable),
         "held": held_share(usable, cut),
         "iou": iou,
         "acceleration": mean_known(acceleration(joints, scene.fps)[usable]) if many else None,
@@ -295,6 +304,7 @@ def trust_of(
         "lost": NOT_REPORTED,
         "unknown": NOT_REPORTED,
         "interval_mm": NOT_REPORTED,
+        "frontal": SEVERAL if several else TOO_FEW,
         "training_mm": SEVERAL if several else "no motion was learned from" if many else TOO_FEW,
     }
     return {
@@ -304,6 +314,12 @@ def trust_of(
         **figures,
         "unknown_signs": {name: why for name, why in reasons.items() if figures[name] is None},
     }
+
+
+def _frontal_share(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
+    """Return the share of usable frames (T,) within 30 degrees of the front or the back, by the first camera."""
+    turns = [frame.pose[0] - facing(scene.cameras[0], frame.translation) for frame in frames]
+    return mean_known((np.abs(np.sin(turns)) < FRONTAL)[usable].astype(np.float64))
 
 
 def _training_mm(

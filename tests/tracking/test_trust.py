@@ -49,6 +49,7 @@ FINE: dict[str, Any] = {
     "unknown": 0.05,
     "interval_mm": 90.0,
     "training_mm": 40.0,
+    "frontal": 0.2,
     "held": 0.0,
     "iou": 0.88,
     "acceleration": 6.0,
@@ -113,7 +114,10 @@ def test_a_body_covers_half_of_what_moves() -> None:
     ("changes", "words"),
     [
         ({"unknown": 0.92}, "doubtful: left and right are unknown in 92% of the frames"),
-        ({"training_mm": 75.0}, "doubtful: one camera leaves depth to the motions learned from, which are 75 mm away"),
+        (
+            {"training_mm": 75.0},
+            "doubtful: one camera leaves depth to the motions learned from, and the nearest are 75 mm away",
+        ),
         ({"interval_mm": 160.0}, "doubtful: 80% of joints are expected within 160 mm only"),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
@@ -169,7 +173,7 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
     assert (trust["size_ratio"], trust["grade"]) == (1.0, "good")
     assert trust["unknown_signs"] == {
         "explained": "there are masks alone",
-        "training_mm": "several cameras see the depth",
+        **dict.fromkeys(("training_mm", "frontal"), "several cameras see the depth"),
     }
     trust = trusted(replace(scene, body=scene.body.scaled(0.8, 0.8)))
     assert trust["size_ratio"] == pytest.approx(1.25, abs=0.06)  # by perspective, and poses that rest on their root
@@ -200,10 +204,17 @@ def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
     bent = replace(motion, poses=motion.poses + 0.1 * (np.arange(66) >= 3))  # radians, at every joint
     trust = trusted(scene, training=[bent])
     assert trust["training_mm"] > 60.0
-    assert trust["sentence"].startswith(
-        "Trust: doubtful: one camera leaves depth to the motions learned from, which are"
-    )
+    assert trust["against"][0].startswith("one camera leaves depth to the motions learned from, and the nearest are ")
+    assert trust["grade"] == "doubtful"
     assert trusted(walk(30, (20.0, 110.0)), training=[bent])["training_mm"] is None
+
+
+def test_a_track_by_one_camera_is_doubtful_from_the_front_and_the_back() -> None:
+    for view, share in ((0.0, 1.0), (180.0, 1.0), (45.0, 0.0), (90.0, 0.0)):
+        trust = trusted(walk(30, (view,)))
+        assert trust["frontal"] == share
+        assert trust["grade"] == ("doubtful" if share else "good")
+    assert trusted(walk(30, (0.0, 90.0)))["frontal"] is None
 
 
 def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
