@@ -243,7 +243,7 @@ def _listed(figures: Mapping[str, Any]) -> str:
 
 
 SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
-FRONTAL = 0.5  # sine of the angle to the line of sight, 30 degrees, within which a person is seen from the front
+FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a person is seen from the front or the back
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 SEVERAL = "several cameras see the depth"
 NOT_REPORTED = "the method does not say"
@@ -317,7 +317,7 @@ def trust_of(
 
 
 def _frontal_share(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
-    """Return the share of usable frames (T,) within 30 degrees of the front or the back, by the first camera."""
+    """Return the share of usable frames (T,) within 20 degrees of the front or the back, by the first camera."""
     turns = [frame.pose[0] - facing(scene.cameras[0], frame.translation) for frame in frames]
     return mean_known((np.abs(np.sin(turns)) < FRONTAL)[usable].astype(np.float64))
 
