@@ -164,7 +164,6 @@ class Sign:
 SIGNS = (
     Sign("lost", 0.0, 0.15, 0.5, "the person is lost in {lost:.0%} of the frames"),
     Sign("held", 0.0, 0.25, 0.6, "the person is gone, or nearly, in {held:.0%} of the frames in between"),
-    Sign("interval_mm", 0.0, 150.0, 300.0, "80% of joints are expected within {interval_mm:.0f} mm only"),
     Sign(
         "training_mm",
         0.0,

@@ -118,7 +118,6 @@ def test_a_body_covers_half_of_what_moves() -> None:
             {"training_mm": 75.0},
             "doubtful: one camera leaves depth to the motions learned from, and the nearest are 75 mm away",
         ),
-        ({"interval_mm": 160.0}, "doubtful: 80% of joints are expected within 160 mm only"),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
