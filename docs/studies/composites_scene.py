@@ -472,6 +472,7 @@ SHOWS = {
     "waves": "a person who is always there and moves on the spot",
     "squats": "a person who is always there and bends their knees",
     "treadmill": "a person who is always there and walks on the spot",
+    "towards": "the same, seen from the front",
 }
 
 
@@ -487,7 +488,7 @@ def situation(name: str, views: int, seed: int) -> Situation:
     """Return a situation before so many cameras. Raises ValueError where there is none of that name or number."""
     check_situation(name, views)
     rng = np.random.default_rng([seed, views])
-    turned = rng.uniform(-8.0, 8.0)  # degrees, so that no side view is exactly one
+    turned = rng.uniform(-8.0, 8.0) + 90.0 * (name == "towards")  # degrees, so that no side view is exactly one
     target = np.array([0.0, HEIGHT, 0.0])
     cameras = [Camera.around(target, np.radians(degrees + turned), DISTANCE, SIZE, ACROSS) for degrees in PLACES[views]]
     return Situation(name, views, _actors(name, views, seed), cameras)
@@ -497,7 +498,7 @@ def _actors(name: str, views: int, seed: int) -> Sequence[Actor]:
     walk = WALKS[seed % len(WALKS)]
     if name in STAYING:
         return [_staying(STAYING[name][seed % len(STAYING[name])], seed, along=name == "to and fro")]
-    if name == "treadmill":
+    if name in ("treadmill", "towards"):
         return [_on_treadmill(walk, seed)]
     if name == "through":
         return [_walker(walk, views, seed)]

@@ -16,7 +16,7 @@ from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
 from posefit.tracking.trajectory import effort_of, motion_of
-from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL
 from posefit.uncertainty.intervals import joint_intervals
 from posefit.uncertainty.modes import unknown_sides
 
@@ -129,7 +129,7 @@ def _errors(
 def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> tuple[dict[str, Array], dict[str, Any]]:
     """Return the columns and the measures of how certain the method is; NaN in frames where that is unknown."""
     skeleton, truth = scene.body.skeleton, scene.truth
-    sides = np.full(len(frames), np.nan)
+    sides, radius_mm = np.full((2, len(frames)), np.nan)
     lost = np.array([np.nan if frame.lost is None else frame.lost for frame in frames])
     inside: list[NDArray[np.bool_]] = []
     radii_mm: list[Array] = []
@@ -139,6 +139,7 @@ def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> 
         sides[k] = unknown_sides(skeleton, frame.posterior, frame.pose)
         radii = joint_intervals(skeleton, frame.posterior, frame.pose)[:, 1:]
         radii_mm.append(1e3 * radii)
+        radius_mm[k] = radii_mm[-1][MAIN_LEVEL].mean()
         if truth is not None:
             off = truth.skeleton.joints(truth.poses[k]) - skeleton.joints(frame.pose)
             inside.append(np.linalg.norm(off, axis=1)[1:] <= radii)
@@ -149,7 +150,7 @@ def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> 
         "swapped_known_rate": None if swapped is None else mean_known(swapped[sides == 0.0]),
         "lost_said_rate": mean_known((lost[np.isfinite(lost)] >= LOST).astype(np.float64)),
     }
-    return {"unknown_sides": sides, "lost": lost}, measures
+    return {"unknown_sides": sides, "lost": lost, "interval_mm": radius_mm}, measures
 
 
 def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:

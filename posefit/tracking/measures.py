@@ -165,6 +165,7 @@ FRAME = {
             "unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where not estimated"
         ),
         Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
+        Measure("interval_mm", "80 % interval", "mm", 0, "its radius, the mean over joints; blank where not estimated"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
         Measure("seconds", "time", "ms", 1, "wall time", 1e3),
         Measure("activity", "activity", "", 0, "what the person does, a word; blank where not estimated"),

@@ -33,7 +33,7 @@ from posefit.tracking.drawing import (
     write,
 )
 from posefit.tracking.evaluation import LOST
-from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.calibration import MAIN_LEVEL
 from posefit.uncertainty.modes import Mode, other_mode
 
 PANEL = 480  # pixels high
@@ -42,7 +42,6 @@ SUMMARY_STILLS = 6  # frames on the summary
 SUMMARY_SCALE = 0.65  # of its words, which a page shows at three quarters of their size
 LABEL_HEIGHT = 38  # pixels that the label stands on
 SOLID = 0.65  # how much of the footage the body hides
-DRAWN_LEVEL = LEVELS.index(0.8)  # the interval that a limb fades by
 MIN_OTHER_WEIGHT = 0.2  # above which another mode is drawn
 BORDER = 6  # pixels around a lost frame
 LINE_HEIGHT = 22  # pixels from one line to the next
@@ -71,7 +70,7 @@ class Painter:
         `radii` (levels, 27) are those of its joints' intervals, where it has a posterior.
         """
         body, camera, pose, place = self._scene.body, self._scene.cameras[0], frame.pose, frame.translation
-        solid = None if radii is None else opacities(radii[DRAWN_LEVEL])
+        solid = None if radii is None else opacities(radii[MAIN_LEVEL])
         other = other_mode(body.skeleton, frame.modes, pose, MIN_OTHER_WEIGHT)
         left = self.overlay(frame, observation, filmed, solid, other)
         width = left.shape[1]

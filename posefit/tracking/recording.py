@@ -18,7 +18,8 @@ from posefit.geometry.skeleton import BONES, PARENTS, SIDES
 from posefit.motion.motion import Motion
 from posefit.tracking.drawing import OTHER, SIDE_COLOURS, opacities
 from posefit.tracking.evaluation import LOST
-from posefit.tracking.picture import DRAWN_LEVEL, MIN_OTHER_WEIGHT
+from posefit.tracking.picture import MIN_OTHER_WEIGHT
+from posefit.uncertainty.calibration import MAIN_LEVEL
 from posefit.uncertainty.intervals import joint_intervals
 from posefit.uncertainty.modes import other_mode
 
@@ -60,7 +61,7 @@ def record(path: str | Path, scene: Scene, estimate: Motion, frames: Sequence[Fr
         recording.set_time("time", duration=k / estimate.fps)
         colours = sides
         if frame.posterior is not None:
-            off = joint_intervals(skeleton, frame.posterior, frame.pose)[DRAWN_LEVEL]
+            off = joint_intervals(skeleton, frame.posterior, frame.pose)[MAIN_LEVEL]
             colours = sides * opacities(off)[:, None]
         look = {"radii": radii, "colors": colours.round().astype(np.uint8), "labels": list(BONES)}
         recording.log("world/body", rerun.LineStrips3D(_bones(points), **look, show_labels=False))

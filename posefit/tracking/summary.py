@@ -90,7 +90,9 @@ def evaluate(
         "relocalised": [k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
         "retracked_outside": tracked.stay,
         "backwards_share": round(float(walks_back.mean()), 6),
-        "trust": None if scene.truth is not None else trust_of(scene, tracked.frames, frames, rows, measures.iou),
+        "trust": None
+        if scene.truth is not None
+        else trust_of(scene, tracked.frames, frames, rows, measures.iou, task.training),
         "gait": gait_of(estimate, unseen(rows)).as_dict(),
         "warnings": warnings,
     }

@@ -17,12 +17,16 @@ from posefit.arrays import Array
 from posefit.fitting.tracker import Frame
 from posefit.footage.quality import AROUND, LAG, changed_pixels
 from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.symmetry import facing, mirrored_poses
+from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, acceleration, runs, standing
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
 from posefit.tracking.evaluation import LOST, mean_known
 from posefit.tracking.trajectory import motion_of
+from posefit.uncertainty.modes import poses_apart
 
 SMOOTH_SECONDS = 0.5  # before and after a frame, to which a smooth path is fitted
 MIN_SMOOTH_FRAMES = 5  # of such a fit
@@ -76,6 +80,23 @@ def stance_spread(joints: Array, stands: NDArray[np.bool_]) -> float | None:
     each = [(start, stop, ball) for ball, flags in zip(BALLS, stands.T, strict=True) for start, stop in runs(flags)]
     heights = [joints[start:stop, ball, 1].mean() for start, stop, ball in each]
     return float(np.std(heights)) if len(heights) > 1 else None
+
+
+TRAINING_SECONDS = 1.0 / 15.0  # between poses of a motion that others are compared with
+
+
+def training_distances(skeleton: Skeleton, poses: Array, training: Sequence[Motion]) -> Array:
+    """Return how far poses (n, 66) are from the nearest of some motions (n,): metres, the mean over joints.
+
+    All are turned to yaw 0, and mirror images count, too. Infinite without any motion.
+    """
+    both, nearest = np.concatenate([poses, mirrored_poses(skeleton, poses)]), np.full(2 * len(poses), np.inf)
+    both[:, 0] = 0.0
+    for motion in training:
+        others = motion.poses[:: max(1, round(TRAINING_SECONDS * motion.fps))].copy()
+        others[:, 0] = 0.0
+        np.minimum(nearest, poses_apart(skeleton, both, others).min(axis=1), out=nearest)
+    return np.asarray(nearest.reshape(2, -1).min(axis=0))
 
 
 CLOTHES = 0.05  # of the person's longer side: motion as near as that to the body is its own clothes' and hair's
@@ -143,6 +164,20 @@ class Sign:
 SIGNS = (
     Sign("lost", 0.0, 0.15, 0.5, "the person is lost in {lost:.0%} of the frames"),
     Sign("held", 0.0, 0.25, 0.6, "the person is gone, or nearly, in {held:.0%} of the frames in between"),
+    Sign(
+        "training_mm",
+        0.0,
+        60.0,
+        200.0,
+        "one camera leaves depth to the motions learned from, and the nearest are {training_mm:.0f} mm away",
+    ),
+    Sign(
+        "frontal",
+        0.0,
+        0.5,
+        1.0,
+        "one camera sees the front or the back in {frontal:.0%} of the frames, where steps and lean do not show",
+    ),
     Sign("unknown", 0.0, 0.2, 1.0, "left and right are unknown in {unknown:.0%} of the frames"),
     Sign("iou", 1.0, 0.35, 0.55, "the body and the mask overlap by {iou:.0%} only"),
     Sign("size_ratio", 1.0, 0.08, 0.3, "the person seems to be {size_m:.2f} m tall, not {height_m:.2f} m"),
@@ -159,6 +194,8 @@ LISTED = {
     "foot_share": "a foot stands in {foot_share:.0%} of frames",
     "stance_spread_m": "at heights {stance_spread_m:.2f} m apart",
     "explained": "the body covers {explained:.0%} of what moves",
+    "interval_mm": "80% of joints expected within {interval_mm:.0f} mm",
+    "training_mm": "{training_mm:.0f} mm from the motions learned from",
     "lost": "lost {lost:.0%}",
     "unknown": "sides unknown {unknown:.0%}",
     "held": "held {held:.0%}",
@@ -204,8 +241,10 @@ def _listed(figures: Mapping[str, Any]) -> str:
     return ", ".join(words.format(**figures) for name, words in LISTED.items() if figures[name] is not None)
 
 
-SIZED_FRAMES = 60  # frames whose sizes are compared, spread over the footage
+SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
+FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a person is seen from the front or the back
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
+SEVERAL = "several cameras see the depth"
 NOT_REPORTED = "the method does not say"
 TOO_FEW = "too few frames show the person"
 IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
@@ -218,11 +257,12 @@ def trust_of(
     frames: Sequence[Frame],
     rows: Sequence[Mapping[str, float]],
     iou: float,
+    training: Sequence[Motion],
 ) -> dict[str, Any]:
     """Return whether a track can be trusted: the sentence, the grade, every figure, and why some are not known.
 
     `tracked` are the tracker's frames, and `frames` these in the end, smoothed; `iou` is their overlap with
-    the masks. Shares are of the frames that show enough of the person.
+    the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
     usable = np.array([row["usable"] == 1.0 for row in rows])
     cut = np.array([any(is_cut(view.mask) for view in each.silhouettes) for each in scene.observations])
@@ -231,8 +271,10 @@ def trust_of(
     stands = standing(joints, scene.fps) & usable[:, None]
     walks = many and np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() > STAYS
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
-    ratio = _size(scene, frames, usable) if len(scene.cameras) > 1 else None
-    lost, unknown = (np.array([row[name] for row in rows])[usable] for name in ("lost", "unknown_sides"))
+    several = len(scene.cameras) > 1
+    ratio = _size(scene, frames, usable) if several else None
+    columns = ("lost", "unknown_sides", "interval_mm")
+    lost, unknown, radii = (np.array([row[name] for row in rows])[usable] for name in columns)
     figures: dict[str, Any] = {
         "frames": int(usable.sum()),
         "size_ratio": ratio,
@@ -244,19 +286,25 @@ def trust_of(
         "explained": explained_share(scene, frames, usable),
         "lost": mean_known(np.where(np.isnan(lost), lost, lost >= LOST)),
         "unknown": mean_known(unknown),
+        "interval_mm": mean_known(radii),
+        "training_mm": None if several else _training_mm(scene, frames, usable, training),
+        "frontal": None if several else _frontal_share(scene, frames, usable),
         "held": held_share(usable, cut),
         "iou": iou,
         "acceleration": mean_known(acceleration(joints, scene.fps)[usable]) if many else None,
     }
     signs = signs_against(figures)
     reasons = {
-        "size_ratio": ONE_CAMERA if len(scene.cameras) == 1 else TOO_FEW,
+        "size_ratio": TOO_FEW if several else ONE_CAMERA,
         "depth_scatter": TOO_FEW,
         "foot_share": IN_PLACE if many else TOO_FEW,
         "stance_spread_m": "no foot stands twice" if many else TOO_FEW,
         "explained": "there are masks alone" if scene.pictures is None else "nothing moves enough",
         "lost": NOT_REPORTED,
         "unknown": NOT_REPORTED,
+        "interval_mm": NOT_REPORTED,
+        "frontal": SEVERAL if several else TOO_FEW,
+        "training_mm": SEVERAL if several else "no motion was learned from" if many else TOO_FEW,
     }
     return {
         "sentence": sentence(figures, signs),
@@ -267,10 +315,27 @@ def trust_of(
     }
 
 
+def _frontal_share(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
+    """Return the share of usable frames (T,) within 20 degrees of the front or the back, by the first camera."""
+    turns = [frame.pose[0] - facing(scene.cameras[0], frame.translation) for frame in frames]
+    return mean_known((np.abs(np.sin(turns)) < FRONTAL)[usable].astype(np.float64))
+
+
+def _training_mm(
+    scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], training: Sequence[Motion]
+) -> float | None:
+    """Return how far the poses of usable frames (T,) are from motions, millimetres, the mean; None of too few."""
+    poses = np.array([frame.pose for frame in frames])[usable]
+    if len(poses) < MIN_FRAMES:
+        return None
+    sampled = poses[:: max(1, len(poses) // SAMPLED_FRAMES)]
+    return mean_known(1e3 * training_distances(scene.body.skeleton, sampled, training))
+
+
 def _size(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
     """Return how large the person looks beside the body, the median over all cameras and frames over the footage."""
     shown, ratios = np.flatnonzero(usable).tolist(), []
-    for k in shown[:: max(1, len(shown) // SIZED_FRAMES)]:
+    for k in shown[:: max(1, len(shown) // SAMPLED_FRAMES)]:
         for camera, silhouette in zip(scene.cameras, scene.observations[k].silhouettes, strict=True):
             observed = longer_side(silhouette.mask)
             fitted = longer_side(project(scene.body, camera, frames[k].pose, frames[k].translation))

@@ -11,6 +11,7 @@ from posefit.errors import InputError
 from posefit.geometry.skeleton import ANGLES, JOINTS
 
 LEVELS = (0.5, 0.8, 0.95)  # of intervals
+MAIN_LEVEL = LEVELS.index(0.8)  # of the one interval that is drawn and judged by
 SECOND_SIDE = 0.2  # ours: left and right are unknown from this probability on that they are exchanged
 DIGITS = 6  # of what a file holds
 BINS = 10  # of probabilities

@@ -37,7 +37,7 @@ def test_nothing_is_reported_of_a_method_that_reports_no_certainty(scene: Scene)
     rows, measures = measured(scene, exact_frames(scene))
     names = ("coverage", "interval_mm", "unknown_rate", "swapped_known_rate", "lost_said_rate")
     assert [getattr(measures, name) for name in names] == [None] * 5
-    assert np.isnan([[row["unknown_sides"], row["lost"]] for row in rows]).all()
+    assert np.isnan([[row[name] for name in ("unknown_sides", "lost", "interval_mm")] for row in rows]).all()
 
 
 def test_frames_that_are_swapped_count_among_those_that_are_known(scene: Scene) -> None:
@@ -70,9 +70,12 @@ def test_coverage_is_the_share_of_joints_that_are_near_enough(scene: Scene) -> N
 def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) -> None:
     frames = uncertain_frames(scene, CERTAIN)
     frames[2] = replace(frames[2], posterior=None)
-    measures = measured(scene, frames)[1]
+    rows, measures = measured(scene, frames)
     # nothing but the pose itself, blurred by 2 cm
     assert measures.interval_mm == {name: pytest.approx(20.0 * r, abs=0.5) for name, r in MAXWELL.items()}
+    widths = [row["interval_mm"] for row in rows]
+    assert np.isnan(widths[2])
+    assert widths[:2] + widths[3:] == [pytest.approx(20.0 * MAXWELL["80"], abs=0.5)] * (FRAMES - 1)
     without_truth = evaluated(replace(scene, truth=None), frames, None, np.zeros((1, 63)), 0.5)[1]
     assert without_truth.interval_mm == measures.interval_mm
     assert without_truth.coverage is None

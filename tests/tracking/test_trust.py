@@ -1,6 +1,7 @@
 """Signs of trust worked by hand, and the sentence that they come to."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import pytest
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses
+from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS
 from posefit.tracking.table import table
 from posefit.tracking.trust import (
@@ -25,11 +28,12 @@ from posefit.tracking.trust import (
     sentence,
     signs_against,
     stance_spread,
+    training_distances,
     trust_line,
     trust_of,
 )
 from tests.cases import each
-from tests.tracking.scenes import exact_frames, viewed, walk
+from tests.tracking.scenes import exact_frames, truth_of, viewed, walk
 
 ALL = np.ones(60, dtype=bool)
 FINE: dict[str, Any] = {
@@ -43,6 +47,9 @@ FINE: dict[str, Any] = {
     "explained": 0.95,
     "lost": 0.0,
     "unknown": 0.05,
+    "interval_mm": 90.0,
+    "training_mm": 40.0,
+    "frontal": 0.2,
     "held": 0.0,
     "iou": 0.88,
     "acceleration": 6.0,
@@ -107,6 +114,10 @@ def test_a_body_covers_half_of_what_moves() -> None:
     ("changes", "words"),
     [
         ({"unknown": 0.92}, "doubtful: left and right are unknown in 92% of the frames"),
+        (
+            {"training_mm": 75.0},
+            "doubtful: one camera leaves depth to the motions learned from, and the nearest are 75 mm away",
+        ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
@@ -143,26 +154,66 @@ def test_three_doubtful_signs_together_are_as_bad_as_a_useless_one() -> None:
     assert grade_of(signs[:2]) == "doubtful"
 
 
-def trusted(scene: Scene, tracked: list[Frame] | None = None, reported: float = 0.0) -> dict[str, Any]:
+def trusted(
+    scene: Scene,
+    tracked: list[Frame] | None = None,
+    reported: float = 0.0,
+    training: Sequence[Motion] = (),
+) -> dict[str, Any]:
     """Return the trust in the true track of a scene that a tracker estimated as `tracked`."""
     frames = exact_frames(scene)
-    row = {"usable": 1.0, "lost": reported, "unknown_sides": reported}
-    return trust_of(scene, tracked or frames, frames, [row] * len(frames), 0.9)
+    row = {"usable": 1.0, "lost": reported, "unknown_sides": reported, "interval_mm": 1e3 * reported}
+    return trust_of(scene, tracked or frames, frames, [row] * len(frames), 0.9, training)
 
 
 def test_several_cameras_show_the_size_and_one_cannot() -> None:
     scene = walk(30, (20.0, 110.0))
     trust = trusted(scene)
     assert (trust["size_ratio"], trust["grade"]) == (1.0, "good")
-    assert trust["unknown_signs"] == {"explained": "there are masks alone"}
+    assert trust["unknown_signs"] == {
+        "explained": "there are masks alone",
+        **dict.fromkeys(("training_mm", "frontal"), "several cameras see the depth"),
+    }
     trust = trusted(replace(scene, body=scene.body.scaled(0.8, 0.8)))
     assert trust["size_ratio"] == pytest.approx(1.25, abs=0.06)  # by perspective, and poses that rest on their root
     assert "the person seems to be" in trust["sentence"]
     trust = trusted(walk(30), reported=np.nan)
     assert trust["size_ratio"] is None
     assert trust["unknown_signs"]["size_ratio"] == ONE_CAMERA
-    assert trust["unknown_signs"]["lost"] == "the method does not say"
+    for name in ("lost", "unknown", "interval_mm"):
+        assert trust["unknown_signs"][name] == "the method does not say"
+    assert trust["unknown_signs"]["training_mm"] == "no motion was learned from"
     assert ONE_CAMERA in trust_line(trust)
+
+
+def test_poses_are_as_far_from_motions_as_from_the_nearest_pose_or_its_mirror_image() -> None:
+    motion = truth_of(walk(30))
+    turned = replace(motion, poses=mirrored_poses(motion.skeleton, motion.poses) + np.eye(1, 66))
+    distances = training_distances(motion.skeleton, motion.poses[:3], [turned])
+    assert distances[0] == pytest.approx(0.0, abs=1e-9)
+    assert 0.0 < distances[1] < 0.05  # only every second pose of 30 a second counts
+    assert distances[2] == pytest.approx(0.0, abs=1e-9)
+    assert np.isinf(training_distances(motion.skeleton, motion.poses[:3], [])).all()
+
+
+def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
+    scene = walk(30)
+    motion = truth_of(scene)
+    assert trusted(scene, training=[motion])["grade"] == "good"
+    bent = replace(motion, poses=motion.poses + 0.1 * (np.arange(66) >= 3))  # radians, at every joint
+    trust = trusted(scene, training=[bent])
+    assert trust["training_mm"] > 60.0
+    assert trust["against"][0].startswith("one camera leaves depth to the motions learned from, and the nearest are ")
+    assert trust["grade"] == "doubtful"
+    assert trusted(walk(30, (20.0, 110.0)), training=[bent])["training_mm"] is None
+
+
+def test_a_track_by_one_camera_is_doubtful_from_the_front_and_the_back() -> None:
+    for view, share in ((0.0, 1.0), (180.0, 1.0), (45.0, 0.0), (90.0, 0.0)):
+        trust = trusted(walk(30, (view,)))
+        assert trust["frontal"] == share
+        assert trust["grade"] == ("doubtful" if share else "good")
+    assert trusted(walk(30, (0.0, 90.0)))["frontal"] is None
 
 
 def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
