@@ -140,8 +140,8 @@ class Exemplars:
     members: Rows = field(repr=False)  # (K,) all poses, group by group
     bounds: Rows = field(repr=False)  # (G + 1,) where each group begins in `members`
     owners: Rows = field(repr=False)  # (K,) the group of each pose
-    tiles: "Tiles" = field(repr=False)  # of the codes, group by group
-    centre_tiles: "Tiles" = field(repr=False)  # of the centres', as one group
+    tiles: Tiles = field(repr=False)  # of the codes, group by group
+    centre_tiles: Tiles = field(repr=False)  # of the centres', as one group
     kinds: Rows = field(repr=False)  # (K,) which of a few poses that are as unlike as can be each is nearest to
     coding: Coding = field(repr=False)
 
