@@ -195,10 +195,10 @@ def curve(values: Sequence[float], name: str, width: int, height: int) -> Image:
     image = blank(height, width)
     left, right = 66, width - 16
     scale = (height - 56) / (max(max(values), 1e-9) * 1.15)
-    for level in (0.0, float(np.mean(values)), max(values)):
+    for lines, level in enumerate((0.0, float(np.mean(values)), max(values))):
         row = int(height - 24 - level * scale)
         cv2.line(image, (left, row), (right, row), LINES, 1)
-        write(image, f"{level:.2f}", (8, row + 6), scale=SUMMARY_SCALE - 0.1)
+        write(image, f"{level:.2f}", (8, min(row, height - 24 - lines * LINE_HEIGHT) + 6), scale=SUMMARY_SCALE - 0.1)
     x = np.linspace(left, right, max(len(values), 2))[: len(values)]
     points = np.rint(np.column_stack([x, height - 24 - scale * np.array(values)]) * 16).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
