@@ -118,7 +118,7 @@ def tracks(folder: Path) -> Iterator[tuple[str, str]]:
     yield "masks", poses(folder / "masked")
     yield "live", live(masks, folder / "live")
     if VIDEO.is_dir():
-        posefit("track", VIDEO / "demo.mp4", "--frames", "60:76", "--out", folder / "film")
+        posefit("track", VIDEO / "demo.mp4", "--roi", "0,420,1520,532", "--frames", "55:95", "--out", folder / "film")
         yield "video", poses(folder / "film")
 
 
