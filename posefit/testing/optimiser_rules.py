@@ -12,6 +12,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start, draw_population
 from posefit.fitting.optimiser import Filter, NextFrame, Niching, Optimiser, populations
+from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.settings import planned
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, duplicates, left_alone
@@ -71,6 +72,10 @@ class Case(PluginCase):
                 proposals = optimiser.ask()
             if not len(proposals):
                 return
+            expect(
+                len(proposals) <= BUDGET,
+                f"ask must return at most the budget of {BUDGET} proposals, got {len(proposals)}",
+            )
             costs = np.asarray(evaluate(proposals), dtype=np.float64)
             yield proposals.copy(), costs.copy()
             optimiser.tell(proposals, costs)
@@ -178,6 +183,17 @@ def budget(case: Case) -> str:
         used += len(proposals)
     expect(used >= 0.75 * EVALUATIONS, f"a search must use most of its budget of {EVALUATIONS}, got {used}")
     return f"{used} of {EVALUATIONS} evaluations"
+
+
+def evaluations(case: Case) -> None:
+    """All evaluations are the search's: neither ask nor tell draws poses of its own."""
+    problem = pose_problem()
+    checked = CheckedOptimiser(case.build(problem.space), problem.space, "the optimiser")
+    try:
+        for _ in case.steps(checked, problem.space, problem.evaluate, 4):
+            pass
+    except BrokenRuleError as broken:
+        raise BrokenError(str(broken)) from broken.__cause__
 
 
 def order(case: Case) -> str:
@@ -374,7 +390,9 @@ RULES = [
     dimensions,
     costs,
     budget,
+    evaluations,
     order,
+    common.silence,
     common.unknown_setting,
     nonsense_settings,
     seeds,
