@@ -83,20 +83,6 @@ SEARCH_SCORE = {
 
 def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs."""
-    changed = time.localtime((ledger.path / ROWS).stat().st_mtime)
-    made = f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', changed)}"
-    if runs.is_search:
-        return search_data(runs, "Report of single searches", made)
-    return _data(runs, "Report of a sweep", made, lambda data: _tracks(ledger, runs, data, warn))
-
-
-def search_data(runs: Runs, title: str, made: str) -> dict[str, Any]:
-    """Return the data of a page about single searches; `made` says of what and when."""
-    return _data(runs, title, made, lambda data: _searches(runs, data))
-
-
-def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], dict[str, Any]]) -> dict[str, Any]:
-    """Return the data of a page; `rest` adds what tracks alone or searches alone have."""
     contest = contest_of(runs)
     data: dict[str, Any] = {"sections": []}
     answer = "Every cell failed." if runs.failures else "No run has an error yet: there is nothing to compare."
@@ -114,11 +100,12 @@ def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], di
             "taking_part": contest.methods,
             **(_search_curves(contest) if runs.is_search else _track_curves(contest, board[0]["method"])),
         }
+    changed = time.localtime((ledger.path / ROWS).stat().st_mtime)
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
     data |= {
-        "title": title,
+        "title": "Report of single searches" if runs.is_search else "Report of a sweep",
         "headline": answer,
-        "made": made,
+        "made": f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', changed)}",
         "header": _header(runs, contest),
         "methods": [{"name": name, **fields} for name, fields in zip(runs.methods, runs.variants, strict=True)],
         "joints": [place.replace("_", " ") for place in PLACES],
@@ -130,7 +117,7 @@ def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], di
         "warned": {row: [warnings.index(text) for text in texts] for row, texts in runs.warnings.items()},
         "live": None,
         "failures": runs.failures,
-        **rest(data),
+        **(_searches(runs, data) if runs.is_search else _tracks(ledger, runs, data, warn)),
     }
     return data | {"sections": [*data["sections"], *(["failures"] if runs.failures else [])]}
 
@@ -326,7 +313,7 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
         notes.append("Budgets differ: compare methods of one budget only, as a longer search has lower costs.")
     if runs.is_search and len(_of_methods(runs, "infeasible")) > 1:
         notes.append("Infeasible proposals are treated differently: compare methods that treat them in the same way.")
-    if len(_of_methods(runs, "version")) > 1 and any(runs.keys):
+    if len(_of_methods(runs, "version")) > 1:
         notes.append("Commands run rows again if the same versions are installed.")
     return notes
 

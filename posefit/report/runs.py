@@ -21,7 +21,6 @@ from posefit.suites.running import SuiteRun
 from posefit.sweep.cell import settings_text
 from posefit.sweep.table import is_search, search_run
 from posefit.uncertainty.calibration import BINS
-from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
@@ -130,16 +129,6 @@ def _track_data(row: Mapping[str, Any], grids: dict[bytes, Any]) -> tuple[Any, .
     return figures, joints, _binned(row["mode_reliability"]), trace
 
 
-def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
-    """Return searches as `runs_of` does, each with the name of the bundle it is of, which makes another method."""
-    rows = []
-    for bundle, run in named:
-        spec = {**vars(run), "evaluations": run.budget, "bundle": bundle}
-        figures, *data = _search_data(run)
-        rows.append(_Row(_text(_place(spec)), _text(_variant(spec)), "", run.seed, "", (), figures, tuple(data)))
-    return _sorted_runs(posefit_build().removeprefix("posefit "), True, rows, (), ())
-
-
 def _search_data(run: SuiteRun) -> tuple[Any, ...]:
     evaluations = hits((run.evaluations, run.costs), run.targets)
     reached = 100.0 * float(np.isfinite(evaluations).mean())
@@ -226,9 +215,7 @@ def _bad_row(reason: str) -> dict[str, Any]:
 
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
     if is_search(spec):
-        fields = {
-            name: spec[name] for name in ("method", "settings", "infeasible", "version", "bundle") if name in spec
-        }
+        fields = {name: spec[name] for name in ("method", "settings", "infeasible", "version")}
         return {**fields, "budget": spec["evaluations"] / spec["dimension"]}
     return {name: spec[name] for name in _METHOD_FIELDS}
 
@@ -240,8 +227,7 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
     else:
         count = variant["hypotheses"]
         words = [f"{variant['evaluations']} evaluations", f"{count} {'hypothesis' if count == 1 else 'hypotheses'}"]
-    source = [f"of {variant['bundle']}"] if "bundle" in variant else variant["version"].split(", ")
-    return [*settings_text(variant["settings"]), *words, *source]
+    return [*settings_text(variant["settings"]), *words, *variant["version"].split(", ")]
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 ledger.json          the format of the folder
 rows/NAME.jsonl      finished rows, one log a driver
-rows/NAME.joints     the joints of the rows' frames; of single searches the points at which the cost fell
+rows/NAME.joints     the joints of the rows' frames
 leases/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
 plans/NAME.cells     the cells of a plan that was begun here, when, and how many were done then
@@ -19,7 +19,7 @@ import time
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -214,15 +214,6 @@ class Ledger:
         except Exception:  # whatever a hostile archive raises
             pass
         raise InputError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
-
-    def points(self, row: Mapping[str, Any]) -> "Array | None":
-        """Return the points (k, d) at which the cost of a row's search fell; None where they are missing or damaged."""
-        start, length, checksum = row["joints"]
-        dimension = row["spec"]["dimension"]
-        data = joints_at((self.path / ROWS / self._places[row["key"]][0]).with_suffix(JOINTS), start, length)
-        if not data or zlib.crc32(data) != checksum or len(data) % (8 * dimension):
-            return None
-        return np.frombuffer(data, "<f8").reshape(-1, dimension).astype(np.float64)
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""

@@ -275,17 +275,6 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         assert 'suite = "posefit-2026.3"' in page.inner_text("#command")
 
 
-def test_a_leaderboard_opens_and_names_what_is_not_ranked(chromium: Any, tmp_path: Path) -> None:
-    (tmp_path / "broken.zip").write_bytes(b"PK")
-    done = run("suite", "board", tmp_path / "broken.zip", "--out", tmp_path / "board.html")
-    assert done.exit_code == 0, done.stderr
-    with shown(chromium, tmp_path / "board.html") as page:
-        assert page.inner_text("h1").startswith("Leaderboard of posefit-")
-        assert "broken.zip: expected a bundle of runs" in page.inner_text("#trouble")
-        assert page.locator("#leaders tbody tr").count() == 6
-        assert page.locator("#charts .band").count() == 4 * page.locator("#charts figure").count()
-
-
 def test_pages_of_one_run_or_of_failures_alone_open(chromium: Any, tmp_path: Path) -> None:
     search = cell("cma")
     single = written(ledger(tmp_path / "one" / "results", [search_result(search, 5)]))

@@ -146,7 +146,6 @@ function trouble() {
     const reasons = H.reasons.map(([reason, count]) => `${whole(count)} × ${reason}`);
     note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
   }
-  if (H.unranked?.length) note("warn", ["Not ranked, with the reason:"], H.unranked);
   if (H.dropped.length) {
     const why = (gap) => (gap.missing.length ? `no run of ${gap.missing.join("; ")}` : "no seed in common");
     const missing = H.dropped.map((gap) => `${gap.instance}: ${why(gap)}`);
