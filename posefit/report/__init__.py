@@ -20,7 +20,6 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | the best method of each instance, and a selector | selection.py |
 | the data of the page; its animations | content.py, animations.py |
 | the page: markup, style and scripts as one document | page/ |
-| the report of a running sweep | live.py |
 | figures by matplotlib, and the folder of a paper's figures and tables | figures.py |
 | LaTeX, CSV and IOHprofiler's files | export.py |
 | the command that runs one row again | repeat.py |

@@ -115,7 +115,6 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
         "colours": COLOURS,
         "warnings": warnings,
         "warned": {row: [warnings.index(text) for text in texts] for row, texts in runs.warnings.items()},
-        "live": None,
         "failures": runs.failures,
         **(_searches(runs, data) if runs.is_search else _tracks(ledger, runs, data, warn)),
     }

@@ -87,11 +87,11 @@ class _Row(NamedTuple):
     data: tuple[Any, ...]  # joint errors, modes and trace of a track; run and hits of a search
 
 
-def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
+def runs_of(ledger: "Ledger") -> Runs:
     """Return the finished rows of a ledger, in an order that does not depend on which of them finished first.
 
-    If every cell failed there are no rows, but failures. Raises ValueError where there is neither, unless the ledger
-    may be empty, and where it holds both tracks and single searches.
+    If every cell failed there are no rows, but failures. Raises ValueError where there is neither, and where it holds
+    both tracks and single searches.
     """
     quarantined = ledger.quarantined()
     rows: list[_Row] = []
@@ -115,7 +115,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
             places[place] = sys.intern(_text(_place(spec)))
         texts = (places[place], *heads[fields])
         rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row["warnings"]), figures, tuple(data)))
-    if not kinds and not may_be_empty and not ledger.bad():
+    if not kinds and not ledger.bad():
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
     return _sorted_runs(ledger.version, True in kinds, rows, quarantined, ledger.bad())
 

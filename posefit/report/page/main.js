@@ -26,7 +26,6 @@ $("whole").textContent = D.headline;
 if (!because.length) $("verdict-whole").remove();
 $("summary").textContent = D.header.summary;
 details(D.header);
-live();
 trouble();
 if (D.leaderboard) firstScreen();
 else $("overview").remove();
