@@ -17,7 +17,6 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | the methods compared on the runs that they share; the leaderboard | contest.py |
 | cost over evaluations, targets reached, errors of joints, calibration, running times, as numbers | curves.py |
 | the sentences of the first screen; published claims | summary.py |
-| the best method of each instance, and a selector | selection.py |
 | the data of the page; its animations | content.py, animations.py |
 | the page: markup, style and scripts as one document | page/ |
 | figures by matplotlib, and the folder of a paper's figures and tables | figures.py |

@@ -28,7 +28,6 @@ from posefit.report.contest import (
 )
 from posefit.report.page import COLOURS
 from posefit.report.runs import Runs, damage, views
-from posefit.report.selection import selection_of
 from posefit.report.summary import (
     leader_sentence,
     not_worse,
@@ -123,8 +122,8 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
 
 def _tracks(ledger: Ledger, runs: Runs, data: dict[str, Any], warn: Callable[[str], None]) -> dict[str, Any]:
     """Return the rows of tracks, their animations, and the sections of the page."""
-    needed = {"selection": "selection", "joints": "joint_errors", "certainty": "certainty"}  # for these sections
-    compared = ["leaderboard", "comparison", "selection", "curves", "joints", "certainty"] if "answer" in data else []
+    needed = {"joints": "joint_errors", "certainty": "certainty"}  # for these sections
+    compared = ["leaderboard", "comparison", "curves", "joints", "certainty"] if "answer" in data else []
     baselines = {name: _by_instance(runs, f"baseline_{name}") for name in BASELINES}
     rows = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
     rows |= {name: np.round(runs.figures[name], COLUMNS[name].stored_digits) for name in runs.table_figures}
@@ -160,7 +159,6 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     return {
         "examples": three_tracks(contest, leader),
         "claims": published_claims(contest, [claim for one in plugins_of("claims") for claim in one.offers]),
-        "selection": selection_of(contest),
         "evaluations": evaluations,
         "charts": [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]
         if len(evaluations)

@@ -1,4 +1,4 @@
-// Methods compared: ranks and paired tests, published claims, selection by instance, one method against all others.
+// Methods compared: ranks and paired tests, published claims, one method against all others.
 const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
 const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`; // in a sentence
 const degrees = (value) => `${number(value, 2)}°`;
@@ -120,56 +120,6 @@ function claims() {
 function chooseMethod(select, names, first, show) {
   choose(select, names, String(first), () => show(+select.value));
   show(first);
-}
-
-// Who wins where, and what choosing a method by its instance would gain.
-function selection() {
-  const S = D.selection;
-  const [best, leader] = [METHODS[S.best], METHODS[D.leaderboard[0].method]];
-  const gap = S.single - S.oracle;
-  const closed = (share) => (share < 0 ? "worse than the single best" : percents(share));
-  const pays =
-    S.closed >= 0.05
-      ? "pays here"
-      : given(S.oracle_apart) && S.oracle_apart >= S.single
-        ? "does not pay here"
-        : "might pay, but no selector here knows how";
-  const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ");
-  const other = best === leader ? "" : `, the lowest plain mean (${leader} has the lowest interquartile mean),`;
-  const apart = given(S.oracle_apart) ? `, or ${degrees(S.oracle_apart)} if it is picked on other seeds` : "";
-  const share = given(S.closed) ? `, ${closed(S.closed)}${S.closed < 0 ? "" : " of the gap between them"}` : "";
-  const learnt = given(S.selector)
-    ? `, and a selector that knows ${listed(S.features)} ${degrees(S.selector)}${share}`
-    : "";
-  $("selection-text").textContent =
-    `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)}${other} over ` +
-    `${counted(S.instances, "instance")}, the best method of each ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
-    (S.why ? ` There is no selector: ${S.why}.` : "");
-  const ways = [
-    [`single best, by the plain mean: ${best}`, S.single],
-    ["selector, on instances it was not trained on", S.selector],
-    ["oracle, scored on seeds it was not picked on", S.oracle_apart],
-    ["oracle", S.oracle],
-  ].filter(([, error]) => given(error));
-  const plain = (title, show, more) => ({ title, show, ...more });
-  const text = { text: true };
-  const error = plain("mean error °", (row) => twoDigits(row.error ?? row[1]));
-  const part = plain("gap closed", (row) => (gap > 0 ? closed((S.single - row[1]) / gap) : "–"));
-  const choice = plain("choice of a method", ([name]) => name, text);
-  table($("choosing"), [choice, error, part], ways, { name: "Ways of choosing" });
-  const won = column("instances won", "1", whole, { down: true });
-  const taken = column("chosen by the selector", "2", whole, { down: true });
-  const wins = [methodColumn("0"), won, ...(given(S.selector) ? [taken] : [])];
-  table($("wins"), wins, S.wins, { name: "Instances won" });
-  if (!S.where.length) return $("where").remove();
-  const where = [
-    plain("where", (row) => row.part, text),
-    plain("instances", (row) => whole(row.instances)),
-    plain("best there", (row) => [swatch(row.method), METHODS[row.method]], text),
-    error,
-    plain(`${shortened(best, 20)} behind by °`, (row) => twoDigits(row.behind)),
-  ];
-  table($("where"), where, S.where, { name: "Who wins where" });
 }
 
 // One method against all others, instance by instance.

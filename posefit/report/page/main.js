@@ -5,7 +5,6 @@ const SECTIONS = {
     claims();
   },
   comparison,
-  selection,
   curves,
   "by-function": functionShares,
   joints,
