@@ -9,11 +9,10 @@ into an error.
 
 import os
 import re
-import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
@@ -25,7 +24,7 @@ import pluggy
 from posefit import hooks
 from posefit.errors import InputError
 from posefit.hooks import PROJECT, ClaimedOrder
-from posefit.reading import cut, quoted, suggestion
+from posefit.reading import quoted, suggestion
 from posefit.settings import Setting, settings_of
 from posefit.version import posefit_build, source_digest
 
@@ -155,8 +154,6 @@ class Registry:
 @lru_cache(maxsize=1)
 def registry() -> Registry:
     """Return the methods of all installed plugins; they are loaded once a process."""
-    import numpy  # noqa: F401  # before a plugin that may change it
-
     return Registry(plugins_of("methods"))
 
 
@@ -220,8 +217,7 @@ def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owner
     """Return what a plugin offers, by how an error names it. Raises whatever goes wrong."""
     manager = pluggy.PluginManager(PROJECT)
     manager.add_hookspecs(hooks)
-    with _unpatched():
-        module = point.load()
+    module = point.load()
     manager.register(module, point.name)
     manager.check_pending()
     for hook in manager.get_hookcallers(module) or ():
@@ -268,29 +264,6 @@ def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owner
 
 def _taken(name: str) -> str:
     return f"{name} is already registered by"
-
-
-@contextmanager
-def _unpatched() -> Iterator[None]:
-    """Undo what the body changes for every other plugin, Python's recursion limit and NumPy's functions, and raise."""
-    names = ("numpy", "numpy.linalg", "numpy.random")
-    modules = [sys.modules[name] for name in names if name in sys.modules]
-    before, limit = [dict(vars(module)) for module in modules], sys.getrecursionlimit()
-    try:
-        yield
-    finally:
-        changed = [
-            f"another {module.__name__}.{name}"
-            for module, values in zip(modules, before, strict=True)
-            for name, value in values.items()
-            if vars(module).get(name) is not value
-        ]
-        changed += ["another recursion limit"] * (sys.getrecursionlimit() != limit)
-        for module, values in zip(modules, before, strict=True):
-            vars(module).update(values)
-        sys.setrecursionlimit(limit)
-    if changed:
-        raise InputError(f"to load it must leave NumPy and Python as they are, got {cut(', '.join(changed))}")
 
 
 def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
