@@ -16,7 +16,7 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | the figures of a row, their labels and digits | columns.py |
 | the methods compared on the runs that they share; the leaderboard | contest.py |
 | cost over evaluations, targets reached, errors of joints, calibration, running times, as numbers | curves.py |
-| the sentences of the first screen; published claims | summary.py |
+| the sentences of the first screen | summary.py |
 | the data of the page; its animations | content.py, animations.py |
 | the page: markup, style and scripts as one document | page/ |
 | figures by matplotlib, and the folder of a paper's figures and tables | figures.py |

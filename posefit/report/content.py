@@ -12,7 +12,6 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
 from posefit.motion.built_in import average_skeleton
 from posefit.reading import counted
-from posefit.registry import plugins_of
 from posefit.report import curves
 from posefit.report.animations import animations_of
 from posefit.report.columns import COLUMNS, SEARCH_COLUMNS
@@ -31,7 +30,6 @@ from posefit.report.runs import Runs, damage, views
 from posefit.report.summary import (
     leader_sentence,
     not_worse,
-    published_claims,
     three_tracks,
     unpaired_sentence,
 )
@@ -158,7 +156,6 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     title = "Targets reached, of all runs and 51 costs an instance"
     return {
         "examples": three_tracks(contest, leader),
-        "claims": published_claims(contest, [claim for one in plugins_of("claims") for claim in one.offers]),
         "evaluations": evaluations,
         "charts": [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]
         if len(evaluations)

@@ -16,7 +16,7 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
 
 MAX_MISSING = 20  # instances that are named if they are not compared
-PRINTED = ("header", "answer", "leaderboard", "baselines", "claims", "times")
+PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
 
 def write_report(
@@ -30,11 +30,11 @@ def write_report(
 ) -> dict[str, Any]:
     """Write the report of a ledger to a file, and return what the command prints.
 
-    That is the header, the answer, the leaderboard, the baselines, published claims of tracks, and the
-    running times of single searches. Without `out` no page is written; an earlier report of that name is replaced,
-    nothing else is. `figures` is a new folder for figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for
-    IOHprofiler's files, `csv` a new file of all rows. Raises ValueError where the ledger has no finished row or
-    something cannot be written, and ImportError where figures need matplotlib: before anything is written, if possible.
+    That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
+    `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
+    figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows.
+    Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
+    need matplotlib: before anything is written, if possible.
     """
     _check_places(Path(path), out, [figures, iohprofiler, csv])
     if figures is not None:

@@ -1,4 +1,4 @@
-// Methods compared: ranks and paired tests, published claims, one method against all others.
+// Methods compared: ranks and paired tests, one method against all others.
 const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
 const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`; // in a sentence
 const degrees = (value) => `${number(value, 2)}°`;
@@ -93,27 +93,6 @@ function comparison() {
   const show = (m) => table($("pairs"), columns, duelsOf(m), { name: "Paired tests", by: 1 });
   const names = P.methods.map((m) => [String(m), METHODS[m]]);
   chooseMethod($("against"), names, D.leaderboard[0].method, show);
-}
-
-// The results of orders of methods that publications claim.
-function claims() {
-  for (const C of D.claims ?? []) {
-    const names = C.methods.map((m) => METHODS[m]);
-    const errors = names.map((name, k) => `${name} ${k ? "" : "has "}${degrees(C.errors[k])}`);
-    const parts = C.steps.map(({ difference, adjusted, by_instance }, k) => {
-      const how = difference < 0 ? "worse" : difference > 0 ? "better" : "the same";
-      return (
-        `${names[k + 1]} is ${how} by a median of ${degrees(Math.abs(difference))} than ${names[k]} (paired Wilcoxon, ` +
-        `Holm over all steps, ${C.blocks} pairs: ${stated(adjusted)}; over ${C.instances} instances alone: ` +
-        `${stated(by_instance)})`
-      );
-    });
-    const confirmed = C.steps.flatMap((one, k) => (one.confirmed ? [`from ${names[k]} to ${names[k + 1]}`] : []));
-    const which = confirmed.length === C.steps.length ? "All of it is" : `Only the step ${confirmed.join(" and ")} is`;
-    const result = `${confirmed.length ? which : "It is not"} confirmed here, at 5 %.`;
-    const text = `: ${C.said}. Here ${errors.join(", ")}. ${parts.join("; ")}. ${result}`;
-    $("claims").append(make("div", { class: "note claim" }, make("strong", {}, `The claim of ${C.source}`), text));
-  }
 }
 
 // A select of methods, which shows the chosen one.

@@ -1,9 +1,6 @@
 // Puts the page together.
 const SECTIONS = {
-  leaderboard: () => {
-    leaderboard();
-    claims();
-  },
+  leaderboard,
   comparison,
   curves,
   "by-function": functionShares,
@@ -19,8 +16,8 @@ const SECTIONS = {
 document.title = `posefit: ${D.title}`;
 $("title").textContent = D.title;
 $("made").textContent = D.made;
-const [claim, ...because] = D.headline.split("; ");
-$("headline").textContent = because.length ? `${claim}.` : claim;
+const [first, ...because] = D.headline.split("; ");
+$("headline").textContent = because.length ? `${first}.` : first;
 $("whole").textContent = D.headline;
 if (!because.length) $("verdict-whole").remove();
 $("summary").textContent = D.header.summary;
