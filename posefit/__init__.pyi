@@ -47,7 +47,6 @@ from posefit.silhouette.cuda.device import moved_to as moved_to
 from posefit.silhouette.mask import Silhouette as Silhouette
 from posefit.statistics.intervals import iqm_intervals as iqm_intervals
 from posefit.statistics.ranks import friedman as friedman
-from posefit.suites.bundles import write_bundle as write_bundle
 from posefit.suites.problem import Problem as Problem
 from posefit.suites.problem import Suite as Suite
 from posefit.suites.problem import suite as suite
@@ -64,6 +63,5 @@ from posefit.uncertainty.intervals import angle_intervals as angle_intervals
 from posefit.uncertainty.intervals import joint_intervals as joint_intervals
 from posefit.uncertainty.modes import modes_of as modes_of
 from posefit.version import __version__ as __version__
-from posefit.version import source_digest as source_digest
 
 hookimpl: HookimplMarker

@@ -12,7 +12,6 @@ with a space is a function here.
 | tracker | `Tracker`: a `Task` and `Observation`s in, `Frame`s out | `posefit_register_trackers` |
 | segmenter | `Segmenter` of a `Footage` | `posefit_register_segmenters` |
 | command | a `click.Command` | `posefit_register_commands` |
-| claim of a publication | `ClaimedOrder` | `posefit_register_claims` |
 """
 
 from typing import TYPE_CHECKING, Any
@@ -45,8 +44,6 @@ from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Observation as Observation
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
-from posefit.hooks import ClaimedOrder as ClaimedOrder
-from posefit.hooks import RegisterClaim as RegisterClaim
 from posefit.hooks import RegisterCommand as RegisterCommand
 from posefit.hooks import RegisterOptimiser as RegisterOptimiser
 from posefit.hooks import RegisterPrior as RegisterPrior

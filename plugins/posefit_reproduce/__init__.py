@@ -12,3 +12,15 @@ folder `docs/studies`.
     bench/          the benchmark
     jobs.py         runs jobs in processes, by the engine of `posefit sweep`
 """
+
+from posefit import hookimpl
+from posefit.hooks import RegisterCommand
+
+
+@hookimpl
+def posefit_register_commands(register: RegisterCommand) -> None:
+    """Register `reproduce` and `bench`."""
+    from posefit_reproduce.commands import bench_command, reproduce_group
+
+    register(reproduce_group)
+    register(bench_command)

@@ -48,10 +48,10 @@ class _Commands(Command, Group):
 
 
 def _added() -> dict[str, click.Command]:
-    from posefit.registry import plugins_of
+    from posefit.registry import COMMAND, plugins_of
 
-    added = plugins_of("commands", tuple(main.commands))
-    return {command.name or "": command for plugin in added for command in plugin.offers}
+    added = plugins_of((COMMAND,), tuple(main.commands))
+    return {command.name or "": command for plugin in added for command in plugin.commands}
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -27,7 +27,7 @@ LIBRARIES = {
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
     for name, library in LIBRARIES.items():
-        (plugin,) = load("methods", [EntryPoint(name, f"posefit_{name}", "posefit")])
+        (plugin,) = load([EntryPoint(name, f"posefit_{name}", "posefit")])
         assert [offer.needs for offer in plugin.offers] == [(library, f"posefit[{name}]")]
         absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{name}]")) for offer in plugin.offers)
         kind = plugin.offers[0].kind
