@@ -7,7 +7,7 @@ with a space is a function here.
 
 | what you write | what it is | its hook |
 |---|---|---|
-| optimiser | `Optimiser`, also `Filter` or `Niching`, of a `Space` | `posefit_register_optimisers` |
+| optimiser | `Optimiser`, or `Filter`, of a `Space` | `posefit_register_optimisers` |
 | prior | `Prior` | `posefit_register_priors` |
 | tracker | `Tracker`: a `Task` and `Observation`s in, `Frame`s out | `posefit_register_trackers` |
 | segmenter | `Segmenter` of a `Footage` | `posefit_register_segmenters` |
@@ -36,7 +36,6 @@ from posefit.fitting.check import positive as positive
 from posefit.fitting.check import whole as whole
 from posefit.fitting.optimiser import Adapter as Adapter
 from posefit.fitting.optimiser import Filter as Filter
-from posefit.fitting.optimiser import Niching as Niching
 from posefit.fitting.optimiser import Optimiser as Optimiser
 from posefit.fitting.optimiser import finite_costs as finite_costs
 from posefit.fitting.prior import Prior as Prior

@@ -8,7 +8,7 @@
 
 `FitImage-v0` is a search for the pose in one silhouette whose observation is the picture, `FitState-v0` one whose
 observation is the state of the search; `Track-v0` follows a sequence; `Configure-v0` chooses and steers the optimisers
-of a search; `Race-v0` says which of several searches goes on; `Modes-v0` asks for all poses of one silhouette. Their
+of a search; `Race-v0` says which of several searches goes on. Their
 docstrings are their manual. Importing this package registers them; the environments themselves are imported when they
 are made. `drive` runs an optimiser against an environment or a vector of them, `drive_each` one in every environment of
 a vector, `track_reference` returns what a tracker would commit in Track-v0, `to_sb3_vec_env` adapts a vector
@@ -20,7 +20,6 @@ environment to Stable-Baselines3, and `check_vector_env` compares any vector env
 | FitImage-v0, FitState-v0, Track-v0 | fit.py, track.py |
 | Configure-v0: dynamic algorithm configuration; the population it steers | configure.py, population.py |
 | Race-v0: racing | race.py |
-| Modes-v0: niching | modes.py |
 | single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
 | arguments and numbered instances (as in sweeps: `posefit.footage.instance`) | instance.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
@@ -62,7 +61,6 @@ for _id, _entry in (
         entry_point=f"posefit_envs.{_entry}Env",
         vector_entry_point=f"posefit_envs.{_entry}VectorEnv",
     )
-register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 
 
 def __getattr__(name: str) -> Any:

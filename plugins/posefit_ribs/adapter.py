@@ -14,14 +14,13 @@ class Ribs(Adapter):
     """CMA-ES that restarts from an archive of dominated novelty search: from proposals far from all better ones.
 
     An archive of `capacity` proposals keeps those that are farthest from their nearest better ones. Several evolution
-    strategies search at a time, and each starts again, after so many populations, from a random one of them. `modes`
-    are the proposals of the archive that are better than all their neighbours.
+    strategies search at a time, and each starts again, after so many populations, from a random one of them.
 
     Settings:
         population_size: proposals at a time, those of all strategies together, 4 or more.
         strategies: that search at a time, 1 or more, with at least 4 proposals each.
         capacity: proposals that the archive holds, 2 or more.
-        neighbours: better ones whose distance counts, and neighbours that a mode is better than, 1 or more.
+        neighbours: better ones whose distance counts, 1 or more.
         populations: of a strategy until it starts again, 1 or more.
         step: first standard deviation of a strategy, in half-ranges of the box, above 0; at most that of the start.
     """
@@ -47,7 +46,7 @@ class Ribs(Adapter):
         at_least("neighbours", neighbours, 1)
         at_least("populations", populations, 1)
         positive("step", step)
-        self._first, self._neighbours = draw_population(space, rng, population_size), neighbours
+        self._first = draw_population(space, rng, population_size)
         super().__init__(space, self._first[0])
         self._archive: Any = DNSArchive(
             solution_dim=space.dimensions,
@@ -89,17 +88,6 @@ class Ribs(Adapter):
                 mine = slice(stop - one.batch_size, stop)
                 about = {name: value[mine] for name, value in added.items()}
                 one.tell(proposals[mine], values[mine], where[mine], about)
-
-    def modes(self) -> Array:
-        """Return the proposals (k, d) that are better than all their neighbours, the best first."""
-        kept = self._archive.data()
-        proposals, costs = np.asarray(kept["solution"]), -np.asarray(kept["objective"])
-        order = np.argsort(costs, kind="stable")
-        where = np.asarray(kept["measures"])[order]
-        away = np.linalg.norm(where[:, None] - where[None], axis=-1)
-        near = np.argsort(away, axis=1, kind="stable")[:, 1 : self._neighbours + 1]
-        best = (near > np.arange(len(order))[:, None]).all(axis=1)
-        return np.asarray(proposals[order][best])
 
     def _where(self, proposals: Array) -> Array:
         """Return points (n, m) as far apart as proposals (n, d) are: what wraps around goes round a circle."""

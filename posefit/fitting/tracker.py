@@ -121,9 +121,6 @@ class Prediction:
         tilt_margin_degrees: what is searched beyond them, to either side, 0 or more. Ours.
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
-        modes: searches of a frame that its modes are weighed by, the track's own and others; 0 weighs none. Ours.
-        modes_share: their evaluations, over those of the track's own search, above 0. Ours.
-        posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
         root_order: the root's angles are "yaw_first", or the paper's "xyz", without a tilt. Interpretation S3.
         variant: "paper" sets the letter of SAPSO's paper: a "literal" prediction, a "box" of tilts, "xyz".
@@ -138,9 +135,6 @@ class Prediction:
     tilt_margin_degrees: float = TILT_MARGIN_DEGREES
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
-    modes: int = 0
-    modes_share: float = 0.2
-    posterior_temperature: float = 2.0
     relocalise_gap: int | None = None
     root_order: RootOrder = "yaw_first"
     variant: Literal["default", "paper"] = "default"
@@ -151,14 +145,13 @@ class Prediction:
         if self.variant == "paper":
             for name, value in PAPER.items():
                 object.__setattr__(self, name, value)
-        for name in ("floor", "modes_share", "posterior_temperature", "tilt_share"):
+        for name in ("floor", "tilt_share"):
             positive(name, getattr(self, name))
         between("tilt_share", self.tilt_share, 0.0, 1.0)
         between("beta", self.beta, 0.0, 1.0)
         for name in ("spread", "tilt_margin_degrees", "root_range_degrees", "translation_range"):
             for value in np.atleast_1d(getattr(self, name)):
                 at_least(name, value, 0.0)
-        whole("modes", self.modes, 0)
         whole("relocalise_gap", self.relocalise_gap or 0, 0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
@@ -268,14 +261,10 @@ class SynthesisTracker:
                 continue
             optimiser = self._ready(optimiser, space, rng)
             problem = self.problem(space, observation)
-            best = self.minimum(problem, optimiser)
+            best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
             yield latest
-
-    def minimum(self, problem: PoseProblem, optimiser: Optimiser) -> Minimum:
-        """Return the best of the search of a frame."""
-        return minimise(problem.evaluate, optimiser, self.task.evaluations, budget_known=True)
 
     def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
         """Return the latest frame once more, at no evaluation; before the first one, the middle of the box."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.box import Space, Start, draw_population
-from posefit.fitting.optimiser import Filter, NextFrame, Niching, Optimiser, populations
+from posefit.fitting.optimiser import Filter, NextFrame, Optimiser, populations
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.settings import planned
 from posefit.testing import common
@@ -311,26 +311,6 @@ def next_frame(case: Case) -> str:
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 
 
-def modes(case: Case) -> str:
-    """The method modes returns proposals that were passed to tell, the best first."""
-    space = Toy(3, ball)
-    optimiser = case.build(space)
-    if not hasattr(optimiser, "modes"):
-        raise SkippedError("it has no modes")
-    known = np.concatenate([proposals for proposals, _ in case.steps(optimiser, space, sphere, 12)])
-    returned = cast(Niching, optimiser).modes()
-    check_population(returned, space)
-    expect(len(returned), "after twelve populations, modes must return at least one proposal, got (0, 3)")
-    rows = {row.tobytes() for row in known}
-    unknown = sum(row.tobytes() not in rows for row in np.asarray(returned))
-    expect(not unknown, f"modes must return proposals that tell got, got {unknown} others")
-    values = sphere(returned)
-    expect((np.diff(values) >= 0.0).all(), "modes must return the best first, got a dearer one before a cheaper")
-    lowest = float(sphere(known).min())
-    expect(values[0] <= lowest, f"modes must begin with the best there was, cost {lowest:.4g}, got {values[0]:.4g}")
-    return f"{len(returned)} modes"
-
-
 def compiled_search(case: Case) -> str:
     """The method compiled_search returns what ask, evaluate and tell do, bit for bit, and leaves the same state."""
     problem = pose_problem()
@@ -402,7 +382,6 @@ RULES = [
     copies,
     start,
     next_frame,
-    modes,
     compiled_search,
     sphere_problem,
     real_problem,

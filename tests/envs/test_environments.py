@@ -18,8 +18,6 @@ from posefit_envs.instance import instance
 from tests.cases import each
 
 SEARCHES = tuple(f"posefit/{name}-v0" for name in ("FitImage", "FitState", "Track", "Configure", "Race"))
-MODES = "posefit/Modes-v0"
-IDS = (*SEARCHES, MODES)
 WORLDS: list[dict[str, Any]] = [
     {},
     {"instance": 17},
@@ -28,14 +26,12 @@ WORLDS: list[dict[str, Any]] = [
     {"translation": "aligned", "mismatch_percent": 10.0, "split": "test", "train": ["walk-a", "run-a"]},
 ]
 VARIANTS = [(name, {}) for name in SEARCHES] + list(zip(SEARCHES, [*WORLDS[1:], WORLDS[3]], strict=True))
-VARIANTS += [(MODES, {}), (MODES, {"instance": 0}), (MODES, {"split": "test", "max_reports": 1})]
 SHORT: dict[str, dict[str, Any]] = {
     "posefit/FitImage-v0": {"max_evaluations": 7},
     "posefit/FitState-v0": {"max_evaluations": 7},
     "posefit/Track-v0": {"frames": 3, "evaluations_per_frame": 3},
     "posefit/Configure-v0": {"population_size": 5, "iterations": 4, "every": 1},
     "posefit/Race-v0": {"searches": 3, "generations": [4, 6]},
-    MODES: {"max_evaluations": 5},
 }
 
 
@@ -69,14 +65,14 @@ def trace(env: gym.Env[Any, Any], steps: int = 12) -> list[Any]:
     return results
 
 
-@each(("name", "arguments"), list(zip(IDS, [*WORLDS, {"instance": 3}], strict=True)))
+@each(("name", "arguments"), list(zip(SEARCHES, [*WORLDS, {"instance": 3}], strict=True)))
 def test_its_description_as_json_makes_an_equal_one(name: str, arguments: dict[str, Any]) -> None:
     env = gym.make(name, **{**arguments, **SHORT[name]})
     assert env.spec is not None
     assert data_equivalence(trace(env), trace(gym.make(EnvSpec.from_json(env.spec.to_json()))))
 
 
-@each("name", IDS)
+@each("name", SEARCHES)
 def test_it_can_be_pickled_and_copied_in_the_middle(name: str) -> None:
     env = gym.make(name, instance=3, **SHORT[name]).unwrapped
     env.reset(seed=0)
@@ -88,7 +84,7 @@ def test_it_can_be_pickled_and_copied_in_the_middle(name: str) -> None:
     env.close()
 
 
-@each("name", IDS)
+@each("name", SEARCHES)
 def test_pictures_are_rgb_and_a_window_opens(name: str) -> None:
     env = gym.make(name, render_mode="rgb_array")
     env.reset(seed=0)
@@ -205,10 +201,6 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"generations": (0, 5)}, "generations must be at least 1, got 0"),
         ({"generations": (5, 4)}, "generations must be the least and the largest, got 5 and 4"),
     ],
-    MODES: [
-        ({"split": "both"}, "split must be .*, got 'both'"),
-        ({"max_reports": 11}, "max_reports must be .*, got 11"),
-    ],
 }
 
 
@@ -230,7 +222,7 @@ def test_unknown_arguments_and_modes_are_named() -> None:
         gym.make("posefit/Track-v0", render_mode="ansi")
 
 
-@each("name", IDS)
+@each("name", SEARCHES)
 def test_wrong_actions_are_named(name: str) -> None:
     env = gym.make(name, disable_env_checker=True).unwrapped
     size = (env.action_space.shape or ())[0]
@@ -248,7 +240,7 @@ def test_wrong_actions_are_named(name: str) -> None:
             env.step(action)
 
 
-@each("name", IDS)
+@each("name", SEARCHES)
 def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
     env, other = (gym.make(name, instance=3, disable_env_checker=True).unwrapped for _ in range(2))
     env.reset(seed=0)

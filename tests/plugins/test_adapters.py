@@ -7,12 +7,10 @@ import warnings
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 
-import numpy as np
 import pytest
 
 import posefit
-from posefit.registry import Registry, load, registry
-from posefit.testing.toy import Toy
+from posefit.registry import Registry, load
 from tests.cases import each
 
 LIBRARIES = {
@@ -68,17 +66,3 @@ def test_an_unknown_variant_is_named() -> None:
     ):
         with pytest.raises(ValueError, match=message):
             posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
-
-
-def test_ribs_separates_two_minima() -> None:
-    space, centres = Toy(2), np.array([[-0.5, -0.5], [0.5, 0.4]])
-    optimiser = registry().optimiser("ribs")(space, np.random.default_rng(0))
-
-    def costs(proposals: np.ndarray) -> np.ndarray:
-        return 50.0 * ((proposals[:, None] - centres) ** 2).sum(axis=-1).min(axis=1)
-
-    for _ in range(150):
-        proposals = optimiser.ask()
-        optimiser.tell(proposals, costs(proposals))
-    modes = optimiser.modes()
-    assert np.linalg.norm(modes[:, None] - centres, axis=-1).min(axis=0).max() < 0.1

@@ -280,24 +280,6 @@ class IgnoresTheStart(Sound):
         self.population = allowed if len(allowed) == 40 else self.population
 
 
-class InventsModes(Sound):
-    def modes(self) -> Array:
-        return draw_population(self.space, np.random.default_rng(0), 3)
-
-
-class BackwardModes(Sound):
-    def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
-        super().__init__(space, rng)
-        self.costs: list[tuple[float, Array]] = []
-
-    def tell(self, proposals: Array, costs: Array) -> None:
-        self.costs += list(zip(costs.tolist(), np.array(proposals), strict=True))
-        super().tell(proposals, costs)
-
-    def modes(self) -> Array:
-        return np.array([row for _, row in sorted(self.costs, key=lambda pair: -pair[0])])
-
-
 class Slow(Sound):
     def ask(self) -> Array:
         time.sleep(0.06 * len(self.population))
@@ -486,8 +468,6 @@ OPTIMISERS: dict[type, tuple[str, ...]] = {
     HoldsALock: ("copies",),
     SharesItsGenerator: ("copies",),
     IgnoresTheStart: ("start",),
-    InventsModes: ("modes",),
-    BackwardModes: ("modes",),
     Slow: ("speed",),
     HangsOnNonsense: ("nonsense_settings",),
     WrongSignature: ("construction", "shape"),
