@@ -94,10 +94,10 @@ def measured() -> dict[str, float]:
         whole = sum(took[f"{name} {k}"] for k in range(4)) / 4
         figures[f"{name} frame, ms"] = 1e3 * whole
         figures[f"{name} overhead"] = 1e6 * whole / evaluations / least
-    for name in ("fit_each", "race_each", "configure_each"):
+    for name in ("fit_each", "race_each"):
         envs = _pair(*CASES[name])
         native = envs["native"].unwrapped
-        count = 40 * int(getattr(native, "population_size", 1)) * int(getattr(native, "every", 1))
+        count = 40 * int(getattr(native, "population_size", 1))
         took = fastest_of({kind: _steps(env, 1) for kind, env in envs.items()}, 0.5)
         figures |= {f"{name} {kind}, us": 1e6 * took[kind] / count for kind in took}
         figures[f"{name} over Sync"] = took["sync"] / took["native"]

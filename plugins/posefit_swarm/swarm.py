@@ -1,7 +1,6 @@
 """What particle swarms share: inertia, speed limits, and a state that moves so that every constraint is met."""
 
 import math
-from copy import copy
 from typing import Any, Literal
 
 import numpy as np
@@ -26,8 +25,6 @@ def inertia(step: int, steps: int, first: float = INERTIA) -> float:
 
 
 SPARE = 2048  # ours: how many numbers are drawn at once for redraws, beside those that one particle may need
-
-_EACH = ("moved", "velocity", "position", "cost", "best", "best_cost")  # what every particle has
 
 Pull = tuple[float, float, Array]  # omega, the acceleration c1 = c2, and the swarm's best (d,)
 
@@ -119,21 +116,6 @@ class SwarmState:
             objective, self._rng, schedule, temperature, annealing, *draws, self.arrays(), moves, searched
         )
         return (searched[0][:done], searched[1][:done]), temperature
-
-    def subset(self, rows: NDArray[np.int64]) -> "SwarmState":
-        """Return some particles (k,) as a state of their own, which draws from the same generator."""
-        part = copy(self)
-        for name in _EACH:
-            setattr(part, name, getattr(self, name)[rows])
-        part._all_rows = np.arange(len(rows))
-        part._next_velocity, part._stopped = np.empty_like(part.moved), np.zeros(len(rows), dtype=bool)
-        return part
-
-    def update(self, rows: NDArray[np.int64], part: "SwarmState") -> None:
-        """Take back what `subset` returned for these rows, as it is now."""
-        for name in _EACH:
-            getattr(self, name)[rows] = getattr(part, name)
-        self._spare, self.used = part._spare, part.used
 
     def draws(self) -> tuple[Array, int]:
         """Return the random numbers for redraws, which compiled loops write to, and how many of them are `used`."""
