@@ -7,7 +7,6 @@ from gymnasium import spaces
 
 from posefit.arrays import Array
 from posefit.fitting.check import whole
-from posefit.silhouette.sharing import work_through
 from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, log_improvement
 from posefit_envs.instance import ArgumentError, Episode, World, checked
 from posefit_envs.population import (
@@ -74,8 +73,6 @@ class ConfigureVectorEnv(SearchVectorEnv):
         before = [population.best for population in populations]
         for i in rows.tolist():
             populations[i].begin_step(control_of(actions[i]))
-        each = [slice(i, i + 1) for i in rows.tolist()]
-        work_through(each, self._stage.threads, lambda _: (), lambda row: populations[row.start].take_turns())
         while open_rows := [i for i, population in enumerate(populations) if population.open]:
             asked = {i: populations[i].ask() for i in open_rows}
             widest = max(len(proposals) for proposals in asked.values())

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.box import BATCH, REDRAWS, Space, displacement, draw_population, fold, repair, sample_normal
+from posefit.fitting.box import REDRAWS, Space, displacement, draw_population, fold, repair, sample_normal
 from posefit.silhouette.mask import box_of
 from posefit_envs.base import log_cost, scaled, unscaled
 from posefit_envs.instance import World, first_episode
 from posefit_envs.stage import Rows
-from posefit_envs.turns import Turns, products, take_turns
+from posefit_envs.turns import products
 from posefit_swarm.sapso import COOLING
 from posefit_swarm.swarm import INERTIA as SAPSO_INERTIA
 from posefit_swarm.swarm import SwarmState, inertia, speed_limits
@@ -125,36 +125,6 @@ class Population:
             drawn = draw_population(self.space, self.rng, restarted)
             swarm.moved[worst] = swarm.position[worst] = swarm.best[worst] = drawn
             swarm.velocity[worst], swarm.cost[worst], swarm.best_cost[worst] = 0.0, np.inf, np.inf
-
-    def take_turns(self) -> None:
-        """Ask, evaluate and tell until the step is done, in one compiled call, where the problem has such a form."""
-        problem, control, d = self.episode.problem, self.control, self.space.dimensions
-        objective = problem.compiled()
-        if objective is None:
-            return
-        kick = np.zeros(d if any(control.diffusion) else 0)
-        for layer, deviation in zip(self.layers, control.diffusion if len(kick) else (), strict=False):
-            kick[layer] = deviation
-        decay = inertia(1, self.steps * self.every) / SAPSO_INERTIA
-        turns = Turns(
-            self.open,
-            max(MIN_PARTICLES, round(control.population * self.size)),
-            control.shares[:2],
-            np.array([control.stride * float(decay**k) for k in range(self.every)]),
-            np.array([control.temperature * float(COOLING**k) for k in range(self.every)]),
-            kick,
-            *(ACCELERATION, GREEDY_SHARE, CROSSOVER_RATE, ELITE_SHARE, NEUTRAL_STRIDE, REDRAWS, BATCH),
-        )
-        costs, accepted, leader = np.empty(self.open), np.empty(self.open, dtype=bool), self.leader.copy()
-        swarm, draws = self.swarm, (self.rng, turns, *self.swarm.draws())
-        state = self.best, leader, swarm.arrays(), swarm.moved
-        swarm.used, best = take_turns(objective, *draws, *state, costs, accepted)
-        problem.count_poses(self.open)
-        assert swarm.used >= 0, "proposals are finite"
-        if best < self.best:
-            self.best, self.leader, self.stale = best, leader, 0
-        self._turns.append((costs, accepted))
-        self.used, self.open = self.used + self.open, 0
 
     def ask(self) -> Array:
         """Return the proposals (n, d) of the next turn: of the whole population, or of its best part.

@@ -12,7 +12,6 @@ from posefit.fitting.box import draw_population
 from posefit_envs.policies import sapso_action
 from posefit_envs.population import ControlAction, action_of, control_of, differential, normal
 from posefit_swarm.sapso import SAPSO
-from tests.cases import each
 
 NAME = "posefit/Configure-v0"
 NO_ACTION = np.full(10, -1.0)
@@ -27,9 +26,8 @@ def population_of(env: Any) -> Any:
 
 
 def recorded(env: Any) -> list[Any]:
-    """Return the list to which every population that an environment asks for is added, without compiled turns."""
+    """Return the list to which every population that an environment asks for is added."""
     asked: list[Any] = []
-    population_of(env).take_turns = lambda: None
     ask = population_of(env).ask
     population_of(env).ask = lambda: asked.append(ask().copy()) or asked[-1]
     return asked
@@ -57,22 +55,6 @@ def test_with_sapsos_own_schedule_it_costs_what_sapso_does_and_proposes_it_but_f
         np.testing.assert_array_equal(np.concatenate(costs_asked), np.concatenate(costs[1:]))
         assert info["best_cost"] == np.min(costs)
         assert info["evaluations"] == 2440
-
-
-@each("arguments", [{}, {"translation": "searched"}, {"population_size": 10, "every": 3}])
-def test_compiled_turns_are_those_of_python_bit_for_bit(arguments: dict[str, Any]) -> None:
-    rng, compiled, plain = np.random.default_rng(1), made(iterations=30, **arguments), made(iterations=30, **arguments)
-    for env in (compiled, plain):
-        env.reset(seed=5)
-    recorded(plain)
-    for _ in range(5):
-        action = np.where(rng.random(10) < 0.3, -1.0, rng.uniform(-1.0, 1.0, 10))
-        results = [env.step(action) for env in (compiled, plain)]
-        np.testing.assert_array_equal(*(result[0] for result in results))
-        assert results[0][1] == results[1][1]
-        for name in ("moved", "position", "velocity", "best", "best_cost"):
-            first, second = (getattr(population_of(env).swarm, name) for env in (compiled, plain))
-            np.testing.assert_array_equal(first, second)
 
 
 def test_a_control_comes_back_from_its_action() -> None:
