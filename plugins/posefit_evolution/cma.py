@@ -12,9 +12,7 @@ from posefit.errors import InputError
 from posefit.evolution.strategy import LAG, Strategy, default_population_size
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
-from posefit.fitting.optimiser import NOTHING_SEARCHED, WORST, finite_costs
-from posefit.fitting.problem import PoseProblem
-from posefit_evolution.kernels import search
+from posefit.fitting.optimiser import finite_costs
 
 SPREAD = 0.5  # sigma_0 in an unknown place, in half-ranges of the box
 GROWTH = 2  # IPOP: each restart has a population so many times as large
@@ -94,21 +92,6 @@ class CMAES:
         self._home, self._asked = proposals[known.argmin()].copy(), None
         if self._strategy.ended():
             self._restart()
-
-    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
-        """Return the next populations (k, n, d) and their costs (k, n), up to the next restart."""
-        n, d, strategy = self._population_size, self._space.dimensions, self._strategy
-        objective = problem.compiled() if self._asked is None and evaluations >= n else None
-        if objective is None:
-            return NOTHING_SEARCHED
-        searched = np.empty((evaluations // n, n, d)), np.empty((evaluations // n, n))
-        draws = self._rng, self._space.periodic, (self._redraws, *strategy.settings), self._home
-        now = strategy.generation, strategy.sigma, strategy.ending, strategy.state
-        done, strategy.sigma, ended = search(objective, *draws, *now, WORST, searched)
-        strategy.generation += done
-        if ended:
-            self._restart()
-        return searched[0][:done], searched[1][:done]
 
     def _restart(self) -> None:
         self._population_size *= self._growth  # AUGER2005 (restart)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
-from posefit.fitting.prior import CompiledLatents
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import Shape, Stored, angles_of, check_clustering
 from posefit_priors.clusters import clustered
@@ -95,11 +94,6 @@ class PCA(Linear):
         allowed = np.empty(len(latents), dtype=bool)
         near(writeable(latents), self.centres, self.reach, allowed)
         return allowed
-
-    @property
-    def compiled(self) -> CompiledLatents:
-        """The loops of `inverse_transform` and of `feasible`."""
-        return (recover, (self.components, self.mean)), (near, (self.centres, self.reach))
 
 
 def check_components(components: float) -> None:

@@ -7,10 +7,7 @@ velocities are clamped to their limits; else one outside them breaks a constrain
 
 import math
 
-import numpy as np
-
 from posefit.arrays import inlined, jit
-from posefit.fitting.kernels import evaluate, feasible
 
 FIRST_REDRAWS = 6  # ours: how many redraws of whole particles are made at once at first; then all that are left
 
@@ -154,100 +151,3 @@ def repair(broken, works, velocities, moved, velocity, position):
             broken[left] = broken[k]
             left += 1
     return broken[:left].copy()
-
-
-@inlined
-def advance(constraint, rng, rand, attempts, redraws, pull, spare, used, swarm, moves):
-    """Move a swarm so that it meets the constraints, as `SwarmState.move` does; return how much of `spare` is used.
-
-    `rand` and `redraws` are as in `move`, with more drawn to `spare` as it is used up; `attempts` are the redraws of
-    whole particles, and `pull` omega, the acceleration and the swarm's best (d,).
-    """
-    velocities, moved, stopped = moves
-    omega, acceleration, swarm_best = pull
-    (n, d), position, again, first = moved.shape, swarm[0], moves, True
-    rows, broken, count, left, many = np.empty(n, np.int64), np.empty(n, np.int64), 0, attempts, FIRST_REDRAWS
-    ends, works, clipped = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty((n, d))
-    for i in range(n):
-        rows[i], ends[i] = i, False
-    while True:
-        reached = 0
-        while reached < rows.size:
-            if used + 2 * redraws * d > spare.size:
-                for k in range(spare.size):
-                    spare[k] = rng.random()
-                used = 0
-            reached, used = move(
-                rows, reached, rand, spare, used, redraws, omega, acceleration, swarm_best, swarm, *again
-            )
-        feasible(constraint, again[1], works)
-        if first:
-            for i in range(n):
-                if not works[i]:
-                    broken[count], ends[i] = i, stopped[i]
-                    count += not stopped[i]
-            broken, first = broken[:count], False
-        else:
-            broken = repair(broken, works, again[0], again[1], velocities, moved)
-            left, many = left - many, attempts
-        if left <= 0 or not broken.size:
-            break
-        many = min(left, many)
-        rows, works = np.empty(broken.size * many, np.int64), np.empty(broken.size * many, np.bool_)
-        again = np.empty((rows.size, d)), np.empty((rows.size, d)), np.empty(rows.size, np.bool_)
-        rand = np.empty(2 * rows.size * d)
-        for k in range(rows.size):
-            rows[k] = broken[k // many]
-        for k in range(rand.size):
-            rand[k] = rng.random()
-    for k in range(broken.size):
-        ends[broken[k]] = True
-    count = 0
-    for i in range(n):
-        count += ends[i]
-        for j in range(d):
-            clipped[i, j] = min(max(moved[i, j], -1.0), 1.0)
-    if count:
-        works = np.empty(n, np.bool_)
-        feasible(constraint, clipped, works)
-        for i in range(n):
-            for j in range(d if ends[i] else 0):
-                moved[i, j] = clipped[i, j] if works[i] else position[i, j]
-                velocities[i, j] = 0.0
-    return used
-
-
-@jit
-def search(objective, rng, schedule, temperature, annealing, redraws, spare, used, swarm, moves, searched):
-    """Evaluate, accept and move a swarm, by a row of a `schedule` (k, 3) after the other, as `SwarmState` does it.
-
-    A row are omega, the acceleration and the factor of the temperature. `annealing` are what a refused particle keeps
-    of its velocity, the temperature that ends the search, and whether each accepted move cools; `redraws` those of
-    whole particles and of a coordinate. Written to `searched` are the proposals (k, n, d) and their costs (k, n).
-
-    Returns how many rows are done, how much of `spare` is used, and the temperature.
-    """
-    velocities, moved, _ = moves
-    kept, stop, each = annealing
-    n, d = moved.shape
-    rand, accepted = np.empty(n + 2 * n * d), np.empty(n, np.bool_)
-    for g in range(schedule.shape[0]):
-        proposals, costs = searched[0][g], searched[1][g]
-        if temperature <= stop or not evaluate(objective, moved, costs):
-            return g, used, temperature
-        for i in range(n):
-            for j in range(d):
-                proposals[i, j] = moved[i, j]
-        for k in range(rand.size):
-            rand[k] = rng.random()
-        leader = accept(moved, costs, rand, temperature, kept, swarm, accepted)
-        moves_accepted = 0
-        for i in range(n):
-            moves_accepted += accepted[i]
-        temperature *= schedule[g, 2] ** (moves_accepted if each else 1)
-        pull = schedule[g, 0], schedule[g, 1], swarm[2][leader]
-        used = advance(objective.constraint, rng, rand, redraws[0], redraws[1], pull, spare, used, swarm, moves)
-        for i in range(n):
-            for j in range(d):
-                swarm[4][i, j] = velocities[i, j]
-    return schedule.shape[0], used, temperature

@@ -13,7 +13,6 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import choices
-from posefit.fitting.problem import PoseProblem
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
 
 POPULATION_SIZE = 40
@@ -77,14 +76,6 @@ class PSO:
             proposals, costs, ALWAYS, 1.0, *self._weights(self._iteration)
         )  # KENNEDY1995 (pbest, gbest)
         self._iteration += 1
-
-    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
-        """Return the next populations (k, n, d) and their costs (k, n)."""
-        steps = range(self._iteration, self._iteration + evaluations // len(self._swarm.moved))
-        schedule = np.array([(*self._weights(step), 1.0) for step in steps]).reshape(-1, 3)
-        searched, _ = self._swarm.compiled_search(problem, schedule, ALWAYS, (1.0, 0.0, False))
-        self._iteration += len(searched[1])
-        return searched
 
     def _weights(self, step: int) -> tuple[float, float]:
         """Return, of an iteration, what multiplies the old velocity, and each of the two random pulls."""

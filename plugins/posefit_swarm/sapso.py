@@ -7,7 +7,6 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import REDRAWS, Space
 from posefit.fitting.check import at_least, between, choices, positive
-from posefit.fitting.problem import PoseProblem
 from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
 
 POPULATION_SIZE = 40  # N, section 5.2
@@ -97,16 +96,3 @@ class SAPSO:
             # SAPSO A1.2e
             self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
         self._iteration += 1
-
-    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
-        """Return the next populations (k, n, d) and their costs (k, n); the last one, which moves no more, is asked."""
-        before = self._iteration
-        after = min(before + evaluations // len(self._swarm.moved), self._iterations)
-        omegas = [inertia(step, self._iterations, self._inertia) for step in range(before, after)]
-        schedule = np.tile([0.0, self._acceleration, self._cooling], (len(omegas), 1))
-        schedule[:, 0] = omegas
-        schedule[: before == 0, 2] = 1.0  # the first moves are not cooled after
-        annealing = self._kept, self._stop, self._cool_each
-        searched, self._temperature = self._swarm.compiled_search(problem, schedule, self._temperature, annealing)
-        self._iteration += len(searched[1])
-        return searched

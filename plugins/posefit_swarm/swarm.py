@@ -10,9 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population, extent
 from posefit.fitting.check import at_least, positive
-from posefit.fitting.optimiser import NOTHING_SEARCHED
-from posefit.fitting.problem import PoseProblem
-from posefit_swarm.kernels import FIRST_REDRAWS, accept, move, repair, search
+from posefit_swarm.kernels import FIRST_REDRAWS, accept, move, repair
 
 INERTIA = 0.9  # A; Interpretation S5: the paper gives none, and it must be above 0.1
 ACCELERATION = 2.0  # c1 = c2, section 3.1
@@ -94,35 +92,6 @@ class SwarmState:
         leader = accept(self.moved, costs, rand, temperature, kept, self.arrays(), accepted)
         self._finish(rand, (omega, acceleration, self.best[leader]))
         return accepted
-
-    def compiled_search(
-        self, problem: PoseProblem, schedule: Array, temperature: float, annealing: tuple[float, float, bool]
-    ) -> tuple[tuple[Array, Array], float]:
-        """Return the next populations (k, n, d) with their costs (k, n), and the temperature after them.
-
-        They are evaluated, and `accept_and_move` is done with each. `schedule` (k, 3) has an omega, an acceleration and
-        a factor of the temperature for each; `annealing` are what a refused particle keeps of its velocity, the
-        temperature that ends the search, and whether each accepted move cools it. There are fewer where it ends, and
-        none where no compiled form is to be had.
-        """
-        (n, d), (count, _) = self.moved.shape, schedule.shape
-        objective = problem.compiled() if count and self._clamped and not self._scalar else None
-        if objective is None:
-            return NOTHING_SEARCHED, temperature
-        searched = np.empty((count, n, d)), np.empty((count, n))
-        redraws, moves = (self._redraws, self._coordinate_redraws), (self._next_velocity, self.moved, self._stopped)
-        draws = redraws, *self.draws()
-        done, self.used, temperature = search(
-            objective, self._rng, schedule, temperature, annealing, *draws, self.arrays(), moves, searched
-        )
-        return (searched[0][:done], searched[1][:done]), temperature
-
-    def draws(self) -> tuple[Array, int]:
-        """Return the random numbers for redraws, which compiled loops write to, and how many of them are `used`."""
-        most = 2 * self._coordinate_redraws * self.moved.shape[1] + SPARE
-        if len(self._spare) != most:  # nothing has been drawn yet
-            self._spare, self.used = np.empty(most), most
-        return self._spare, self.used
 
     def arrays(self) -> tuple[Any, ...]:
         """Return the arrays that the compiled loops take."""

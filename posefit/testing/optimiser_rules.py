@@ -311,20 +311,6 @@ def next_frame(case: Case) -> str:
     return f"mean cost {near:.3g}, by chance {chance:.3g}"
 
 
-def compiled_search(case: Case) -> str:
-    """The method compiled_search returns what ask, evaluate and tell do, bit for bit, and leaves the same state."""
-    problem = pose_problem()
-    if not hasattr(case.build(problem.space), "compiled_search"):
-        raise SkippedError("it has none")
-    searches = [
-        list(populations(case.build(problem.space, 0, BUDGET), evaluate, BUDGET))
-        for evaluate in (problem.evaluate, lambda proposals: problem.evaluate(proposals))
-    ]
-    compiled, plain = ([array for population in search for array in population] for search in searches)
-    expect(same(compiled, plain), "compiled_search must return what ask, evaluate and tell do, got others")
-    return f"{len(plain) // 2} populations"
-
-
 def sphere_problem(case: Case) -> str:
     """A sphere is solved better than by chance."""
     return _beats_chance(case, Toy(6), sphere)
@@ -382,7 +368,6 @@ RULES = [
     copies,
     start,
     next_frame,
-    compiled_search,
     sphere_problem,
     real_problem,
     speed,

@@ -13,7 +13,6 @@ import numpy as np
 from posefit import Frame, SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.box import draw_population, sample_normal
-from posefit.fitting.optimiser import NOTHING_SEARCHED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
@@ -131,18 +130,6 @@ class MixesRows(Sound):
 class Maximises(Sound):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, -costs)
-
-
-class CompilesAnother(Sound):
-    """Its compiled form draws other proposals."""
-
-    def compiled_search(self, problem: Any, evaluations: int) -> tuple[Array, Array]:
-        if evaluations < len(self.population):
-            return NOTHING_SEARCHED
-        proposals = -self.ask()
-        costs = problem.evaluate(proposals)
-        self.tell(proposals, costs)
-        return proposals[None], costs[None]
 
 
 class KnowsItsRows(Sound):
@@ -458,7 +445,6 @@ OPTIMISERS: dict[type, tuple[str, ...]] = {
     Talks: ("silence",),
     MixesRows: ("order",),
     Maximises: ("sphere_problem", "real_problem"),
-    CompilesAnother: ("compiled_search",),
     FewDimensionsOnly: ("dimensions",),
     UsesGlobalNumpy: ("global_randomness",),
     UsesTheClock: ("seeds",),
