@@ -47,6 +47,7 @@ from posefit.suites.problem import Problem as Problem
 from posefit.suites.problem import Suite as Suite
 from posefit.suites.problem import suite as suite
 from posefit.suites.running import run_of as run_of
+from posefit.suites.running import suite_scores as suite_scores
 from posefit.sweep.ledger import Ledger as Ledger
 from posefit.tracking.evaluation import unseen as unseen
 from posefit.tracking.front import fit as fit

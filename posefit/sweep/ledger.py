@@ -89,10 +89,6 @@ class Ledger:
     def __contains__(self, key: str) -> bool:
         return key in self._places
 
-    def keys(self) -> Iterator[str]:
-        """Return the keys of all finished cells."""
-        return iter(self._places)
-
     @property
     def version(self) -> str:
         """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
