@@ -30,7 +30,9 @@ __all__ = ["hookimpl", *_HOME]
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
-        raise AttributeError(f"module 'posefit' has no attribute {name!r}")
+        from posefit.reading import suggestion
+
+        raise AttributeError(f"module 'posefit' has no attribute {name!r}{suggestion(name, __all__)}")
     value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value

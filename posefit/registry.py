@@ -135,8 +135,8 @@ class Registry:
         known = self.offers[kind]
         family, colon, variant = name.partition(":")
         if family not in known:
-            came = f"{quoted(name)}{suggestion(family, known)}"
-            raise InputError(f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {came}")
+            listed = ", ".join(sorted(known)) or "none"
+            raise InputError(f"{kind} must be one of {listed}, got {quoted(name)}{self._hint(family, known)}")
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
@@ -151,6 +151,13 @@ class Registry:
         factory.__doc__ = offer.factory.__doc__
         return replace(offer, name=name, factory=factory)
 
+    def _hint(self, name: str, known: Iterable[str]) -> str:
+        """Return the end of a message about a name that is not known: its kind, the nearest name, or where to ask."""
+        kinds = [kind for kind, offers in self.offers.items() if name in offers]
+        if kinds:
+            return f"; its kind is {kinds[0]}"
+        return suggestion(name, known) or "; posefit plugins doctor says whether a plugin failed to load"
+
 
 @lru_cache(maxsize=1)
 def registry() -> Registry:
@@ -160,8 +167,12 @@ def registry() -> Registry:
 
 @lru_cache
 def plugins_of(kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()) -> tuple[Plugin, ...]:
-    """Return all installed plugins with what they offer of some kinds; see `load`."""
-    return load(entry_points(group=PROJECT), kinds, taken=taken)
+    """Return all installed plugins with what they offer of some kinds; see `load`.
+
+    One whose group only begins with posefit's name is among them, and broken.
+    """
+    groups = [group for group in entry_points().groups if group.startswith(PROJECT)]
+    return load([point for group in groups for point in entry_points(group=group)], kinds, taken=taken)
 
 
 def version_of(origins: Iterable[str]) -> str:
@@ -218,11 +229,18 @@ def _offers(
     point: EntryPoint, kinds: Iterable[Registrable], owner: str, release: str, owners: Mapping[str, str]
 ) -> "dict[str, Offer | click.Command]":
     """Return what a plugin offers, by how an error names it. Raises whatever goes wrong."""
+    if point.group != PROJECT:
+        raise InputError(f"its entry point must be in the group {PROJECT!r}, got {point.group!r}")
     manager = pluggy.PluginManager(PROJECT)
     manager.add_hookspecs(hooks)
     module = point.load()
     manager.register(module, point.name)
-    manager.check_pending()
+    try:
+        manager.check_pending()
+    except pluggy.PluginValidationError as error:
+        known = [name for name in vars(hooks) if name.startswith("posefit_register_")]
+        unknown = [name for name in vars(module) if name.startswith("posefit_") and name not in known]
+        raise InputError(f"{error}{suggestion(unknown[0], known) if unknown else ''}") from None
     offers: dict[str, Offer | click.Command] = {}
 
     def add(name: str, offer: "Offer | click.Command") -> None:

@@ -18,7 +18,7 @@ from posefit_priors.pca import PCA
 from tests.cases import each
 
 
-def point(name: str, module: Any) -> Any:
+def point(name: str, module: Any, group: str = "posefit") -> Any:
     """Return what stands for an entry point of a distribution that is not installed."""
 
     def load() -> Any:
@@ -26,7 +26,8 @@ def point(name: str, module: Any) -> Any:
             raise module
         return module() if callable(module) else module
 
-    return SimpleNamespace(name=name, dist=SimpleNamespace(name=f"posefit-{name}", version="1.0"), load=load)
+    distribution = SimpleNamespace(name=f"posefit-{name}", version="1.0")
+    return SimpleNamespace(name=name, group=group, dist=distribution, load=load)
 
 
 def registering(*offers: Any, hook: str = "optimisers", **more: Any) -> Any:
@@ -63,7 +64,7 @@ BROKEN = {
     KINDS: [
         (ImportError("no module named 'lost'"), "ImportError: no module named 'lost'"),
         (SystemExit(3), "SystemExit: 3"),
-        (registering(hook="optimizers"), "posefit_register_optimizers"),
+        (registering(hook="optimizers"), "did you mean 'posefit_register_optimisers'?"),
         (registering(("a", PCA), hook="priors", colour="red"), "TypeError"),
         (registering(("a.b", PCA)), "a name must be letters, digits"),
         (registering(("a:b", PCA)), "a name must be letters, digits"),
@@ -95,6 +96,25 @@ def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(kinds: A
         assert bad.traceback
         with pytest.raises(ValueError, match="plugin 'bad' of posefit-bad 1.0 is left out: "):
             load(points, kinds, {"POSEFIT_STRICT_PLUGINS": "1"}, ["track"])
+
+
+def test_an_entry_point_of_a_group_that_is_nearly_right_is_broken() -> None:
+    with pytest.warns(UserWarning, match="must be in the group 'posefit', got 'posefit.plugins'"):
+        (plugin,) = load([point("mine", offering("mine"), "posefit.plugins")])
+    assert plugin.state == "broken"
+
+
+@each(
+    ("name", "hint"),
+    [
+        ("sapos", "; did you mean 'sapso'\\?"),
+        ("mixture", "; its kind is segmenter"),
+        ("xyzzy", "; posefit plugins doctor says whether"),
+    ],
+)
+def test_an_unknown_name_gets_the_nearest_its_kind_or_the_doctor(name: str, hint: str) -> None:
+    with pytest.raises(ValueError, match=hint):
+        registry().offer("optimiser", name)
 
 
 def test_one_module_registers_methods_and_commands_and_only_the_hooks_of_the_kinds_asked_for_are_called() -> None:
