@@ -65,7 +65,7 @@ def trace(env: gym.Env[Any, Any], steps: int = 12) -> list[Any]:
     return results
 
 
-@each(("name", "arguments"), list(zip(SEARCHES, [*WORLDS, {"instance": 3}], strict=True)))
+@each(("name", "arguments"), list(zip(SEARCHES, WORLDS, strict=True)))
 def test_its_description_as_json_makes_an_equal_one(name: str, arguments: dict[str, Any]) -> None:
     env = gym.make(name, **{**arguments, **SHORT[name]})
     assert env.spec is not None
