@@ -29,4 +29,5 @@ def _summary(function: object) -> str:
     """Return the first paragraph of a function's docstring, and what it raises."""
     paragraphs = (inspect.getdoc(function) or "").split("\n\n")
     raises = [" ".join(text.split()) for text in paragraphs[1:] if text.lstrip().startswith("Raises")]
-    return " ".join([" ".join(paragraphs[0].split()), *raises]).removeprefix("Return ").removeprefix("nothing. ").replace("|", "\\|")
+    text = " ".join([" ".join(paragraphs[0].split()), *raises]).replace("|", "\\|")
+    return text.removeprefix("Return ").removeprefix("nothing. ")
