@@ -56,6 +56,7 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_run(
     optimiser: str,
+    *,
     functions: tuple[int, ...],
     dimensions: tuple[int, ...],
     instances: tuple[int | None, int | None],
