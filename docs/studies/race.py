@@ -1,4 +1,4 @@
-"""Does looking pay in Race-v0? Policies that do not look, that do, and that learn to, on held-out instances.
+"""Does it pay to observe in Race-v0? Policies that do not, that do, and that learn to, on held-out instances.
 
 All have the same instances, first populations and budgets, so that they are compared in pairs. The figure is
 ln(1 + best cost), which the rewards of an episode sum up to.
