@@ -7,21 +7,21 @@ import numpy as np
 from posefit.plugin import Adapter, Array, Space, at_least, draw_population, positive
 
 MIN_POPULATION_OF_A_STRATEGY = 4  # proposals of a strategy: half of them are its parents
+STRATEGIES = 2  # that search at a time
+ARCHIVE_CAPACITY = 100  # proposals
+NEIGHBOURS = 1  # better ones whose distance counts
+POPULATIONS_OF_A_STRATEGY = 40  # until it starts again
 
 
 @final
 class Ribs(Adapter):
     """CMA-ES that restarts from an archive of dominated novelty search: from proposals far from all better ones.
 
-    An archive of `capacity` proposals keeps those that are farthest from their nearest better ones. Several evolution
-    strategies search at a time, and each starts again, after so many populations, from a random one of them.
+    An archive of 100 proposals keeps those that are farthest from their nearest better ones. Two evolution strategies
+    search at a time, and each starts again, after 40 populations, from a random one of them.
 
     Settings:
         population_size: proposals at a time, those of all strategies together, 4 or more.
-        strategies: that search at a time, 1 or more, with at least 4 proposals each.
-        capacity: proposals that the archive holds, 2 or more.
-        neighbours: better ones whose distance counts, 1 or more.
-        populations: of a strategy until it starts again, 1 or more.
         step: first standard deviation of a strategy, in half-ranges of the box, above 0; at most that of the start.
     """
 
@@ -31,33 +31,25 @@ class Ribs(Adapter):
         rng: np.random.Generator,
         *,
         population_size: int = 24,
-        strategies: int = 2,
-        capacity: int = 100,
-        neighbours: int = 1,
-        populations: int = 40,
         step: float = 0.3,
     ) -> None:
         from ribs.archives import DNSArchive
         from ribs.emitters import EvolutionStrategyEmitter
 
         at_least("population_size", population_size, MIN_POPULATION_OF_A_STRATEGY)
-        at_least("strategies", strategies, 1)
-        at_least("capacity", capacity, 2)
-        at_least("neighbours", neighbours, 1)
-        at_least("populations", populations, 1)
         positive("step", step)
         self._first = draw_population(space, rng, population_size)
         super().__init__(space, self._first[0])
         self._archive: Any = DNSArchive(
             solution_dim=space.dimensions,
             measure_dim=self._where(self._first).shape[1],
-            capacity=capacity,
-            k_neighbors=neighbours,
+            capacity=ARCHIVE_CAPACITY,
+            k_neighbors=NEIGHBOURS,
             seed=int(rng.integers(2**31)),
         )
         if space.start is not None:
             step = min(step, max(float(np.mean(space.start.spread)), 1e-6))
-        strategies = min(strategies, population_size // MIN_POPULATION_OF_A_STRATEGY)
+        strategies = min(STRATEGIES, population_size // MIN_POPULATION_OF_A_STRATEGY)
         self._strategies: list[Any] = [
             EvolutionStrategyEmitter(
                 self._archive,
@@ -65,7 +57,7 @@ class Ribs(Adapter):
                 sigma0=step,
                 ranker="obj",
                 selection_rule="mu",
-                restart_rule=populations,
+                restart_rule=POPULATIONS_OF_A_STRATEGY,
                 batch_size=population_size // strategies + (k < population_size % strategies),
                 seed=int(rng.integers(2**31)),
             )
