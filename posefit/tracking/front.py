@@ -46,7 +46,7 @@ def track(
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
-    go to `progress`, by default a terminal or a notebook. Raises InputError for every mistake in the arguments or files.
+    go to `progress`, by default a terminal or a notebook. Raises InputError for any mistake in the arguments or files.
     """
     known = [option.name for option in fields(TrackOptions)]
     if unknown := [name for name in options if name not in known]:
