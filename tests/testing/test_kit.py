@@ -27,7 +27,7 @@ from tests.testing import planted
 
 SLOW = ("pso", "particle", "annealed", "scipy", "scipy:dual_annealing")
 ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna", "ribs")
-SLOW_PRIORS = ("loose", "full", "union", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA")
+SLOW_PRIORS = ("loose", "full", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA")
 
 
 def with_slow(quick: Sequence[str], slow: Sequence[str]) -> list[Any]:
