@@ -2,7 +2,6 @@
 
 import importlib
 import os
-import re
 from pathlib import Path
 
 import click
@@ -11,7 +10,6 @@ import pytest
 from click.testing import CliRunner
 
 import functions
-import suite_claims
 from make_boxes import learned_from, upright_poses
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
 from posefit.motion.built_in import average_skeleton
@@ -222,12 +220,6 @@ def test_shares_are_of_problems_and_targets_and_the_best_of_all_is_so_on_each_pr
     assert shares["best of all"] == [0.25, 0.75]
 
 
-def test_a_share_of_targets_has_its_interval() -> None:
-    text = suite_claims.share_text(8, "random", range(10_000, 10_004))
-    value, low, high = map(int, re.fullmatch(r"(\d+) \((-?\d+) to (\d+)\)", text).groups())  # type: ignore[union-attr]
-    assert low < value < high < 100
-
-
 def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"BUDGETS": (6, 7), "DESCENTS": 2, "LONGEST": 20}.items():
         monkeypatch.setattr(functions, name, value)
@@ -238,7 +230,6 @@ def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> 
     assert lines[2].startswith("| 2 next frame | 9 |")
     assert lines[2].endswith("| 1 |")  # rises are nearer to a tenth than to three
     assert lines[4].startswith("| bbob 3 | 9 |")
-    lines = list(functions.share_lines({2: 3 * [functions.shares_of(targets[None], [costs])]}))
+    lines = list(functions.share_lines({2: functions.shares_of(targets[None], [costs])}))
     assert lines[2].startswith("| 2 next frame |")
-    assert lines[-1] == "| 2 next frame | 1.00 |"
     assert picture.any()
