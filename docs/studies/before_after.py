@@ -49,9 +49,9 @@ def measured() -> dict[str, float]:
 
     import posefit
     from posefit.fitting.box import draw_population
+    from posefit.fitting.cma import CMAES
     from posefit.fitting.optimiser import minimise
     from posefit.silhouette.cost import areas
-    from posefit_evolution.cma import CMAES
     from posefit_reproduce.bench.environments import CASES, _pair, _steps
     from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
     from posefit_swarm.pso import PSO

@@ -14,7 +14,7 @@ from posefit.fitting.kernels import move_to_borders, unpack_proposals
 from posefit.geometry.kernels import LANES, empty_lanes, read_joints, set_offsets
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
-from posefit_swarm.kernels import step, update_best
+from posefit_envs.swarm_kernels import step, update_best
 
 
 class Scenes(NamedTuple):

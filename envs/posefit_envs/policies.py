@@ -14,8 +14,7 @@ from posefit.fitting.check import positive
 from posefit_envs.configure import EVERY, ITERATIONS
 from posefit_envs.population import ControlAction, action_of
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
-from posefit_swarm.sapso import COOLING, TEMPERATURE
-from posefit_swarm.swarm import inertia
+from posefit_envs.swarm import COOLING, TEMPERATURE, inertia
 
 Policy = Callable[[Any, int], Array]
 

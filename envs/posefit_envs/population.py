@@ -13,10 +13,9 @@ from posefit.silhouette.mask import box_of
 from posefit_envs.base import log_cost, scaled, unscaled
 from posefit_envs.instance import World, first_episode
 from posefit_envs.stage import Rows
+from posefit_envs.swarm import COOLING, SwarmState, inertia, speed_limits
+from posefit_envs.swarm import INERTIA as SAPSO_INERTIA
 from posefit_envs.turns import products
-from posefit_swarm.sapso import COOLING
-from posefit_swarm.swarm import INERTIA as SAPSO_INERTIA
-from posefit_swarm.swarm import SwarmState, inertia, speed_limits
 
 # what the numbers of an action stand for
 ACTION_NUMBERS = 10  # three optimisers, four of the population, three layers

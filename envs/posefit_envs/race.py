@@ -17,10 +17,11 @@ from posefit_envs.kernels import Swarms, move_swarms, teach_swarms
 from posefit_envs.population import MAX_SPREAD, MIN_SPREAD, State
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Rows
-from posefit_swarm.pso import PHI, constriction
+from posefit_swarm.pso import constriction
 
 SEARCHES, POPULATION_SIZE = 8, 8
 GENERATIONS = (100, 220)  # the least and the most that an episode has
+PHI = 4.1  # Clerc and Kennedy's usual sum of the two accelerations
 OMEGA = constriction(PHI)  # as PSO's
 ACCELERATION = OMEGA * PHI / 2.0
 MAX_SPEED = 0.5  # of particles, in half-ranges a generation

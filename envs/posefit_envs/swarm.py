@@ -11,11 +11,12 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population, extent
 from posefit.fitting.check import at_least, positive
-from posefit_swarm.kernels import FIRST_REDRAWS, accept, move, repair
+from posefit_envs.swarm_kernels import FIRST_REDRAWS, accept, move, repair
 
 INERTIA = 0.9  # A; Interpretation S5: the paper gives none, and it must be above 0.1
 ACCELERATION = 2.0  # c1 = c2, section 3.1
 ALPHA = 0.15  # section 2.2
+TEMPERATURE, COOLING = 1.0, 0.95  # T and gamma, section 5.2
 
 
 def inertia(step: int, steps: int, first: float = INERTIA) -> float:
