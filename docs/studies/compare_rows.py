@@ -39,9 +39,9 @@ def lines(before: dict[tuple[str, ...], Array], after: dict[tuple[str, ...], Arr
         means = (new - old)[drawn].mean(axis=1)
         low, high = np.quantile(means, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0], axis=0)
         for k, name in enumerate(FIGURES):
-            difference = f"{(new - old)[:, k].mean():+.3g}"
-            interval = f"{low[k]:+.3g} to {high[k]:+.3g}"
-            yield [method, name, str(len(cells)), f"{old[:, k].mean():.3g}", f"{new[:, k].mean():.3g}", difference, interval]
+            values = old[:, k].mean(), new[:, k].mean()
+            difference = f"{values[1] - values[0]:+.3g}", f"{low[k]:+.3g} to {high[k]:+.3g}"
+            yield [method, name, str(len(cells)), *(f"{value:.3g}" for value in values), *difference]
 
 
 @click.command(cls=Command, help=__doc__)

@@ -80,7 +80,7 @@ METHODS = {
     "particle@full": PaperMethod("PF", "particle", *_FULL),
     "sapso@full": PaperMethod("SAPSO", "sapso", *_FULL),
     OURS: PaperMethod("PCA + SAPSO", "sapso", "pca", {}),
-    LETTER: PaperMethod("PCA + SAPSO, paper", "sapso:paper", "pca", {}),
+    LETTER: PaperMethod("PCA + SAPSO, paper", "sapso-letter", "pca", {}),
     "pso@pca": PaperMethod("PCA + PSO", "pso", "pca", {}),
     "particle@pca": PaperMethod("PCA + PF", "particle", "pca", {}),
 }
