@@ -5,13 +5,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.seeding import np_random
 
 import posefit_envs  # noqa: F401, registers it
 from posefit.fitting.box import draw_population
 from posefit_envs.policies import sapso_action
 from posefit_envs.population import ControlAction, action_of, control_of, differential, normal
-from posefit_swarm.sapso import SAPSO
 
 NAME = "posefit/Configure-v0"
 NO_ACTION = np.full(10, -1.0)
@@ -31,30 +29,6 @@ def recorded(env: Any) -> list[Any]:
     ask = population_of(env).ask
     population_of(env).ask = lambda: asked.append(ask().copy()) or asked[-1]
     return asked
-
-
-def test_with_sapsos_own_schedule_it_costs_what_sapso_does_and_proposes_it_but_for_rounding() -> None:
-    for number, every in ((0, 1), (1, 5)):
-        env = made(instance=number, every=every)
-        env.reset(seed=number)
-        ended, step, asked, costs_asked = False, 0, recorded(env), []
-        while not ended:
-            _, _, ended, _, info = env.step(sapso_action(step, every=every))
-            costs_asked.append(population_of(env).costs)
-            step += 1
-        # the same draws: an environment's generator begins with the seed, and hands one number on to its search
-        rng, _ = np_random(number)
-        sapso = SAPSO(population_of(env).space, np.random.default_rng(int(rng.integers(2**63))))
-        problem = population_of(env).episode.problem
-        proposed, costs = [], []
-        while len(proposals := sapso.ask()):
-            proposed.append(proposals.copy())
-            costs.append(problem.evaluate(proposals))
-            sapso.tell(proposals, costs[-1])
-        np.testing.assert_allclose(np.concatenate(asked), np.concatenate(proposed[1:]), rtol=0.0, atol=1e-12)
-        np.testing.assert_array_equal(np.concatenate(costs_asked), np.concatenate(costs[1:]))
-        assert info["best_cost"] == np.min(costs)
-        assert info["evaluations"] == 2440
 
 
 def test_a_control_comes_back_from_its_action() -> None:
