@@ -25,8 +25,8 @@ myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 toc_object_entries = False  # thousands, and every page would look through them for its navigation
-# what the modules of posefit_bridges, and `Problem.ioh`, build upon
-autodoc_mock_imports = ["evox", "ioh", "iohblade", "metaevobox", "nevergrad", "optuna", "optunahub", "pymoo", "torch"]
+# what `Problem.ioh` builds upon
+autodoc_mock_imports = ["ioh"]
 autodoc_typehints_format = "short"
 python_maximum_signature_line_length = 90
 copybutton_exclude = ".linenos, .gp, .go"

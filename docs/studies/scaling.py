@@ -1,7 +1,7 @@
 """What a pose costs as a function of the picture's size, the views, the dimensions and the population.
 
-Each is the benchmark's problem with one number changed, on one thread, in microseconds a pose: the fastest run in CPU
-time. The last column of a curve is its slope by least squares.
+Each is the benchmark's problem with one number changed, on one thread, in microseconds a pose: the fastest run. The
+last column of a curve is its slope by least squares.
 """
 
 from dataclasses import replace
@@ -10,7 +10,6 @@ from functools import partial
 import click
 import numpy as np
 
-from before_after import fastest_of
 from posefit.fitting.box import draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.geometry.camera import Camera
@@ -18,7 +17,7 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit_priors.pca import PCA
-from posefit_reproduce.bench.kernel import bench_problem, walking_angles
+from posefit_reproduce.bench.kernel import bench_problem, fastest, walking_angles
 
 POSES = 400
 WIDTHS, VIEWS, COMPONENTS, POPULATIONS = (
@@ -62,7 +61,7 @@ def main() -> None:
             str(x): partial(own.evaluate, draw_population(own.space, np.random.default_rng(0), counts[x]))
             for x, own in problems.items()
         }
-        took = fastest_of(jobs, 0.5)
+        took = fastest(jobs)
         costs = {x: 1e6 * took[str(x)] / counts[x] for x in problems}
         slope = np.polyfit(
             list(costs), [cost * counts[x] if name == "population" else cost for x, cost in costs.items()], 1

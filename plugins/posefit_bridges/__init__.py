@@ -1,21 +1,122 @@
-"""Problems of posefit's suites as those of other tools, where benchmarks are run and optimisers are learned.
+"""Problems of posefit's suites as those of other tools, where benchmarks are run.
 
-Each module imports its tool, which `pip install posefit[NAME]` brings along, and has a `Problem` of that tool's kind.
-Unless `infeasible` says another, a proposal that is not feasible costs what its repair costs. Budgets are the tool's.
+Each function imports its tool, which `pip install posefit[NAME]` brings along. What is not feasible costs what the
+problem's `infeasible` says, by default what its repair costs. Each has `problem`, the suite's, with the trace; the
+budget is the tool's, since that of a problem ends the tool's loop by an error.
 
-| tool | module | what it is made of |
+| tool | function | what it returns |
 |---|---|---|
-| EvoX | evox.py | a problem |
-| IOH-BLADE, where language models design optimisers | blade.py | numbers of problems to train and to test on |
-| MetaBox, in numpy and in torch, with its data sets | metabox.py | a problem |
-| Nevergrad, with a plan for its benchmark command | nevergrad.py | a problem's numbers |
-| OptunaHub | optunahub.py | a problem |
-| pymoo | pymoo.py | a problem |
+| OptunaHub | optunahub_problem | a benchmark for studies of Optuna |
+| pymoo | pymoo_problem | a problem, evaluated a population at a time |
+| Nevergrad | nevergrad_function | a function of its benchmarks |
+| Nevergrad's benchmark command | posefit_suite | a plan of experiments |
 
 IOHexperimenter's is `problem.ioh()` of any problem of a suite.
 
 >>> import posefit
->>> from posefit_bridges.pymoo import Problem
->>> Problem(posefit.suite("posefit-2026.3", function=1, instance=10_000, dimension=9)).n_var
+>>> from posefit_bridges import pymoo_problem
+>>> pymoo_problem(posefit.suite("posefit-2026.3", function=1, instance=10_000, dimension=9)).n_var
 9
 """
+
+from collections.abc import Iterator
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE
+from posefit.suites.problem import EVALUATIONS, Infeasible, Problem, suite
+
+if TYPE_CHECKING:
+    from nevergrad.benchmark.xpbase import Experiment
+    from nevergrad.functions import ExperimentFunction
+    from optunahub.benchmarks import BaseProblem
+    from pymoo.core.problem import Problem as PymooProblem
+
+OPTIMISERS = ("CMA", "OnePlusOne", "PSO", "RandomSearch", "TwoPointsDE")  # of the plan, by Nevergrad's names
+
+
+def optunahub_problem(problem: Problem) -> "BaseProblem":
+    """Return a problem of OptunaHub whose parameters x0, x1, ... are floats of [-1, 1], to be minimised.
+
+    A trial that is not feasible is no failure. Y. Ozaki et al., OptunaHub: a platform for black-box optimization, 2025,
+    arXiv 2510.02798.
+    """
+    from optuna.distributions import BaseDistribution, FloatDistribution
+    from optuna.study import StudyDirection
+    from optunahub.benchmarks import BaseProblem
+
+    names = [f"x{k}" for k in range(problem.dimension)]
+
+    class OptunaHubProblem(BaseProblem):
+        def __init__(self) -> None:
+            self.problem = problem
+
+        @property
+        def search_space(self) -> dict[str, BaseDistribution]:
+            return {name: FloatDistribution(-1.0, 1.0) for name in names}
+
+        @property
+        def directions(self) -> list[StudyDirection]:
+            return [StudyDirection.MINIMIZE]
+
+        def evaluate(self, params: dict[str, Any]) -> float:
+            return float(problem([params[name] for name in names]))
+
+    return OptunaHubProblem()
+
+
+def pymoo_problem(problem: Problem) -> "PymooProblem":
+    """Return a problem of pymoo with one objective, no constraint and the bounds -1 and 1.
+
+    Its Pareto front is the optimum, where that is known. J. Blank, K. Deb, pymoo: multi-objective optimization in
+    Python, IEEE Access 8, 2020.
+    """
+    from pymoo.core.problem import Problem as PymooProblem
+
+    class SilhouetteProblem(PymooProblem):
+        def __init__(self) -> None:
+            super().__init__(n_var=problem.dimension, n_obj=1, xl=-1.0, xu=1.0, vtype=float)
+            self.problem = problem
+
+        def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+            out["F"] = problem.evaluate(x)
+
+        def _calc_pareto_front(self, *args: Any, **kwargs: Any) -> list[float] | None:
+            return None if problem.optimum is None else [problem.optimum]
+
+    return SilhouetteProblem()
+
+
+def nevergrad_function(
+    function: int = 1, instance: int = 0, dimension: int = 9, infeasible: Infeasible = "repair"
+) -> "ExperimentFunction":
+    """Return a problem of the suite, by its numbers, as a function of Nevergrad: each copy of it counts for itself.
+
+    An experiment evaluates what the optimiser recommends once more at its end. J. Rapin, O. Teytaud, Nevergrad, a
+    gradient-free optimization platform, 2018.
+    """
+    import nevergrad
+    from nevergrad.functions import ExperimentFunction
+
+    class SilhouetteFunction(ExperimentFunction):
+        def __init__(self, function: int, instance: int, dimension: int, infeasible: Infeasible) -> None:
+            self.problem = suite(SUITE, function, instance, dimension, infeasible=infeasible)
+            box = nevergrad.p.Array(init=self.problem.initial_solution, lower=-1.0, upper=1.0)
+            super().__init__(self.problem, box.set_name(""))
+
+    return SilhouetteFunction(function, instance, dimension, infeasible)
+
+
+def posefit_suite(seed: int | None = None) -> "Iterator[Experiment]":
+    """Yield experiments of Nevergrad: each function, dimension and optimiser on three held-out instances."""
+    from nevergrad.benchmark.xpbase import Experiment
+
+    rng = np.random.default_rng(seed)
+    for function, instance in product(FUNCTIONS, HELD_OUT[:3]):
+        for dimension in function.dimensions:
+            problem = nevergrad_function(function.number, instance, dimension)
+            for optimiser in OPTIMISERS:
+                yield Experiment(problem, optimiser, budget=EVALUATIONS * dimension, seed=int(rng.integers(2**32)))

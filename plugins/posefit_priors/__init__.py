@@ -1,8 +1,7 @@
-"""Priors for posefit: `pca`, the paper's compact pose space; `loose`, freer limbs; `full`; `union`; scikit-learn's.
+"""Priors for posefit: `pca`, the paper's compact pose space; `loose`, freer limbs; `full`; scikit-learn's.
 
 - `pca.PCA` is section 2 of the SAPSO paper: principal components, a range (constraint 1) and clusters (constraint 2).
 - `loose.Loose` adds freedom at shoulders, elbows, hips and knees, for movements that are not in the training poses.
-- `union.Union` is one space for several motions, feasible near any of many local Gaussians.
 - `full.Full` is all joint angles that are free, within their limits.
 - `sklearn.Transformed` is a decomposition of scikit-learn that has an inverse: `sklearn:KernelPCA`.
 
@@ -20,15 +19,13 @@ from posefit.hooks import RegisterPrior
 
 @hookimpl
 def posefit_register_priors(register: RegisterPrior) -> None:
-    """Offer `pca`, `loose`, `full`, `union` and `sklearn:NAME`."""
+    """Offer `pca`, `loose`, `full` and `sklearn:NAME`."""
     from posefit_priors.full import Full
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA
     from posefit_priors.sklearn import Transformed
-    from posefit_priors.union import Union
 
     register("pca", PCA)
     register("loose", Loose)
     register("full", Full)
-    register("union", Union)
     register("sklearn", Transformed)

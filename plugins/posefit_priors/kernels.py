@@ -79,22 +79,3 @@ def near_within_limits(latents, components, mean, loose, low, high, centres, rea
             allowed[i] = low[k] - ROUNDING <= angle <= high[k] + ROUNDING
             k += 1
     return allowed
-
-
-@jit
-def mahalanobis(centres, whitening, latents):
-    """Return the Mahalanobis distance (n,) of latents (n, m) from the cluster that is nearest by it."""
-    m = centres.shape[1]
-    nearest = np.full(latents.shape[0], np.inf)
-    for i in range(latents.shape[0]):
-        for c in range(centres.shape[0]):
-            total = 0.0
-            for j in range(m):
-                part = 0.0
-                for k in range(j + 1):
-                    part += whitening[c, j, k] * (latents[i, k] - centres[c, k])
-                total += part * part
-                if total > nearest[i]:
-                    break
-            nearest[i] = min(nearest[i], total)
-    return np.sqrt(nearest)

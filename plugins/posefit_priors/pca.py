@@ -17,37 +17,9 @@ COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
 DECIMALS = 7  # of what is learned, in radians and shares
 QUANTILE = 0.99  # Interpretation S5: chi is this quantile of the training distances
-SHAPES: dict[str, Shape] = {
-    "mean": (63,),
-    "components": ("m", 63),
-    "low": ("m",),
-    "high": ("m",),
-    "centres": ("k", "m"),
-}
 
 
-class Linear(Stored):
-    """Poses that are a mean and a weighted sum of components."""
-
-    mean: Array  # (63,)
-    components: Array  # (m, 63)
-    low: Array  # (m,)
-    high: Array  # (m,)
-    centres: Array  # (K, m) of clusters
-    reach: Array  # () of a cluster: chi
-
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
-        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)  # SAPSO 2.1.3 projection
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
-        angles = np.empty((len(latents), len(self.mean)))
-        recover(writeable(latents), self.components, self.mean, angles)
-        return angles
-
-
-class PCA(Linear):
+class PCA(Stored):
     """Principal components of joint angles with constraint 1, a range, and constraint 2, nearness to a cluster.
 
     Settings:
@@ -57,7 +29,21 @@ class PCA(Linear):
         seed: of the clustering, 0 or more.
     """
 
-    SHAPES: ClassVar[Mapping[str, Shape]] = {**SHAPES, "reach": (), "explained": ("m",)}
+    SHAPES: ClassVar[Mapping[str, Shape]] = {
+        "mean": (63,),
+        "components": ("m", 63),
+        "low": ("m",),
+        "high": ("m",),
+        "centres": ("k", "m"),
+        "reach": (),
+        "explained": ("m",),
+    }
+    mean: Array  # (63,)
+    components: Array  # (m, 63)
+    low: Array  # (m,)
+    high: Array  # (m,)
+    centres: Array  # (K, m) of clusters
+    reach: Array  # () of a cluster: chi
     explained: Array  # (m,) share of the variance along each component
 
     def __init__(
@@ -83,6 +69,16 @@ class PCA(Linear):
         self.centres = to_decimals(clustered(latents, self._clusters, self._seed)[0])
         self.reach = reach_of(self.centres, latents, self._quantile)
         return self
+
+    def transform(self, angles: Array) -> Array:
+        """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
+        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)  # SAPSO 2.1.3 projection
+
+    def inverse_transform(self, latents: Array) -> Array:
+        """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
+        angles = np.empty((len(latents), len(self.mean)))
+        recover(writeable(latents), self.components, self.mean, angles)
+        return angles
 
     @property
     def affine(self) -> tuple[Array, Array]:

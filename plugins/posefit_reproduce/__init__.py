@@ -14,7 +14,16 @@ folder `docs/studies`.
 """
 
 from posefit import hookimpl
-from posefit.hooks import RegisterOptimiser
+from posefit.hooks import RegisterCommand, RegisterOptimiser
+
+
+@hookimpl
+def posefit_register_commands(register: RegisterCommand) -> None:
+    """Register `reproduce` and `bench`."""
+    from posefit_reproduce.commands import bench_command, reproduce_group
+
+    register(reproduce_group)
+    register(bench_command)
 
 
 @hookimpl

@@ -110,7 +110,6 @@ TRACK: tuple[Any, ...] = (
     click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
     click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
     click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
-    click.option("--rerun", metavar="FILE", help="Write a recording (.rrd) for the Rerun viewer."),
     click.option("--verbose", is_flag=True, help="Print all figures, not three lines."),
     click.option("--quiet", is_flag=True, help="No messages and no bars, only the result."),
     JSON,
@@ -133,7 +132,7 @@ HEADINGS = {  # the options of a track in its help, by their names in Python
     "Method and budget": "method settings train without_subject evaluations population_size iterations ask_seconds "
     "seed threads device",
     "How it is followed": "translation first_pose restarts body_frames hypotheses smooth passes",
-    "Results": "out force resume rerun verbose quiet as_json",
+    "Results": "out force resume verbose quiet as_json",
 }
 
 

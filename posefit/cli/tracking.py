@@ -70,10 +70,10 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progre
 
     if options["source"]:
         raise InputError(f"SOURCE must be left out with --live, got {' '.join(options['source'])}")
-    if useless := [name for name in ("force", "resume", "rerun", "without_subject") if options[name]]:
+    if useless := [name for name in ("force", "resume", "without_subject") if options[name]]:
         raise InputError(f"--{useless[0].replace('_', '-')} must be left out with --live")
     given = _arguments({**options, "source": ("live.mp4",)})  # for the options of a segmenter
-    kept = {name: given[name] for name in given if name not in ("source", "out", "force", "resume", "rerun")}
+    kept = {name: given[name] for name in given if name not in ("source", "out", "force", "resume")}
     frames, out = track_live(live, progress=shown, **kept), options["out"]
     summary = write_live(frames, out, (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None)
     latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"

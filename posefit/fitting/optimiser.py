@@ -37,17 +37,6 @@ class Filter(Optimiser, Protocol):
         ...
 
 
-class Niching(Optimiser, Protocol):
-    """An optimiser that searches for several optima and separates them."""
-
-    def modes(self) -> Array:
-        """Return the proposals (k, d) that it takes for optima of their own, the best first.
-
-        They are among those passed to `tell`; k is at least 1 after the first `tell`.
-        """
-        ...
-
-
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a numpy Generator that is the
 # only source of randomness, and keyword-only settings. The driver fills in the settings `evaluations`, the budget of
 # one search, and `iterations`, the populations after the first that this budget holds, for a factory that takes them.

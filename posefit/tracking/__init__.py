@@ -13,6 +13,6 @@
 | what a trajectory costs, and which of two is kept | trajectory.py |
 | errors and baselines of a track; what every figure is called, its unit and meaning | evaluation.py, measures.py |
 | the folder that appears whole, and goes on where it ended; whether two tracks are the same | outputs.py, identity.py |
-| pictures, the page, a recording for the Rerun viewer | picture.py, drawing.py, page/, recording.py |
+| pictures, the page | picture.py, drawing.py, page/ |
 | the printed table, and the signs of trust | table.py, trust.py |
 """

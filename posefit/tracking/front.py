@@ -34,7 +34,6 @@ def track(
     out: str | Path | None = None,
     force: bool = False,
     resume: bool = False,
-    rerun: str | Path | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Track:
@@ -46,9 +45,8 @@ def track(
     the defaults that depend on the source in `posefit.tracking.method.resolved`.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
-    not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. `rerun` is where a
-    recording for the Rerun viewer goes; `progress` where messages and bars go, by default a terminal or a notebook.
-    Raises InputError for every mistake in the arguments or files.
+    not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
+    go to `progress`, by default a terminal or a notebook. Raises InputError for any mistake in the arguments or files.
     """
     known = [option.name for option in fields(TrackOptions)]
     if unknown := [name for name in options if name not in known]:
@@ -69,10 +67,6 @@ def track(
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:
             raise InputError(f"{name} must be given with out, the folder of the track, got none")
-    if rerun is not None:
-        from posefit.tracking.recording import check_recording
-
-        check_recording(rerun)
     progress = progress or interactive()
     folder = Output()
     if out is not None:
@@ -86,12 +80,7 @@ def track(
             "view_degrees": options.get("view_degrees"),
         }
         training = training_motions(clips, scene.fps)
-        result = track_scene(scene, training, chosen, output=output, progress=progress, source=names)
-        if rerun is not None:
-            from posefit.tracking.recording import record
-
-            record(rerun, scene, result.motion, result.estimates)
-    return result
+        return track_scene(scene, training, chosen, output=output, progress=progress, source=names)
 
 
 def fit(source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any) -> Fit:

@@ -11,16 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 import functions
-import posefit
 import suite_claims
 from make_boxes import learned_from, upright_poses
-from make_bundles import compact
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
 from posefit.motion.built_in import average_skeleton
 from posefit.suites.boxes import STEP, TRAINING_PEOPLE, learned_without
-from posefit.suites.bundles import write_bundle
-from posefit.suites.running import run_on, suite_scores
-from posefit.suites.verification import verified
 from posefit.sweep.plan import Plan
 from scores import auroc, calibration_error, conformal_factor, false_alarms, kept_errors
 from tests.docs.pages import DOCS
@@ -190,19 +185,6 @@ def test_the_calibration_error_is_the_mean_gap_of_the_bins() -> None:
     right = np.array([True, False, True, True, True])
     assert calibration_error(probabilities, right, bins=2) == pytest.approx((2 * 0.2 + 3 * (1 - 2.6 / 3)) / 5)
     assert calibration_error(np.array([0.0, 1.0]), np.array([False, True])) == 0.0
-
-
-def test_a_run_made_compact_scores_as_before_and_claims_no_more(tmp_path: Path) -> None:
-    problems = [posefit.suite(function=function, instance=10_000) for function in (1, 2, 4)]
-    runs = [run_on(problem, "pso", evaluations=300) for problem in problems]
-    small = [compact(run, posefit.suite(function=run.function, instance=run.instance)) for run in runs]
-    assert suite_scores(small) == suite_scores(runs)
-    sizes = []
-    for name, some in (("small", small), ("whole", runs)):
-        write_bundle(some, tmp_path / f"{name}.zip")
-        assert verified(tmp_path / f"{name}.zip", 3).repeated == 3
-        sizes.append((tmp_path / f"{name}.zip").stat().st_size)
-    assert sizes[0] < 0.7 * sizes[1]
 
 
 def test_features_of_functions_that_are_known(monkeypatch: pytest.MonkeyPatch) -> None:

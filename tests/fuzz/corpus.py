@@ -20,7 +20,6 @@ from posefit_priors.full import Full
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
-from posefit_priors.union import Union
 from tests.footage.matroska import write_matroska
 from tests.fuzz.written import written
 from tests.geometry.calibrations import QUALISYS, TOML, opencv
@@ -66,7 +65,7 @@ def corpus(folder: Path) -> list[Seed]:
             seeds.append(_npz("masks", save, masks=stack, valid=~masks, usable=usable, fps=np.array(30.0)))
     seeds += [Seed("images", suffix, _image(masks[0], suffix)) for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")]
     angles = np.concatenate([built_in.motion(name).poses[:, 3:] for name in built_in.other_styles("walk")])
-    for prior in (PCA, Full, Loose, Union):
+    for prior in (PCA, Full, Loose):
         path = folder / "prior.npz"
         prior().fit(angles, motion.skeleton).save(path)
         seeds.append(Seed(prior.__name__, ".npz", path.read_bytes()))

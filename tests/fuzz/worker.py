@@ -42,7 +42,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA
     from posefit_priors.sklearn import Transformed
-    from posefit_priors.union import Union
 
     skeleton = read_asf(folder / "a.asf")
     plan.MAX_CELLS = CELLS
@@ -90,7 +89,7 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         "plan": plan.Plan.read,
         "ledger": ledger,
         **written.readers(),
-        **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Union, Transformed)},
+        **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Transformed)},
     }
 
 

@@ -1,4 +1,4 @@
-"""The other priors: all angles, several motions at once, and scikit-learn's transformers."""
+"""The priors: components, looser limbs, all angles, and scikit-learn's transformers."""
 
 import time
 from pathlib import Path
@@ -15,7 +15,6 @@ from posefit_priors.full import Full
 from posefit_priors.loose import Loose
 from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
-from posefit_priors.union import Union
 from tests.cases import each
 from tests.files import arrays
 
@@ -73,40 +72,12 @@ def test_a_skeleton_without_limits_is_named() -> None:
         Full(limits="training").fit(np.zeros((5, 63)))
 
 
-@pytest.fixture(scope="module")
-def union() -> Union:
-    return Union().fit(angles("walk-a", "walk-b", "run-a", "run-b"))
-
-
-def test_a_union_covers_every_motion_where_a_prior_of_one_does_not(union: Union) -> None:
-    for styles, others in ((("walk-a", "walk-b"), ("run-a", "run-b")), (("run-a", "run-b"), ("walk-a", "walk-b"))):
-        one = PCA(components=len(union.low)).fit(angles(*styles))
-        assert floor(union, angles(*others)) < 0.25 * floor(one, angles(*others))
-        assert union.feasible(union.transform(angles(*others))).mean() > 0.95
-
-
 def test_last_digits_of_a_library_of_linear_algebra_change_nothing_of_a_prior() -> None:
     walk = angles("walk-a", "walk-b")
     noise = 1.0 + 1e-15 * np.random.default_rng(0).standard_normal(walk.shape)
     one, other = PCA().fit(walk).arrays(), PCA().fit(walk * noise).arrays()
     for name, value in one.items():
         np.testing.assert_array_equal(value, other[name], err_msg=name)
-
-
-def test_little_is_feasible_half_way_between_two_motions(union: Union) -> None:
-    rng = np.random.default_rng(0)
-    walk, run = union.transform(angles("walk-a")), union.transform(angles("run-a"))
-    between = 0.5 * (walk[rng.integers(0, len(walk), 400)] + run[rng.integers(0, len(run), 400)])
-    one = PCA(components=len(union.low)).fit(angles("walk-a", "walk-b", "run-a", "run-b"))
-    assert union.feasible(between).mean() < 0.2
-    assert one.feasible(between).mean() > 0.5  # where the paper's constraint lets nearly everything in
-
-
-def test_a_long_clip_does_not_push_a_short_one_out() -> None:
-    walk, run = angles("walk-a"), angles("run-a")
-    many = np.concatenate([np.tile(walk, (20, 1)) + 1e-3 * np.random.default_rng(0).standard_normal((1200, 63)), run])
-    union, one = Union(components=4).fit(many), PCA(components=4).fit(many)
-    assert floor(union, run) < 0.8 * floor(one, run)
 
 
 def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
@@ -181,7 +152,7 @@ def test_no_freedom_at_all_is_the_space_of_pca() -> None:
     )
 
 
-@each("kind", [PCA, Full, Loose, Union, Transformed])
+@each("kind", [PCA, Full, Loose, Transformed])
 def test_a_file_that_is_no_prior_is_refused(kind: Any, tmp_path: Path) -> None:
     path, poses = tmp_path / "a.npz", angles("walk-a", "walk-b")
     kind().fit(poses, built_in.average_skeleton()).save(path)

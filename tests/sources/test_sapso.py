@@ -12,7 +12,7 @@ from posefit import SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.box import draw_population
-from posefit.fitting.tracker import Prediction, SynthesisTracker
+from posefit.fitting.tracker import Follower, Prediction, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
@@ -299,8 +299,9 @@ def test_s3_the_papers_root_angles_are_about_x_then_y_then_z() -> None:
 
 
 def test_the_papers_variant_of_the_tracker_is_the_letter_of_every_interpretation() -> None:
-    prediction = Prediction(variant="paper")
-    assert (prediction.prediction, prediction.tilt, prediction.root_order) == ("literal", "box", "xyz")
+    task, _, observations = scene()
+    space = Follower(task, Line(), Prediction(variant="paper")).space(observations[0])
+    assert (space.tilt, space.root_order) == (None, "xyz")  # Interpretations S16, S3
 
 
 def test_a1_2_the_loop_ends_at_the_stop_temperature() -> None:  # SAPSO A1.2
@@ -458,9 +459,9 @@ class Scripted:
         pass
 
 
-@pytest.mark.parametrize(("prediction", "steps"), [("latest", [0.0, 0.2, -0.1]), ("literal", [0.0, 0.0, 0.2])])
+@pytest.mark.parametrize(("variant", "steps"), [("default", [0.0, 0.2, -0.1]), ("paper", [0.0, 0.0, 0.2])])
 def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
-    prediction: Any, steps: list[float]
+    variant: Any, steps: list[float]
 ) -> None:  # Interpretation S12
     latents = [0.1, 0.3, 0.2, 0.2]
     made: list[Scripted] = []
@@ -470,7 +471,7 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
         return made[-1]
 
     task, _, observations = scene()
-    how = Prediction(prediction=prediction, spread=2.0, floor=0.05)
+    how = Prediction(variant=variant, spread=2.0, floor=0.05)
     tracker = SynthesisTracker(task, Line(), make, prediction=how)
     list(tracker.track(observations[:4], np.random.default_rng(0)))
     assert made[0].space.start is None  # frame 1 is an estimation

@@ -157,7 +157,7 @@ def test_a_prior_that_fails_in_a_search_is_named_and_not_the_optimiser_that_meet
         posefit.track("walk", method="@bad", **QUICK)
 
 
-@each("prior", ["full", "union", "sklearn", "sklearn:FactorAnalysis"])
+@each("prior", ["full", "sklearn", "sklearn:FactorAnalysis"])
 def test_every_prior_can_be_searched(prior: str) -> None:
     summary = posefit.track("walk", method=f"@{prior}", **QUICK).summary
     assert summary["method"] == f"annealed@{prior}"

@@ -36,7 +36,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"evaluations": 30, "method": "sapso"}, "evaluations must hold one population of 40, got 30"),
     ({"method": "sapzo"}, "method must be OPTIMISER@PRIOR, or one of .*, got 'sapzo'; did you mean 'sapso'"),
     ({"method": "sapzo@pca"}, "optimiser must be one of .*did you mean 'sapso'"),
-    ({"method": "@pcb"}, "prior must be one of full, loose, pca, sklearn, union, got 'pcb'; did you mean 'pca'"),
+    ({"method": "@pcb"}, "prior must be one of full, loose, pca, sklearn, got 'pcb'; did you mean 'pca'"),
     ({"method": "vsmm", "optimiser": dict}, "optimiser must not be given beside a tracker, got .* and vsmm"),
     ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
     ({"settings": {"sapso.coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),

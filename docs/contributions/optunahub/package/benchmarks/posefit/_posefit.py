@@ -1,11 +1,10 @@
 from __future__ import annotations
 
+import optunahub
 import posefit
-from posefit_bridges import optunahub
+from posefit_bridges import optunahub_problem
 
 
-class Problem(optunahub.Problem):
-    """A problem of the suite posefit-2026.3, by its numbers."""
-
-    def __init__(self, function: int = 1, instance: int = 0, dimension: int = 9) -> None:
-        super().__init__(posefit.suite("posefit-2026.3", function, instance, dimension))
+def Problem(function: int = 1, instance: int = 0, dimension: int = 9) -> optunahub.benchmarks.BaseProblem:
+    """Return a problem of the suite posefit-2026.3, by its numbers."""
+    return optunahub_problem(posefit.suite("posefit-2026.3", function, instance, dimension))

@@ -1,1 +1,0 @@
-from posefit_bridges.blade import Problem as Posefit

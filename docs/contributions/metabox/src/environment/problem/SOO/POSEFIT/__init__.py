@@ -1,1 +1,0 @@
-from posefit_bridges.metabox import Dataset as Posefit_Dataset
