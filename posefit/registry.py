@@ -64,9 +64,12 @@ class Offer:
     def origin(self) -> str:
         """What its results depend on: its distribution with its version, a digest of its package's source, its library.
 
-        The packages of posefit's own plugins, which have one version, are distinguished by name.
+        The packages of posefit's own plugins, which have one version, are distinguished by name. What such a plugin
+        offers from posefit itself depends on posefit's build.
         """
         module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
+        if self.distribution == PROJECT and module.partition(".")[0] == PROJECT:
+            return posefit_build()
         name = module.partition(".")[0] if self.distribution == PROJECT else f"{self.distribution} {self.version}"
         library = ""
         if self.needs is not None:
@@ -177,7 +180,7 @@ def plugins_of(kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()) -> t
 
 def version_of(origins: Iterable[str]) -> str:
     """Return the version of posefit, and of a method whose plugins have these origins: see `Offer.origin`."""
-    return ", ".join([posefit_build(), *sorted(set(origins))])
+    return ", ".join([posefit_build(), *sorted(set(origins) - {posefit_build()})])
 
 
 def optimiser(name: str) -> "OptimiserFactory":

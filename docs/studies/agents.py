@@ -17,7 +17,7 @@ from posefit import minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.evolution.strategy import Strategy, default_population_size
+from posefit.fitting.cma import Strategy, default_population_size
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs.fit import MAX_EVALUATIONS

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.stats import rankdata
 
 from posefit.arrays import Array
-from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.files import check_new
 from posefit.fitting.box import draw_population
+from posefit.fitting.cma import Strategy, default_population_size
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, suite_function
 from posefit.suites.problem import suite
 from posefit.suites.running import run_on

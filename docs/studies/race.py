@@ -16,7 +16,7 @@ import numpy as np
 from agents import HELD_OUT, check_learners
 from posefit.arrays import Array
 from posefit.cli.output import Command
-from posefit.evolution.strategy import Strategy
+from posefit.fitting.cma import Strategy
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.policies import (
     Policy,

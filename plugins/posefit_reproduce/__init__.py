@@ -8,13 +8,13 @@ Each has `--help`, and `--json` for one JSON object on stdout. Other measurement
 folder `docs/studies`.
 
     commands.py     the command lines
-    sapso/, vsmm/   the experiments
+    sapso/, vsmm/   the experiments; `sapso/letter.py` is an optimiser, `sapso-letter`
     bench/          the benchmark
     jobs.py         runs jobs in processes, by the engine of `posefit sweep`
 """
 
 from posefit import hookimpl
-from posefit.hooks import RegisterCommand
+from posefit.hooks import RegisterCommand, RegisterOptimiser
 
 
 @hookimpl
@@ -24,3 +24,11 @@ def posefit_register_commands(register: RegisterCommand) -> None:
 
     register(reproduce_group)
     register(bench_command)
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `sapso-letter`, which the reproduction of the SAPSO paper compares with `sapso`."""
+    from posefit_reproduce.sapso.letter import LetterSAPSO
+
+    register("sapso-letter", LetterSAPSO)

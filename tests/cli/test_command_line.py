@@ -237,7 +237,7 @@ def test_plugins_are_listed_with_their_origin_and_settings() -> None:
     assert (sapso["kind"], sapso["distribution"], sapso["next_frame"]) == ("optimiser", "posefit", "start")
     assert sapso["version"] == posefit.__version__
     assert {"name": "cooling", "type": "float", "default": 0.95} in sapso["settings"]
-    assert {"name": "cool", "type": "iteration | acceptance", "default": "iteration"} in sapso["settings"]
+    assert {"name": "limits", "type": "asf | training", "default": "asf"} in rows["full"]["settings"]
     text = run("plugins").stdout
     assert "optimiser sapso (posefit" in text
     assert "cooling: float = 0.95" in " ".join(text.split())
@@ -250,7 +250,7 @@ def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() ->
     assert text.startswith("optimiser sapso (posefit")
     words = " ".join(text.split())
     assert "--set sapso.cooling: float = 0.95 (gamma) factor on the temperature" in words
-    assert "--set sapso.cool: iteration | acceptance = iteration" in words
+    assert "--set full.limits: asf | training = asf" in " ".join(run("plugins", "show", "full").stdout.split())
     assert "Settings:" not in text
     assert all(len(line) <= 120 for line in text.splitlines())
     assert "It has no settings." in run("plugins", "show", "masks").stdout
@@ -265,7 +265,7 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
     result = run("plugins", "doctor")
     assert result.exit_code == 0
     assert "offers optimiser sapso, optimiser pso, optimiser random" in result.stdout
-    offers = "offers command reproduce, command bench"
+    offers = "offers optimiser sapso-letter, command reproduce, command bench"
     assert re.search(rf"^loaded    reproduce \(posefit .*\): {offers}$", result.stdout, re.MULTILINE)
     cause, trace = "ImportError: no module named 'lost'", "Traceback ...\n  line 7, in bad"
     broken = registry.Plugin("bad", "posefit-bad", "1.0", "broken", cause, traceback=trace)

@@ -62,7 +62,6 @@ def test_an_unknown_variant_is_named() -> None:
         ("nevergrad:Best", "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'"),
         ("scipy:minimize", "variant must be one of differential_evolution, dual_annealing, got 'minimize'"),
         ("pso:fast", "optimiser must be pso, which has no variants, got 'pso:fast'"),
-        ("sapso:fast", "variant must be one of default, paper, got 'fast'"),
     ):
         with pytest.raises(ValueError, match=message):
             posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
