@@ -12,5 +12,4 @@
 | the instances of each function | instances.py |
 | the boxes that are searched, made by `docs/studies/make_boxes.py` | boxes.py |
 | an optimiser on a problem; the run of any loop; scores of runs | running.py |
-| a problem as one of IOHexperimenter's | iohexperimenter.py |
 """
