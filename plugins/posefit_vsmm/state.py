@@ -1,18 +1,19 @@
-"""The state that the motion models move, and the points of a body that a silhouette may show. VSMM 3 and 6.1.
+"""The state that the motion models move, its quaternions, and the points of a body that a silhouette may show.
 
 A state is (43,): the root's translation in metres, then w, x, y, z of the whole body and of nine bones, each turned
-against its parent. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
-(Interpretation V4); `imm.PLACED` moves the one by the other. A joint that the state does not hold, such as the back's,
-follows those that it holds: see `Reliance`. The 17 points are Interpretation V2.
+against its parent. VSMM 3. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
+(Interpretation V4). A joint that the state does not hold, such as the back's, follows those that it holds: see
+`DependentJoints`. The 17 points are Interpretation V2. All functions take any number of leading axes.
 """
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import (
     joint_angles_from_rotation,
+    quaternions,
     root_angles_from_rotation,
     rotation_from_joint_angles,
     rotation_from_root_angles,
@@ -30,14 +31,22 @@ BONES = (
     "rradius",
     "lowerneck",
 )  # hips, knees, shoulders, elbows, neck
-STATE = 3 + 4 * (1 + len(BONES))  # a place, and a quaternion of the whole body and of each bone
-ERROR = 3 + 3 * (1 + len(BONES))  # a step, and a rotation vector of each of them
+TURNS = 1 + len(BONES)  # quaternions of a state: the whole body's, and each bone's
+STATE = 3 + 4 * TURNS
+ERROR = 3 + 3 * TURNS
 FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and the whole body's rotation vector
 # Where in an error the whole body's yaw, pitch and roll are: small turns about its y, x and z, whereas a rotation
 # vector has them in the order x, y, z.
 YAW_PITCH_ROLL = (4, 3, 5)
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
-HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[j] for j in INNER if j not in HELD])
+OTHERS = tuple(joint for joint in INNER if joint not in HELD)
+HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in OTHERS])
+
+_W, _X, _Y, _Z = np.eye(4)
+# PRODUCT[a, b] (4,) is the product of the a-th and the b-th of the units 1, i, j, k
+PRODUCT = np.array([[_W, _X, _Y, _Z], [_X, -_W, _Z, -_Y], [_Y, -_Z, -_W, _X], [_Z, _Y, -_X, -_W]])
+TANGENTS = 0.5 * PRODUCT[:, 1:].swapaxes(1, 2)  # (4, 4, 3) of each unit: its change by a small rotation on its right
+_CROSS = np.cross(np.eye(3), np.eye(3)[:, None])  # _CROSS[k] @ v is the cross product of the k-th axis and v
 
 
 def bone_errors(bone: str) -> slice:
@@ -46,47 +55,110 @@ def bone_errors(bone: str) -> slice:
     return slice(first, first + 3)
 
 
-@dataclass(frozen=True, eq=False)
-class Reliance:
-    """How the other joints follow: their angles are `matrix` @ the nine rotation vectors + `offset`."""
-
-    matrix: Array = field(repr=False)  # (36, 27)
-    offset: Array = field(repr=False)  # (36,) radians
-
-
-def encode(poses: Array, translations: Array) -> Array:
-    """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
-    from scipy.spatial.transform import Rotation  # a quarter of a second to import
-
-    root = rotation_from_root_angles(poses[:, :3])
-    held = rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
-    rotations = np.concatenate([root[:, None], held], axis=1)
-    quaternions = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    quaternions = quaternions.reshape(len(poses), -1, 4)
-    quaternions[0] *= np.where(quaternions[0, :, :1] < 0.0, -1.0, 1.0)
-    for k in range(1, len(poses)):
-        turned = np.einsum("ij,ij->i", quaternions[k], quaternions[k - 1]) < 0.0
-        quaternions[k, turned] *= -1.0
-    return np.column_stack([translations, quaternions.reshape(len(poses), -1)])
-
-
 def free_errors(skeleton: Skeleton) -> Array:
     """Return 1 for each error (33,) that a skeleton's joints allow, and 0 for the others: a knee is a hinge."""
     return np.concatenate([np.ones(FIRST_BONE), skeleton.free[HELD_ANGLES].astype(np.float64)])
 
 
-def decode(states: Array, reliance: Reliance) -> tuple[Array, Array]:
-    """Return the poses (n, 66) and the translations (n, 3) of states (n, 43)."""
-    from scipy.spatial.transform import Rotation  # a quarter of a second to import
+def quaternions_of(states: Array) -> Array:
+    """Return the quaternions (..., 10, 4) of states (..., 43)."""
+    return states[..., 3:].reshape(*states.shape[:-1], TURNS, 4)
 
-    n = len(states)
-    quaternions = Rotation.from_quat(states[:, 3:].reshape(-1, 4), scalar_first=True)
-    rotations = quaternions.as_matrix().reshape(n, -1, 3, 3)
-    vectors = quaternions.as_rotvec().reshape(n, -1)[:, 3:]
-    poses = np.zeros((n, ANGLES))
+
+def product(first: Array, second: Array) -> Array:
+    """Return the products (..., 4) of quaternions (..., 4)."""
+    return np.asarray((second[..., None, :] @ np.tensordot(first, PRODUCT, 1))[..., 0, :])
+
+
+def cross_matrices(vectors: Array) -> Array:
+    """Return the matrices (..., 3, 3) whose products with v are the cross products of vectors (..., 3) and v."""
+    return np.tensordot(vectors, _CROSS, 1)
+
+
+def rotation_matrices(turns: Array) -> Array:
+    """Return the rotations (..., 3, 3) of unit quaternions (..., 4)."""
+    crosses = cross_matrices(turns[..., 1:])
+    return np.asarray(np.eye(3) + 2.0 * (turns[..., :1, None] * crosses + crosses @ crosses))
+
+
+def rotation_vectors(turns: Array) -> Array:
+    """Return the rotation vectors (..., 3) of unit quaternions (..., 4), none longer than pi."""
+    turns = np.where(turns[..., :1] < 0.0, -turns, turns)
+    sines = np.linalg.norm(turns[..., 1:], axis=-1, keepdims=True)
+    angles = 2.0 * np.arctan2(sines, turns[..., :1])
+    return np.asarray(turns[..., 1:] * np.where(sines < 1e-8, 2.0, angles / np.maximum(sines, 1e-8)))
+
+
+def plus(states: Array, errors: Array) -> Array:
+    """Return states (..., 43) moved by errors (..., 33)."""
+    vectors = errors[..., 3:].reshape(*errors.shape[:-1], -1, 3)
+    halves = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    turns = np.concatenate([np.cos(halves), 0.5 * np.sinc(halves / np.pi) * vectors], axis=-1)
+    turned = product(quaternions_of(states), turns)
+    return joined_state(states[..., :3] + errors[..., :3], turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+
+
+def minus(first: Array, second: Array) -> Array:
+    """Return the errors (..., 33) that lead from states `second` to `first`, both (..., 43), the shorter way round."""
+    inverses = quaternions_of(second) * [1.0, -1.0, -1.0, -1.0]
+    vectors = rotation_vectors(product(inverses, quaternions_of(first)))
+    return np.concatenate([first[..., :3] - second[..., :3], vectors.reshape(*vectors.shape[:-2], -1)], axis=-1)
+
+
+def joined_state(translations: Array, turns: Array) -> Array:
+    """Return the states (..., 43) of translations (..., 3) and quaternions (..., 10, 4)."""
+    return np.concatenate([translations, turns.reshape(*turns.shape[:-2], -1)], axis=-1)
+
+
+def unit(states: Array) -> Array:
+    """Return states (..., 43) whose quaternions have length 1."""
+    turns = quaternions_of(states)
+    return joined_state(states[..., :3], turns / np.linalg.norm(turns, axis=-1, keepdims=True))
+
+
+def tangents(states: Array) -> Array:
+    """Return how the numbers of states (..., 43) change with their errors: (..., 43, 33)."""
+    changes = np.tensordot(quaternions_of(states), TANGENTS, 1)
+    matrices = np.zeros((*states.shape[:-1], STATE, ERROR))
+    matrices[..., :3, :3] = np.eye(3)
+    for k in range(TURNS):
+        matrices[..., 3 + 4 * k : 7 + 4 * k, 3 + 3 * k : 6 + 3 * k] = changes[..., k, :, :]
+    return matrices
+
+
+def inverse_tangents(states: Array) -> Array:
+    """Return how the errors of states (..., 43) change with their numbers: (..., 33, 43)."""
+    return np.asarray(tangents(states).swapaxes(-1, -2) * np.repeat([1.0, 4.0], [3, STATE - 3]))
+
+
+class DependentJoints(NamedTuple):
+    """How the other joints follow: their angles are `matrix` @ the nine rotation vectors + `offset`."""
+
+    matrix: Array  # (36, 27)
+    offset: Array  # (36,) radians
+
+    def angles(self, vectors: Array) -> Array:
+        """Return the angles (..., 36) that go with rotation vectors (..., 9, 3)."""
+        return np.asarray(vectors.reshape(*vectors.shape[:-2], -1) @ self.matrix.T + self.offset)
+
+
+def encode(poses: Array, translations: Array) -> Array:
+    """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
+    root = rotation_from_root_angles(poses[:, :3])
+    held = rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
+    rotations = np.concatenate([root[:, None], held], axis=1)
+    turns = np.stack([quaternions(rotations[:, k])[:, [3, 0, 1, 2]] for k in range(TURNS)], axis=1)
+    return joined_state(translations, np.where(turns[:1, :, :1] < 0.0, -turns, turns))
+
+
+def decode(states: Array, dependent: DependentJoints) -> tuple[Array, Array]:
+    """Return the poses (n, 66) and the translations (n, 3) of states (n, 43)."""
+    turns = quaternions_of(states)
+    rotations = rotation_matrices(turns)
+    poses = np.zeros((len(states), ANGLES))
     poses[:, :3] = root_angles_from_rotation(rotations[:, 0])
-    poses[:, HELD_ANGLES] = joint_angles_from_rotation(rotations[:, 1:]).reshape(n, -1)
-    poses[:, OTHER_ANGLES] = vectors @ reliance.matrix.T + reliance.offset
+    poses[:, HELD_ANGLES] = joint_angles_from_rotation(rotations[:, 1:]).reshape(len(states), -1)
+    poses[:, OTHER_ANGLES] = dependent.angles(rotation_vectors(turns[:, 1:]))
     return poses, states[:, :3].copy()
 
 
