@@ -20,18 +20,15 @@ from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import parsed_json, read_text
 from posefit_vsmm.state import (
-    ERROR,
-    PRODUCT,
     STATE,
-    TANGENTS,
     TURNS,
     DependentJoints,
+    differentiate,
     free_errors,
     inverse_tangents,
     joined_state,
     product,
     quaternions_of,
-    rotation_matrices,
     tangents,
     unit,
 )
@@ -41,7 +38,6 @@ CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
 SIZE_LIMIT = 10_000_000  # bytes of a file of models
-_TURN = PRODUCT[2]  # of a quaternion: _TURN's product with it is j q, its change by a turn about the vertical, twice
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +68,8 @@ class MotionModels:
 
     def predict(self, states: Array, covariances: Array) -> tuple[Array, Array]:
         """Return the states (r, 43) one frame later, and the covariances (r, 33, 33) of their errors."""
-        moved, jacobians = self.step(states)
+        moved, changes = differentiate(self.step, states)
+        jacobians = inverse_tangents(moved) @ changes
         return moved, jacobians @ covariances @ jacobians.swapaxes(1, 2) + self.noises
 
     def predict_numbers(self, states: Array, covariances: Array) -> tuple[Array, Array]:
@@ -85,53 +82,23 @@ class MotionModels:
         moved, after = self.predict(before, changes @ covariances @ changes.swapaxes(1, 2))
         return moved, lifted(moved, after)
 
-    def step(self, states: Array) -> tuple[Array, Array]:
-        """Return the states (r, 43) one frame later, and the Jacobians (r, 33, 33) of their errors by those before.
+    def step(self, states: Array) -> Array:
+        """Return the states (r, n, 43) one frame later, n of each model.
 
-        One model may move any number of states. The heading is taken out, the rest moved by F, and the heading put
-        back. Write q = h r for the whole body's quaternion, h its heading by an angle a about the vertical j, and
-        r = (w, x, 0, z) what is without it.
-
-        - An error d on the right makes r (1, d / 2), whose y is (z d_x + w d_y - x d_z) / 2. A turn of the heading by
-          da / 2 takes w da / 2 out of it, so that y stays 0: da = (z / w, 1, -x / w) d, which is `turn`.
-        - Of what is without heading that leaves its own change less da / 2 times j r. Put back before the moved r',
-          the heading adds da / 2 times j r'; and it turns the way g over the ground about j, by da times j x g.
-        - The columns of a quaternion's tangents are orthogonal and of length 1/2: four times their transpose is what
-          leads back from its change to an error on its right.
+        The heading is taken out, the rest moved by F, and the heading put back.
         """
-        count = len(states)
         headings, before = without_heading(states)
         signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)
-        before = signs * before
-        change = self.share * ((self.matrices @ before.reshape(count, -1, 1))[..., 0] + self.offsets)
-        after = before + quaternions_of(change)
-        sizes = np.linalg.norm(after, axis=-1, keepdims=True)
-        after /= sizes
-        upright = rotation_matrices(headings)
-        way = self.leg * (upright @ change[:, :3, None])[..., 0]
-        turned = signs * after
-        turned[:, 0] = product(headings, turned[:, 0])
-        moved = joined_state(states[:, :3] + way, turned)
-
-        w, x, _, z = before[:, 0].T
-        turn = np.stack([z / w, np.ones(count), -x / w], axis=1)
-        changes = np.tensordot(before, TANGENTS, 1)  # (r, 10, 4, 3) of the quaternions
-        changes[:, 0] -= 0.5 * (before[:, 0] @ _TURN)[..., None] * turn[:, None]
-        columns = self.matrices.reshape(-1, STATE, TURNS, 4).swapaxes(1, 2) @ changes  # (r, 10, 43, 3)
-        flow = self.share * columns.swapaxes(1, 2)  # (r, 43, 10, 3) of the change by the errors before
-        turning = flow[:, 3:].reshape(count, TURNS, 4, TURNS, 3)
-        each = np.arange(TURNS)
-        turning[:, each, :, each] += changes.swapaxes(0, 1)
-        turning /= sizes[..., None, None]
-        turning[:, 0, :, 0] += 0.5 * (after[:, 0] @ _TURN)[..., None] * turn[:, None]
-        back = 4.0 * np.tensordot(after, TANGENTS, 1).swapaxes(2, 3)  # (r, 10, 3, 4)
-        jacobians = np.zeros((count, ERROR, ERROR))
-        jacobians[:, :3, :3] = np.eye(3)
-        jacobians[:, :3, 3:] = self.leg * upright @ flow[:, :3].reshape(count, 3, -1)
-        jacobians[:, 0, 3:6] += way[:, 2:] * turn
-        jacobians[:, 2, 3:6] -= way[:, :1] * turn
-        jacobians[:, 3:, 3:] = (back @ turning.reshape(count, TURNS, 4, -1)).reshape(count, ERROR - 3, -1)
-        return moved, jacobians
+        inputs = (signs * before).reshape(*states.shape[:-1], -1)
+        change = self.share * (inputs @ self.matrices.swapaxes(1, 2) + self.offsets[:, None])
+        after = before + signs * quaternions_of(change)
+        after /= np.linalg.norm(after, axis=-1, keepdims=True)
+        after[..., 0, :] = product(headings, after[..., 0, :])
+        w, y = headings[..., 0], headings[..., 2]
+        sine, cosine = 2.0 * w * y, w * w - y * y
+        side, up, ahead = self.leg * np.moveaxis(change[..., :3], -1, 0)
+        way = np.stack([cosine * side + sine * ahead, up, cosine * ahead - sine * side], axis=-1)
+        return joined_state(states[..., :3] + way, after)
 
     def captured_nearest(self, name: str, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the captured pose of a model nearest to it."""
@@ -158,9 +125,9 @@ def without_heading(states: Array) -> tuple[Array, Array]:
 
 
 def lifted(states: Array, covariances: Array) -> Array:
-    """Return the covariances (..., 43, 43) of states' numbers, of those of their errors (..., 33, 33)."""
+    """Return the covariances (r, 43, 43) of the numbers of states (r, 43), of those of their errors (r, 33, 33)."""
     changes = tangents(states)
-    return np.asarray(changes @ covariances @ changes.swapaxes(-1, -2) + 1e-9 * np.eye(STATE))
+    return np.asarray(changes @ covariances @ changes.swapaxes(1, 2) + 1e-9 * np.eye(STATE))
 
 
 class Library(NamedTuple):

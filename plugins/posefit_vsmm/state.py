@@ -6,6 +6,7 @@ against its parent. VSMM 3. Its error is (33,): metres, then a rotation vector a
 `DependentJoints`. The 17 points are Interpretation V2. All functions take any number of leading axes.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -39,14 +40,13 @@ FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and 
 # vector has them in the order x, y, z.
 YAW_PITCH_ROLL = (4, 3, 5)
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
-OTHERS = tuple(joint for joint in INNER if joint not in HELD)
-HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in OTHERS])
+HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in INNER if joint not in HELD])
+
+DIFFERENCE = 1e-4  # metres and radians to either side, from which functions of a state are differentiated
 
 _W, _X, _Y, _Z = np.eye(4)
-# PRODUCT[a, b] (4,) is the product of the a-th and the b-th of the units 1, i, j, k
-PRODUCT = np.array([[_W, _X, _Y, _Z], [_X, -_W, _Z, -_Y], [_Y, -_Z, -_W, _X], [_Z, _Y, -_X, -_W]])
-TANGENTS = 0.5 * PRODUCT[:, 1:].swapaxes(1, 2)  # (4, 4, 3) of each unit: its change by a small rotation on its right
-_CROSS = np.cross(np.eye(3), np.eye(3)[:, None])  # _CROSS[k] @ v is the cross product of the k-th axis and v
+# row a holds the products (4, 4) of the a-th of the units 1, i, j, k with each of them
+_PRODUCTS = np.array([_W, _X, _Y, _Z, _X, -_W, _Z, -_Y, _Y, -_Z, -_W, _X, _Z, _Y, -_X, -_W]).reshape(4, 16)
 
 
 def bone_errors(bone: str) -> slice:
@@ -67,18 +67,18 @@ def quaternions_of(states: Array) -> Array:
 
 def product(first: Array, second: Array) -> Array:
     """Return the products (..., 4) of quaternions (..., 4)."""
-    return np.asarray((second[..., None, :] @ np.tensordot(first, PRODUCT, 1))[..., 0, :])
-
-
-def cross_matrices(vectors: Array) -> Array:
-    """Return the matrices (..., 3, 3) whose products with v are the cross products of vectors (..., 3) and v."""
-    return np.tensordot(vectors, _CROSS, 1)
+    return np.asarray((second[..., None, :] @ (first @ _PRODUCTS).reshape(*first.shape, 4))[..., 0, :])
 
 
 def rotation_matrices(turns: Array) -> Array:
     """Return the rotations (..., 3, 3) of unit quaternions (..., 4)."""
-    crosses = cross_matrices(turns[..., 1:])
-    return np.asarray(np.eye(3) + 2.0 * (turns[..., :1, None] * crosses + crosses @ crosses))
+    w, x, y, z = np.moveaxis(turns, -1, 0)
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def rotation_vectors(turns: Array) -> Array:
@@ -116,19 +116,28 @@ def unit(states: Array) -> Array:
     return joined_state(states[..., :3], turns / np.linalg.norm(turns, axis=-1, keepdims=True))
 
 
+def differentiate(function: Callable[[Array], Array], states: Array) -> tuple[Array, Array]:
+    """Return a function of states (r, 43), and its derivatives (r, ..., 33) by their errors: central differences.
+
+    The function is one of states (r, n, 43).
+    """
+    errors = DIFFERENCE * np.concatenate([np.zeros((1, ERROR)), np.eye(ERROR), -np.eye(ERROR)])
+    values = function(plus(states[:, None], errors))
+    derivatives = (values[:, 1 : 1 + ERROR] - values[:, 1 + ERROR :]) / (2.0 * DIFFERENCE)
+    return values[:, 0], np.moveaxis(derivatives, 1, -1)
+
+
 def tangents(states: Array) -> Array:
-    """Return how the numbers of states (..., 43) change with their errors: (..., 43, 33)."""
-    changes = np.tensordot(quaternions_of(states), TANGENTS, 1)
-    matrices = np.zeros((*states.shape[:-1], STATE, ERROR))
-    matrices[..., :3, :3] = np.eye(3)
-    for k in range(TURNS):
-        matrices[..., 3 + 4 * k : 7 + 4 * k, 3 + 3 * k : 6 + 3 * k] = changes[..., k, :, :]
-    return matrices
+    """Return how the numbers of states (r, 43) change with their errors: (r, 43, 33)."""
+    return differentiate(lambda moved: moved, states)[1]
 
 
 def inverse_tangents(states: Array) -> Array:
-    """Return how the errors of states (..., 43) change with their numbers: (..., 33, 43)."""
-    return np.asarray(tangents(states).swapaxes(-1, -2) * np.repeat([1.0, 4.0], [3, STATE - 3]))
+    """Return how the errors of states (r, 43) change with their numbers: (r, 33, 43).
+
+    The columns of a quaternion's tangents are orthogonal and of length 1/2.
+    """
+    return np.asarray(tangents(states).swapaxes(1, 2) * np.repeat([1.0, 4.0], [3, STATE - 3]))
 
 
 class DependentJoints(NamedTuple):
@@ -152,14 +161,15 @@ def encode(poses: Array, translations: Array) -> Array:
 
 
 def decode(states: Array, dependent: DependentJoints) -> tuple[Array, Array]:
-    """Return the poses (n, 66) and the translations (n, 3) of states (n, 43)."""
+    """Return the poses (..., 66) and the translations (..., 3) of states (..., 43)."""
     turns = quaternions_of(states)
     rotations = rotation_matrices(turns)
-    poses = np.zeros((len(states), ANGLES))
-    poses[:, :3] = root_angles_from_rotation(rotations[:, 0])
-    poses[:, HELD_ANGLES] = joint_angles_from_rotation(rotations[:, 1:]).reshape(len(states), -1)
-    poses[:, OTHER_ANGLES] = dependent.angles(rotation_vectors(turns[:, 1:]))
-    return poses, states[:, :3].copy()
+    poses = np.zeros((*states.shape[:-1], ANGLES))
+    poses[..., :3] = root_angles_from_rotation(rotations[..., 0, :, :])
+    held = joint_angles_from_rotation(rotations[..., 1:, :, :])
+    poses[..., HELD_ANGLES] = held.reshape(*states.shape[:-1], -1)
+    poses[..., OTHER_ANGLES] = dependent.angles(rotation_vectors(turns[..., 1:, :]))
+    return poses, states[..., :3].copy()
 
 
 # Each point is the middle of two joints, or one joint twice.

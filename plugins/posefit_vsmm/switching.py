@@ -150,7 +150,7 @@ class Switching:
         if not self._patent:
             return state, covariance
         state = unit(state)
-        return state, inverse_tangents(state) @ covariance @ inverse_tangents(state).T
+        return state, inverse_tangents(state[None])[0] @ covariance @ inverse_tangents(state[None])[0].T
 
     def predicted(self, belief: Belief) -> tuple[Array, Array]:
         """Return the state (43,) and covariance (33, 33) a frame later, by the most probable model."""

@@ -14,7 +14,7 @@ from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter
-from posefit_vsmm.measurement import Figure, JointCameras, JointMeasurement
+from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import STIFF, library
 from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.settings import Settings, Structure, Variant
@@ -92,8 +92,7 @@ class TrackFilter:
         self._dependent = models.dependent
         topology = read_topology(settings.groups, models.models.names)
         self._switching = Switching(settings, models.models, topology, task.body.skeleton, task.fps)
-        figure = Figure(task.body.skeleton, self._dependent)
-        self._cameras = JointCameras(task.body, task.cameras, figure, settings)
+        self._cameras = JointCameras(task.body, task.cameras, self._dependent, settings)
         self._free = free_errors(task.body.skeleton)
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
