@@ -65,7 +65,9 @@ def read_topology(path: str | Path, known: Collection[str]) -> Topology:
     """
     label = str(path) or "groups.toml"
     try:
-        values = parsed_toml(read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / label).read_text("utf-8"))
+        values = parsed_toml(
+            read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / label).read_text("utf-8")
+        )
     except FileNotFoundError:
         raise InputError(f"{label}: expected a file of groups, got none") from None
     except ValueError as error:

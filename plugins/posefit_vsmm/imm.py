@@ -3,15 +3,8 @@
 In every cycle each model starts from a mixture of all their states, predicts, and is updated by the measurement. The
 equations are those of H. Blom, Y. Bar-Shalom, The interacting multiple model algorithm for systems with Markovian
 switching coefficients, IEEE Trans. Automatic Control 33(8), 1988, as CN101894278 uses them in its step 6. The filter
-works for any models of any states; what belongs to a model is a row of an array.
-
-- `IMM` is the filter: `cycle` goes on by one measurement, `fused` returns the one state that stands for all models.
-- `Measurement` is what was measured against what each model's state expects; any function of states may return it.
-- `Belief` is all that the filter holds; `start` makes the first one. It can be stored, copied or changed.
-- `Manifold` defines how an error, a vector, moves a state: + and - for vectors; a rotation for unit quaternions in
-  `QUATERNIONS` (Interpretation V4), which makes the filter an error-state Kalman filter.
-
-Likelihoods are logarithms, so that a residual of any size leaves probabilities that sum to 1 (Interpretation V13).
+works for any models of any states; what belongs to a model is a row of an array. Likelihoods are logarithms, so that a
+residual of any size leaves probabilities that sum to 1 (Interpretation V13).
 
 A thing on a line either stands or moves by 1 a frame. Its place is measured, and it moves:
 
@@ -60,7 +53,7 @@ class Manifold:
         for _ in range(MAX_STEPS):
             steps = np.einsum("kr,kre->ke", weights, self.minus(states, means[:, None]))
             means = self.plus(means, steps)
-            if np.abs(steps).max() < 1e-12:
+            if np.abs(steps).max() < 1e-9:
                 break
         return means
 
@@ -71,9 +64,7 @@ class Manifold:
         return np.asarray(np.tensordot(weights, covariances, 1) + between)
 
 
-# States (3 + 4 n,): a place, then n unit quaternions w, x, y, z. Errors (3 + 3 n,): a step, then n rotation vectors,
-# each applied on its quaternion's right. Such a plus and minus are also written boxplus and boxminus.
-QUATERNIONS = Manifold(plus, minus)
+QUATERNIONS = Manifold(plus, minus)  # Interpretation V4: an error-state Kalman filter
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +92,6 @@ class Measurement(NamedTuple):
     log_likelihoods: Array | float = 0.0  # (r,) of the states themselves, by what cannot be written as a residual
 
 
-Predict = Callable[[Array, Array], tuple[Array, Array]]
 Measure = Callable[[Array], Measurement]
 
 
@@ -119,16 +109,13 @@ class IMM:
     `transition` (r, r) holds how probable each model is after model i.
     """
 
-    predict: Predict
+    predict: Callable[[Array, Array], tuple[Array, Array]]
     transition: Array
     manifold: Manifold = Manifold()
 
     def __post_init__(self) -> None:
-        matrix = np.asarray(self.transition, dtype=np.float64)
-        if matrix.ndim != 2 or len(matrix) != len(matrix.T):
-            raise InputError(f"transition must have a row and a column a model, got shape {matrix.shape}")
-        if not ((matrix >= 0.0).all() and np.allclose(matrix.sum(axis=1), 1.0)):
-            raise InputError(f"transition must hold probabilities whose rows sum to 1, got {matrix.tolist()}")
+        if not ((self.transition >= 0.0).all() and np.allclose(self.transition.sum(axis=1), 1.0)):
+            raise InputError(f"transition must hold probabilities whose rows sum to 1, got {self.transition.tolist()}")
 
     def cycle(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief one frame later; `measure` returns the measurement for states."""
@@ -144,7 +131,7 @@ class IMM:
         A model that no other changes into starts from its own state.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
-            steps = np.log(np.asarray(self.transition, dtype=np.float64)) + belief.log_probabilities[:, None]
+            steps = np.log(self.transition) + belief.log_probabilities[:, None]
             after = np.logaddexp.reduce(steps, axis=0)  # log c_j
             weights = np.exp(steps - after)  # VSMM 6.2a
         weights = np.where(np.isfinite(after), weights, np.eye(len(after))).T
@@ -155,9 +142,8 @@ class IMM:
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief after each model's state is measured, with the probabilities of before."""
-        states, covariances, likelihoods = update(
-            belief.states, belief.covariances, measure(belief.states), self.manifold
-        )
+        before = belief.states, belief.covariances
+        states, covariances, likelihoods = update(*before, measure(belief.states), self.manifold)
         covariances, repairs = positive_definite(covariances)
         return Belief(states, covariances, belief.log_probabilities, likelihoods, belief.repairs + repairs)
 

@@ -109,7 +109,9 @@ def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side
     hand, elbow, shoulder = (AT[f"{side} {name}"] for name in ("hand", "elbow", "shoulder"))
     if not confidence[hand]:
         return None
-    to_hand, to_shoulder, to_elbow = _distances(np.array([points[hand], points[shoulder], expected[elbow]]), lines.skeleton)
+    to_hand, to_shoulder, to_elbow = _distances(
+        np.array([points[hand], points[shoulder], expected[elbow]]), lines.skeleton
+    )
     even = np.abs(to_hand - to_shoulder) < 1.5  # VSMM 2.6
     candidates = np.flatnonzero(even & (to_elbow < gates[elbow]))
     return lines.skeleton[candidates[to_elbow[candidates].argmin()]] if len(candidates) else None

@@ -9,9 +9,9 @@ Variant = Literal["default", "patent"]
 Structure = Literal["variable", "all"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Settings:
-    """Where the patent's letter and the default differ, the code asks for `patent`; all else is the user's choice."""
+    """Where the default differs from the patent's letter, the code asks for `patent`."""
 
     variant: Variant = "default"
     structure: Structure = "variable"
@@ -30,8 +30,3 @@ class Settings:
     def patent(self) -> bool:
         """Whether interpretations are the patent's letter."""
         return self.variant == "patent"
-
-    @property
-    def recovers(self) -> bool:
-        """Whether a lost pose is estimated again and a lost limb sought all around. Interpretation V14."""
-        return not self.patent if self.recovery is None else self.recovery

@@ -1,9 +1,9 @@
 """The state that the motion models move, its quaternions, and the points of a body that a silhouette may show.
 
 A state is (43,): the root's translation in metres, then w, x, y, z of the whole body and of nine bones, each turned
-against its parent. VSMM 3. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
+against its parent. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
 (Interpretation V4). A joint that the state does not hold, such as the back's, follows those that it holds: see
-`DependentJoints`. The 17 points are Interpretation V2. All functions take any number of leading axes.
+`DependentJoints`. The 17 points are Interpretation V2.
 """
 
 from collections.abc import Callable
@@ -12,41 +12,26 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.rotation import (
-    joint_angles_from_rotation,
-    quaternions,
-    root_angles_from_rotation,
-    rotation_from_joint_angles,
-    rotation_from_root_angles,
-)
+from posefit.geometry import rotation
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, turns_of
 
-BONES = (
-    "lfemur",
-    "ltibia",
-    "rfemur",
-    "rtibia",
-    "lhumerus",
-    "lradius",
-    "rhumerus",
-    "rradius",
-    "lowerneck",
-)  # hips, knees, shoulders, elbows, neck
+# hips, knees, shoulders, elbows, neck
+BONES = ("lfemur", "ltibia", "rfemur", "rtibia", "lhumerus", "lradius", "rhumerus", "rradius", "lowerneck")
 TURNS = 1 + len(BONES)  # quaternions of a state: the whole body's, and each bone's
-STATE = 3 + 4 * TURNS
-ERROR = 3 + 3 * TURNS
+STATE, ERROR = 3 + 4 * TURNS, 3 + 3 * TURNS
 FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and the whole body's rotation vector
 # Where in an error the whole body's yaw, pitch and roll are: small turns about its y, x and z, whereas a rotation
 # vector has them in the order x, y, z.
 YAW_PITCH_ROLL = (4, 3, 5)
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
 HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in INNER if joint not in HELD])
-
 DIFFERENCE = 1e-4  # metres and radians to either side, from which functions of a state are differentiated
 
 _W, _X, _Y, _Z = np.eye(4)
 # row a holds the products (4, 4) of the a-th of the units 1, i, j, k with each of them
 _PRODUCTS = np.array([_W, _X, _Y, _Z, _X, -_W, _Z, -_Y, _Y, -_Z, -_W, _X, _Z, _Y, -_X, -_W]).reshape(4, 16)
+# where the numbers of quaternions (10, 4, 1) are in a state, and their rotation vectors (10, 1, 3) in an error
+_NUMBERS, _VECTORS = np.arange(3, STATE).reshape(TURNS, 4, 1), np.arange(3, ERROR).reshape(TURNS, 1, 3)
 
 
 def bone_errors(bone: str) -> slice:
@@ -60,9 +45,20 @@ def free_errors(skeleton: Skeleton) -> Array:
     return np.concatenate([np.ones(FIRST_BONE), skeleton.free[HELD_ANGLES].astype(np.float64)])
 
 
+def joined_state(translations: Array, turns: Array) -> Array:
+    """Return the states (..., 43) of translations (..., 3) and quaternions (..., 10, 4)."""
+    return np.concatenate([translations, turns.reshape(*turns.shape[:-2], -1)], axis=-1)
+
+
 def quaternions_of(states: Array) -> Array:
     """Return the quaternions (..., 10, 4) of states (..., 43)."""
     return states[..., 3:].reshape(*states.shape[:-1], TURNS, 4)
+
+
+def unit(states: Array) -> Array:
+    """Return states (..., 43) whose quaternions have length 1."""
+    turns = quaternions_of(states)
+    return joined_state(states[..., :3], turns / np.linalg.norm(turns, axis=-1, keepdims=True))
 
 
 def product(first: Array, second: Array) -> Array:
@@ -91,29 +87,16 @@ def rotation_vectors(turns: Array) -> Array:
 
 def plus(states: Array, errors: Array) -> Array:
     """Return states (..., 43) moved by errors (..., 33)."""
-    vectors = errors[..., 3:].reshape(*errors.shape[:-1], -1, 3)
+    vectors = errors[..., 3:].reshape(*errors.shape[:-1], TURNS, 3)
     halves = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
     turns = np.concatenate([np.cos(halves), 0.5 * np.sinc(halves / np.pi) * vectors], axis=-1)
-    turned = product(quaternions_of(states), turns)
-    return joined_state(states[..., :3] + errors[..., :3], turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+    return unit(joined_state(states[..., :3] + errors[..., :3], product(quaternions_of(states), turns)))
 
 
 def minus(first: Array, second: Array) -> Array:
     """Return the errors (..., 33) that lead from states `second` to `first`, both (..., 43), the shorter way round."""
     inverses = quaternions_of(second) * [1.0, -1.0, -1.0, -1.0]
-    vectors = rotation_vectors(product(inverses, quaternions_of(first)))
-    return np.concatenate([first[..., :3] - second[..., :3], vectors.reshape(*vectors.shape[:-2], -1)], axis=-1)
-
-
-def joined_state(translations: Array, turns: Array) -> Array:
-    """Return the states (..., 43) of translations (..., 3) and quaternions (..., 10, 4)."""
-    return np.concatenate([translations, turns.reshape(*turns.shape[:-2], -1)], axis=-1)
-
-
-def unit(states: Array) -> Array:
-    """Return states (..., 43) whose quaternions have length 1."""
-    turns = quaternions_of(states)
-    return joined_state(states[..., :3], turns / np.linalg.norm(turns, axis=-1, keepdims=True))
+    return joined_state(first[..., :3] - second[..., :3], rotation_vectors(product(inverses, quaternions_of(first))))
 
 
 def differentiate(function: Callable[[Array], Array], states: Array) -> tuple[Array, Array]:
@@ -129,7 +112,11 @@ def differentiate(function: Callable[[Array], Array], states: Array) -> tuple[Ar
 
 def tangents(states: Array) -> Array:
     """Return how the numbers of states (r, 43) change with their errors: (r, 43, 33)."""
-    return differentiate(lambda moved: moved, states)[1]
+    matrices = np.tile(np.eye(STATE, ERROR), (len(states), 1, 1))
+    matrices[:, 3:, 3:] = 0.0
+    changes = product(quaternions_of(states)[:, :, None], 0.5 * np.eye(4)[1:])  # (r, 10, 3, 4)
+    matrices[:, _NUMBERS, _VECTORS] = changes.swapaxes(2, 3)
+    return matrices
 
 
 def inverse_tangents(states: Array) -> Array:
@@ -146,52 +133,37 @@ class DependentJoints(NamedTuple):
     matrix: Array  # (36, 27)
     offset: Array  # (36,) radians
 
-    def angles(self, vectors: Array) -> Array:
-        """Return the angles (..., 36) that go with rotation vectors (..., 9, 3)."""
-        return np.asarray(vectors.reshape(*vectors.shape[:-2], -1) @ self.matrix.T + self.offset)
-
 
 def encode(poses: Array, translations: Array) -> Array:
     """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
-    root = rotation_from_root_angles(poses[:, :3])
-    held = rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
+    root = rotation.rotation_from_root_angles(poses[:, :3])
+    held = rotation.rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
     rotations = np.concatenate([root[:, None], held], axis=1)
-    turns = np.stack([quaternions(rotations[:, k])[:, [3, 0, 1, 2]] for k in range(TURNS)], axis=1)
+    turns = np.stack([rotation.quaternions(rotations[:, k])[:, [3, 0, 1, 2]] for k in range(TURNS)], axis=1)
     return joined_state(translations, np.where(turns[:1, :, :1] < 0.0, -turns, turns))
 
 
 def decode(states: Array, dependent: DependentJoints) -> tuple[Array, Array]:
     """Return the poses (..., 66) and the translations (..., 3) of states (..., 43)."""
-    turns = quaternions_of(states)
-    rotations = rotation_matrices(turns)
-    poses = np.zeros((*states.shape[:-1], ANGLES))
-    poses[..., :3] = root_angles_from_rotation(rotations[..., 0, :, :])
-    held = joint_angles_from_rotation(rotations[..., 1:, :, :])
-    poses[..., HELD_ANGLES] = held.reshape(*states.shape[:-1], -1)
-    poses[..., OTHER_ANGLES] = dependent.angles(rotation_vectors(turns[..., 1:, :]))
+    turns, lead = quaternions_of(states), states.shape[:-1]
+    rotations, vectors = rotation_matrices(turns), rotation_vectors(turns[..., 1:, :])
+    poses = np.zeros((*lead, ANGLES))
+    poses[..., :3] = rotation.root_angles_from_rotation(rotations[..., 0, :, :])
+    poses[..., HELD_ANGLES] = rotation.joint_angles_from_rotation(rotations[..., 1:, :, :]).reshape(*lead, -1)
+    poses[..., OTHER_ANGLES] = vectors.reshape(*lead, -1) @ dependent.matrix.T + dependent.offset
     return poses, states[..., :3].copy()
 
 
-# Each point is the middle of two joints, or one joint twice.
-_BETWEEN = {
-    "head": ("upperneck", "head"),
-    "root": ("root", "root"),
-    "torso": ("upperback", "upperback"),
-    "left clavicle": ("thorax", "lclavicle"),
-    "right clavicle": ("thorax", "rclavicle"),
-    "left shoulder": ("lclavicle", "lclavicle"),
-    "right shoulder": ("rclavicle", "rclavicle"),
-    "left elbow": ("lhumerus", "lhumerus"),
-    "right elbow": ("rhumerus", "rhumerus"),
-    "left hand": ("lwrist", "lwrist"),
-    "right hand": ("rwrist", "rwrist"),
-    "left hip": ("lhipjoint", "lhipjoint"),
-    "right hip": ("rhipjoint", "rhipjoint"),
-    "left knee": ("lfemur", "lfemur"),
-    "right knee": ("rfemur", "rfemur"),
-    "left foot": ("lfoot", "lfoot"),
-    "right foot": ("rfoot", "rfoot"),
+# The joints that the 17 points are the middles of
+_MIDDLE = {"head": ("upperneck", "head"), "root": ("root",), "torso": ("upperback",)}
+_SIDES = {"clavicle": ("thorax", "?clavicle"), "shoulder": ("?clavicle",), "elbow": ("?humerus",), "hand": ("?wrist",)}
+_SIDES |= {"hip": ("?hipjoint",), "knee": ("?femur",), "foot": ("?foot",)}  # ? is l or r
+_BETWEEN = _MIDDLE | {
+    f"{side} {name}": tuple(joint.replace("?", side[0]) for joint in joints)
+    for name, joints in _SIDES.items()
+    for side in ("left", "right")
 }
 POINTS = tuple(_BETWEEN)
 AT = {name: k for k, name in enumerate(POINTS)}
-ENDS = np.array([[JOINTS.index(joint) for joint in pair] for pair in _BETWEEN.values()])  # (17, 2) two joints a point
+# (17, 2) two joints a point, or one twice
+ENDS = np.array([[JOINTS.index(joints[k]) for k in (0, -1)] for joints in _BETWEEN.values()])

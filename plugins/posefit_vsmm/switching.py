@@ -7,7 +7,7 @@ speed, and a test of both ends one of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, final
+from typing import final
 
 import numpy as np
 
@@ -20,14 +20,9 @@ from posefit_vsmm.motion import CLIP_FPS, MotionModels, lifted
 from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import AT, inverse_tangents, unit
 
-_LIMBS = np.array(
-    [
-        [AT[f"{side} {upper}"], AT[f"{side} {lower}"]]
-        for upper, lower in (("hip", "knee"), ("knee", "foot"))
-        for side in ("left", "right")
-    ]
-)  # thighs, then shanks
-TWICE, HALF = 2.0, 0.5
+# where thighs and shanks begin and end
+_UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
+_LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 MOST = 3  # of the four lower limbs. Interpretation V15
 FIRST_CYCLES = 10  # over all models before a group is chosen
 DWELL = 10  # frames that a group stays at least; none in the patent. Interpretation V10
@@ -42,21 +37,20 @@ def requested_group(points: Sequence[Array]) -> int | None:
     """
     if len(points) < 3:
         return None
-    angles = np.array([limb_angles(frame) for frame in points[-3:]])
-    before, now = np.abs(wrapped(np.diff(angles, axis=0)))
-    grown, shrunk = (now >= TWICE * before) & (now > 0.0), (now <= HALF * before) & (before > 0.0)
-    if grown[:2].all():  # VSMM 7a
+    before, now = np.abs(wrapped(np.diff([limb_angles(frame) for frame in points[-3:]], axis=0)))
+    doubled, halved = (now >= 2.0 * before) & (now > 0.0), (now <= 0.5 * before) & (before > 0.0)
+    if doubled[:2].all():  # VSMM 7a
         return 2
-    if grown.sum() >= MOST:  # VSMM 7b
+    if doubled.sum() >= MOST:  # VSMM 7b
         return 1
-    if shrunk.sum() >= MOST:  # VSMM 7c
+    if halved.sum() >= MOST:  # VSMM 7c
         return 0
     return None
 
 
 def limb_angles(points: Array) -> Array:
     """Return the angles (4,) to the vertical, in the image, of thighs and shanks, left and right."""
-    limbs = points[_LIMBS[:, 1]] - points[_LIMBS[:, 0]]
+    limbs = points[_LOWER] - points[_UPPER]
     return np.asarray(np.arctan2(limbs[:, 0], limbs[:, 1]))
 
 
@@ -65,45 +59,23 @@ def regrouped(
 ) -> Belief:
     """Return a belief over other models: `new` has state, covariance and log-probability of those not in `old`."""
     known = dict(zip(old, zip(belief.states, belief.covariances, belief.log_probabilities, strict=True), strict=True))
-    parts = [known.get(name) or new[name] for name in models]
-    states, covariances, probabilities = (np.array(part) for part in zip(*parts, strict=True))
+    parts = zip(*({**new, **known}[name] for name in models), strict=True)
+    states, covariances, probabilities = (np.array(part) for part in parts)
     return Belief(states, covariances, probabilities, np.zeros(len(models)), belief.repairs)
 
 
 def normalised(belief: Belief) -> Belief:
     """Return a belief whose probabilities sum to 1, all the same where none is above 0."""
-    probabilities = belief.log_probabilities
-    total = np.logaddexp.reduce(probabilities)
-    even = np.full(len(probabilities), -np.log(len(probabilities)))
-    return replace(belief, log_probabilities=probabilities - total if np.isfinite(total) else even)
-
-
-@final
-class Contest:
-    """An old group of models against a new one, until one of them has to end. VSMM step 9.
-
-    It looks at the likelihoods since the new group came. Interpretation V12.
-    """
-
-    def __init__(self, *, old: Sequence[str], new: Sequence[str]) -> None:
-        self._old, self._new = old, new
-        self._likelihood_ratio = 0.0  # its logarithm, new to old
-
-    def decide(self, belief: Belief, models: Sequence[str]) -> Literal["old", "new"] | None:
-        """Return which group stays, after a cycle over both; None while both do."""
-        old, new = ([models.index(name) for name in group] for group in (self._old, self._new))
-
-        def ratio(logarithms: Array) -> float:
-            return float(np.logaddexp.reduce(logarithms[new]) - np.logaddexp.reduce(logarithms[old]))
-
-        self._likelihood_ratio += ratio(belief.log_likelihoods)  # VSMM 9
-        smaller = min(ratio(belief.log_probabilities), self._likelihood_ratio)
-        return "old" if smaller < np.log(ENDED) else "new" if smaller > 0.0 else None
+    probabilities = np.maximum(belief.log_probabilities, -1e9)
+    return replace(belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities))
 
 
 @final
 class Switching:
-    """The models in force; at first all of them."""
+    """The models in force; at first all of them.
+
+    The default's filter holds covariances (33, 33) of errors, the patent's (43, 43) of numbers. Interpretation V4.
+    """
 
     def __init__(
         self, settings: Settings, models: MotionModels, topology: Topology, skeleton: Skeleton, fps: float
@@ -121,15 +93,13 @@ class Switching:
         self.active = self.every
         self.group: str | None = None
         self.newcomer: str | None = None
-        self._contest: Contest | None = None  # of the group and the newcomer
+        self._log_ratio = 0.0  # of the likelihoods since the newcomer came, new to old
         self._cycles = self._cycles_of_group = 0
         self._points: list[Array] = []
 
     def _filter_of(self, names: tuple[str, ...]) -> IMM:
         models, transition = self.models.of(names), self.topology.transition(names)
-        if self._patent:  # Interpretation V4
-            return IMM(models.predict_numbers, transition)
-        return IMM(models.predict, transition, QUATERNIONS)
+        return IMM(models.predict_numbers, transition) if self._patent else IMM(models.predict, transition, QUATERNIONS)
 
     @property
     def imm(self) -> IMM:
@@ -138,19 +108,19 @@ class Switching:
 
     def start(self, state: Array, covariance: Array) -> Belief:
         """Return the belief in one state (43,) with a covariance (33, 33)."""
-        return start(state, self._own(state, covariance), len(self.active))
+        return start(state, self._lifted(state[None], covariance)[0], len(self.active))
 
-    def _own(self, states: Array, covariances: Array) -> Array:
-        """Return covariances (..., 33, 33) of errors as the filter holds them: the patent's are of the numbers."""
-        return lifted(states, covariances) if self._patent else covariances
+    def _lifted(self, states: Array, covariance: Array) -> Array:
+        """Return the covariances of states (r, 43), each (33, 33) of its error, as the filter holds them."""
+        return lifted(states, covariance) if self._patent else np.tile(covariance, (len(states), 1, 1))
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state (43,), and the covariance (33, 33) of its error, that stand for all models."""
         state, covariance = self.imm.fused(belief)
         if not self._patent:
             return state, covariance
-        state = unit(state)
-        return state, inverse_tangents(state[None])[0] @ covariance @ inverse_tangents(state[None])[0].T
+        change = inverse_tangents(unit(state)[None])[0]
+        return unit(state), change @ covariance @ change.T
 
     def predicted(self, belief: Belief) -> tuple[Array, Array]:
         """Return the state (43,) and covariance (33, 33) a frame later, by the most probable model."""
@@ -161,81 +131,85 @@ class Switching:
 
     def widened(self, belief: Belief, variances: Array) -> Belief:
         """Return a belief whose errors have larger variances, by (33,)."""
-        extra = self._own(unit(belief.states), np.tile(np.diag(variances), (len(belief.states), 1, 1)))
+        extra = self._lifted(unit(belief.states), np.diag(variances))
         return replace(belief, covariances=belief.covariances + extra)
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief after one more measurement of the same frame; the models' probabilities stay."""
-        return self.imm.updated(belief, self._measure(measure))
+        return self.imm.updated(belief, self._lifting(measure))
 
-    def _measure(self, measure: Measure) -> Measure:
-        """Return a measurement whose Jacobians are as the filter holds them: the patent's are by the numbers."""
+    def _lifting(self, measure: Measure) -> Measure:
+        """Return a measurement whose Jacobians are by what the filter's covariances are of."""
 
-        def measure_numbers(states: Array) -> Measurement:
+        def by_numbers(states: Array) -> Measurement:
             measurement = measure(unit(states))
             return measurement._replace(jacobians=measurement.jacobians @ inverse_tangents(unit(states)))
 
-        return measure_numbers if self._patent else measure
+        return by_numbers if self._patent else measure
 
     def cycle(self, before: Belief, measure: Measure, points: Array) -> Belief:
-        """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame. VSMM 7."""
-        self._points = [*self._points, points][-3:]
-        measure = self._measure(measure)
+        """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame."""
+        self._points, measure = [*self._points, points][-3:], self._lifting(measure)
         after = self.imm.cycle(before, measure)
         self._cycles += 1
+        likely = most_probable(self.groups, self.active, after.probabilities)  # VSMM 5
         if self._structure == "all":
-            self.group = most_probable(self.groups, self.active, after.probabilities)
+            self.group = likely
             return after
         if self.group is None:
-            if self._cycles < FIRST_CYCLES:
-                return after
-            return self._only(most_probable(self.groups, self.active, after.probabilities), after)  # VSMM 5
-        if self._contest is not None:
-            return self._decided(after)
+            return after if self._cycles < FIRST_CYCLES else self._only(likely, after)
+        if self.newcomer is not None:
+            return self.decided(after)
         self._cycles_of_group += 1
         number = requested_group(self._points)
-        dwells = not self._patent and self._cycles_of_group <= DWELL
-        if dwells or number is None or number >= len(self.groups):
-            return after
-        newcomer = tuple(self.groups)[number]
-        if newcomer == self.group:
+        if number is None or number >= len(self.groups) or (newcomer := tuple(self.groups)[number]) == self.group:
             return after
         if self._patent:
-            return self._decided(self.imm.cycle(self.joined(before, newcomer), measure))  # run again, and judged
-        # Interpretation V11: the cycle is run again with both groups; new models had a probability of 0
+            return self.decided(self.imm.cycle(self.joined(before, newcomer), measure))  # run again, and judged
+        if self._cycles_of_group <= DWELL:
+            return after
+        # Interpretation V11: the cycle is run again over both groups; new models had a probability of 0
         old, fused = self.active, self.imm.fused(before)
-        self._bring_in(newcomer)
-        both = regrouped(before, old, self.active, dict.fromkeys(self.active, (*fused, -np.inf)))
-        return self.imm.cycle(both, measure)
+        self.bring_in(newcomer)
+        return self.imm.cycle(
+            regrouped(before, old, self.active, dict.fromkeys(self.active, (*fused, -np.inf))), measure
+        )
 
     def joined(self, belief: Belief, newcomer: str) -> Belief:
         """Return a belief with another group's models beside those in force, as the patent starts them. VSMM 8."""
-        old, (state, _) = self.active, self.imm.fused(belief)
-        self._bring_in(newcomer)
+        old, (state, _) = self.active, self.fused(belief)
+        self.bring_in(newcomer)
         top = belief.log_probabilities.max()  # VSMM 8.1
         noises = dict(zip(self.models.names, self.models.noises, strict=True))  # VSMM 8.2
         poses = {name: self.models.captured_nearest(name, state) for name in self.active if name not in old}  # VSMM 8.3
-        new = {name: (pose, self._own(pose, noises[name]), top) for name, pose in poses.items()}
+        new = {name: (pose, self._lifted(pose[None], noises[name])[0], top) for name, pose in poses.items()}
         return normalised(regrouped(belief, old, self.active, new))
 
-    def _bring_in(self, newcomer: str) -> None:
+    def bring_in(self, newcomer: str) -> None:
         """Bring another group into force beside the present one."""
-        assert self.group is not None
-        self._contest = Contest(old=self.groups[self.group], new=self.groups[newcomer])
-        self.newcomer, self.active = newcomer, self.topology.union((self.group, newcomer))  # VSMM 8.4
+        self.newcomer, self._log_ratio = newcomer, 0.0
+        self.active = self.topology.union((self.group, newcomer))  # VSMM 8.4
 
-    def _decided(self, after: Belief) -> Belief:
-        """Return the belief after a cycle over both groups: of one of them as soon as the other has to end."""
-        assert self._contest is not None
+    def decided(self, after: Belief) -> Belief:
+        """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
+
+        The likelihoods' ratio is that of all cycles since the new group came. Interpretation V12.
+        """
         assert self.newcomer is not None
         assert self.group is not None
-        decision = self._contest.decide(after, self.active)
-        return after if decision is None else self._only(self.newcomer if decision == "new" else self.group, after)
+        old, new = ([self.active.index(name) for name in self.groups[group]] for group in (self.group, self.newcomer))
+
+        def log_ratio(logarithms: Array) -> float:
+            return float(np.logaddexp.reduce(logarithms[new]) - np.logaddexp.reduce(logarithms[old]))
+
+        self._log_ratio += log_ratio(after.log_likelihoods)  # VSMM 9
+        smaller = min(log_ratio(after.log_probabilities), self._log_ratio)
+        if smaller < np.log(ENDED):
+            return self._only(self.group, after)
+        return self._only(self.newcomer, after) if smaller > 0.0 else after
 
     def _only(self, group: str, belief: Belief) -> Belief:
         """Return the belief over one group, which alone stays in force."""
-        models = tuple(self.groups[group])
-        remaining = normalised(regrouped(belief, self.active, models, {}))
-        self.active, self.group, self.newcomer, self._contest = models, group, None, None
-        self._cycles_of_group = 0
-        return remaining
+        old, self.active = self.active, self.groups[group]
+        self.group, self.newcomer, self._cycles_of_group = group, None, 0
+        return normalised(regrouped(belief, old, self.active, {}))

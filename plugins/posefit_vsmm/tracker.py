@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -74,13 +74,6 @@ def aligned_costs(
     return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
 
 
-class Clock(NamedTuple):
-    """When a frame started, in seconds."""
-
-    seconds: float
-    cpu_seconds: float
-
-
 @final
 class TrackFilter:
     """One track, as far as it has come; with a `search`, every frame ends in one."""
@@ -93,6 +86,7 @@ class TrackFilter:
         topology = read_topology(settings.groups, models.models.names)
         self._switching = Switching(settings, models.models, topology, task.body.skeleton, task.fps)
         self._cameras = JointCameras(task.body, task.cameras, self._dependent, settings)
+        self._recovers = not settings.patent if settings.recovery is None else settings.recovery
         self._free = free_errors(task.body.skeleton)
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
@@ -102,28 +96,38 @@ class TrackFilter:
 
     def frame(self, observation: Observation) -> Frame:
         """Return the next frame."""
-        clock, switching = Clock(time.perf_counter(), time.process_time()), self._switching
-        views = [lines_of(one.mask) if observation.usable else None for one in observation.silhouettes]
+        self._seconds, self._cpu_seconds = time.perf_counter(), time.process_time()
+        switching, views = self._switching, [lines_of(view.mask) for view in observation.silhouettes]
+        if not observation.usable:
+            views = [None] * len(views)
         blind = all(lines is None for lines in views)
         self._blind_frames = self._blind_frames + 1 if blind else 0
-        if self._settings.recovers and (self._bad_frames >= LOST_FRAMES or self._blind_frames > MAX_BLIND_FRAMES):
+        if self._recovers and (self._bad_frames >= LOST_FRAMES or self._blind_frames > MAX_BLIND_FRAMES):
             self._belief = None
-        if self._belief is None and blind:
-            return self._last_pose(observation, clock)
+        if self._belief is None and blind:  # the latest pose once more, or an upright one
+            pose = np.concatenate([[self._task.yaw or 0.0], np.zeros(65)])
+            place = self._task.anchor
+            if self._latest is not None:
+                pose, place = self._latest.pose, self._latest.translation
+            return self._frame(pose, place, observation, 0, {})
         evaluations = self._start(observation) if self._belief is None else 0
         belief = self._belief
         assert belief is not None
         expected, spread = switching.predicted(belief)
         measured = self._cameras.detect(views, expected, spread, observation.landmarks)
-        if self._settings.recovers and (extra := self._missing_variances(measured)).any():
+        if self._recovers and (extra := self._missing_variances(measured)).any():
             belief = switching.widened(belief, extra)
             measured = self._cameras.detect(views, expected, spread + np.diag(extra), observation.landmarks)
-        joints = self._predicted_joints(measured)
+        self._joint_filters = self._joint_filters or [JointFilter(view.points) for view in measured]
+        measured_or_predicted = [
+            view.imputed(joint_filter.follow(view.points, view.confidence, view.variances))
+            for view, joint_filter in zip(measured, self._joint_filters, strict=True)
+        ]
+        joints = np.array([view.points for view in measured_or_predicted])
         details = {"joints": joints, "confidence": np.array([view.confidence for view in measured])}
-        details["detection_seconds"] = time.perf_counter() - clock.seconds
+        details["detection_seconds"] = time.perf_counter() - self._seconds
         if self._settings.patent:  # Interpretation V9
-            measured = [view.imputed(points) for view, points in zip(measured, joints, strict=True)]
-        filter_start = time.perf_counter()
+            measured = measured_or_predicted
 
         def measure(states: Array) -> Measurement:
             nonlocal evaluations
@@ -133,11 +137,11 @@ class TrackFilter:
             evaluations += len(states)
             return measurement._replace(log_likelihoods=self._search.log_likelihoods(states, observation))
 
+        filter_start = time.perf_counter()
         belief = switching.cycle(belief, measure, joints[0])
         state, spread = switching.fused(belief)
         details["filter_seconds"] = time.perf_counter() - filter_start
-        poses, places = decode(state[None], self._dependent)
-        pose, place = poses[0], places[0]
+        (pose,), (place,) = decode(state[None], self._dependent)
         if self._search is not None and not blind:
             budget = self._task.evaluations - evaluations - 1
             result = self._search.best(state, spread, observation, budget, self._rng)
@@ -146,7 +150,7 @@ class TrackFilter:
                 belief = switching.updated(belief, result.measure)
                 place = switching.fused(belief)[0][:3]  # one frame alone hardly shows the depth
         self._belief = belief
-        return self._frame(pose, place, observation, evaluations + 1, clock, details)
+        return self._frame(pose, place, observation, evaluations + 1, details)
 
     def _start(self, observation: Observation) -> int:
         """Take the state (43,) that fits this frame best, with all models equally probable; return its evaluations.
@@ -202,42 +206,17 @@ class TrackFilter:
                     extra[bone_errors(bone)] = MISSING_DEVIATION**2
         return np.asarray(extra * np.maximum(self._free, STIFF) ** 2)
 
-    def _predicted_joints(self, measured: Sequence[JointMeasurement]) -> Array:
-        """Return the joints (views, 17, 2), predicted where they are hidden."""
-        self._joint_filters = self._joint_filters or [JointFilter(view.points) for view in measured]
-        return np.array(
-            [
-                view.imputed(joint_filter.follow(view.points, view.confidence, view.variances)).points
-                for view, joint_filter in zip(measured, self._joint_filters, strict=True)
-            ]
-        )
-
-    def _last_pose(self, observation: Observation, clock: Clock) -> Frame:
-        """Return the latest pose once more, or an upright one, while no person is visible."""
-        pose, place = np.zeros(66), np.array(self._task.anchor, dtype=np.float64)
-        pose[0] = self._task.yaw or 0.0
-        if self._latest is not None:
-            pose, place = self._latest.pose, self._latest.translation
-        return self._frame(pose, place, observation, 0, clock, {})
-
     def _frame(
-        self,
-        pose: Array,
-        place: Array,
-        observation: Observation,
-        evaluations: int,
-        clock: Clock,
-        details: Mapping[str, Any],
+        self, pose: Array, place: Array, observation: Observation, evaluations: int, details: Mapping[str, Any]
     ) -> Frame:
         """Return a frame with its cost, the label of its activity, and the models in its details."""
         task, belief, switching = self._task, self._belief, self._switching
         if observation.translation is not None:
-            place = np.array(observation.translation, dtype=np.float64)
-        pose = np.where(task.body.skeleton.free, pose, 0.0)
+            place = observation.translation
+        pose, place = np.where(task.body.skeleton.free, pose, 0.0), np.array(place, dtype=np.float64)
         costs, counts = pose_costs(task.body, task.cameras, observation.silhouettes, pose[None], place[None])
-        cost, areas = float(costs[0]), counts[:, 0]
         if not self._blind_frames:
-            iou = metrics.iou(np.array(known_views(list(areas), observation.silhouettes))).mean()
+            iou = metrics.iou(np.array(known_views(list(counts[:, 0]), observation.silhouettes))).mean()
             self._bad_frames = self._bad_frames + 1 if iou < LOST_IOU else 0
         models = {name: getattr(switching, name) for name in ("group", "newcomer", "groups")}
         models |= {"lost": belief is None, "models": switching.active}
@@ -245,16 +224,11 @@ class TrackFilter:
         if belief is not None:
             models |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
             activity = most_probable(switching.topology.activities, switching.active, belief.probabilities)
+        seconds, cpu_seconds = time.perf_counter() - self._seconds, time.process_time() - self._cpu_seconds
         self._latest = Frame(
-            pose,
-            place,
-            cost,
-            areas,
-            evaluations,
-            time.perf_counter() - clock.seconds,
-            np.array([cost]),
+            *(pose, place, float(costs[0]), counts[:, 0], evaluations, seconds, costs),
             details={**details, **models},
-            cpu_seconds=time.process_time() - clock.cpu_seconds,
+            cpu_seconds=cpu_seconds,
             activity=activity,
         )
         return self._latest
@@ -303,13 +277,4 @@ def vsmm(
         recovery: whether a lost pose is estimated again and a lost limb sought all around; none is no in the patent,
             else yes. Interpretation V14.
     """
-    settings = Settings(
-        variant=variant,
-        structure=structure,
-        groups=groups,
-        models=models,
-        process_noise=process_noise,
-        joint_noise=joint_noise,
-        recovery=recovery,
-    )
-    return VSMM(task, settings)
+    return VSMM(task, Settings(variant, structure, groups, models, process_noise, joint_noise, recovery))
