@@ -26,7 +26,7 @@ from posefit.hooks import RegisterTracker
 def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `vsmm` and `sapso+vsmm`."""
     from posefit_vsmm.joined import joined
-    from posefit_vsmm.tracker import vsmm
+    from posefit_vsmm.tracker import VSMM
 
-    register("vsmm", vsmm)
+    register("vsmm", VSMM)
     register("sapso+vsmm", joined)

@@ -22,10 +22,7 @@ TABLES = ("groups", "neighbours", "activities")
 
 
 class Topology(NamedTuple):
-    """Groups of models, in the order in which they are numbered, and the neighbours of each model.
-
-    The field calls them model sets, and the neighbours a digraph of models.
-    """
+    """Groups of models (model sets), in the order in which they are numbered, and a digraph of models' neighbours."""
 
     groups: Mapping[str, tuple[str, ...]]
     neighbours: Mapping[str, tuple[str, ...]]
@@ -35,7 +32,6 @@ class Topology(NamedTuple):
     def transition(self, models: Sequence[str]) -> Array:
         """Return how probable each of some models (r, r) is after each: `stay`, the rest among its neighbours there.
 
-        It is the transition matrix of a Markov chain; each row sums to 1.
         A model without a neighbour there may change into any, as a group of its own can only be left that way.
         """
         matrix = np.zeros((len(models), len(models)))
@@ -65,14 +61,12 @@ def read_topology(path: str | Path, known: Collection[str]) -> Topology:
     """
     label = str(path) or "groups.toml"
     try:
-        values = parsed_toml(
-            read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / label).read_text("utf-8")
-        )
+        text = read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / label).read_text("utf-8")
+        values = {"activities": {}, **parsed_toml(text)}
     except FileNotFoundError:
         raise InputError(f"{label}: expected a file of groups, got none") from None
     except ValueError as error:
         raise InputError(f"{label}: expected TOML with stay, groups and neighbours, got {error}") from None
-    values = {"activities": {}, **values}
     if set(values) != {"stay", *TABLES}:
         raise InputError(f"{label}: expected stay, groups and neighbours, got {sorted(values)}")
     stay = values["stay"]
@@ -81,14 +75,12 @@ def read_topology(path: str | Path, known: Collection[str]) -> Topology:
     for key in TABLES:
         if not isinstance(values[key], dict) or not all(isinstance(models, list) for models in values[key].values()):
             raise InputError(f"{label}: {key} must be a table of lists of models, got {quoted(values[key])}")
-    groups, neighbours, activities = (
-        {name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in TABLES
-    )
+    tables = [{name: tuple(dict.fromkeys(models)) for name, models in values[key].items()} for key in TABLES]
+    groups, neighbours, activities = tables
     if not groups or not all(groups.values()):
         raise InputError(f"{label}: groups must hold at least one group of at least one model, got {values['groups']}")
-    used = {model for models in groups.values() for model in models} | set(neighbours)
+    used = {*neighbours}.union(*groups.values())
     for model in used.union(*neighbours.values(), *activities.values()):
         one_of(f"{label}: a model", model, known)
-    alone = {model: (model,) for model in known if not any(model in models for models in activities.values())}
-    neighbours = {model: neighbours.get(model, ()) for model in used}
-    return Topology(groups, neighbours, {**activities, **alone}, stay)  # VSMM 4
+    activities |= {model: (model,) for model in known if not any(model in models for models in activities.values())}
+    return Topology(groups, {model: neighbours.get(model, ()) for model in used}, activities, stay)  # VSMM 4

@@ -5,22 +5,6 @@ equations are those of H. Blom, Y. Bar-Shalom, The interacting multiple model al
 switching coefficients, IEEE Trans. Automatic Control 33(8), 1988, as CN101894278 uses them in its step 6. The filter
 works for any models of any states; what belongs to a model is a row of an array. Likelihoods are logarithms, so that a
 residual of any size leaves probabilities that sum to 1 (Interpretation V13).
-
-A thing on a line either stands or moves by 1 a frame. Its place is measured, and it moves:
-
->>> import numpy as np
->>> from posefit_vsmm.imm import IMM, Measurement, start
->>> def predict(states, covariances):
-...     return states + [[0.0], [1.0]], covariances + 0.01
->>> imm = IMM(predict, np.array([[0.9, 0.1], [0.1, 0.9]]))
->>> belief = start(np.zeros(1), np.eye(1), models=2)
->>> for place in (1.0, 2.0, 3.0):
-...     belief = imm.cycle(belief, lambda states: Measurement(place - states, np.ones((2, 1, 1)), np.array([[0.01]])))
->>> belief.probabilities.round(3).tolist()
-[0.0, 1.0]
->>> state, covariance = imm.fused(belief)
->>> round(float(state[0]), 2)
-3.0
 """
 
 from collections.abc import Callable
@@ -33,7 +17,6 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit_vsmm.state import minus, plus
 
-MIN_EIGENVALUE = 1e-12  # what an eigenvalue of a covariance is raised to where rounding made it less
 MAX_STEPS = 10  # to find the mean of several states; two or three are enough
 
 
@@ -75,7 +58,6 @@ class Belief:
     covariances: Array = field(repr=False)  # (r, e, e)
     log_probabilities: Array  # (r,)
     log_likelihoods: Array  # (r,) of the latest measurement
-    repairs: int = 0  # covariances that had lost their positive definiteness, and were repaired
 
     @property
     def probabilities(self) -> Array:
@@ -137,15 +119,13 @@ class IMM:
         weights = np.where(np.isfinite(after), weights, np.eye(len(after))).T
         states = self.manifold.means(belief.states, weights)
         covariances = self.manifold.spreads(belief.states, belief.covariances, weights, states)  # VSMM 6.2b
-        covariances, repairs = positive_definite(covariances)
-        return Belief(states, covariances, after, belief.log_likelihoods, belief.repairs + repairs)
+        return Belief(states, covariances, after, belief.log_likelihoods)
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief after each model's state is measured, with the probabilities of before."""
         before = belief.states, belief.covariances
         states, covariances, likelihoods = update(*before, measure(belief.states), self.manifold)
-        covariances, repairs = positive_definite(covariances)
-        return Belief(states, covariances, belief.log_probabilities, likelihoods, belief.repairs + repairs)
+        return Belief(states, covariances, belief.log_probabilities, likelihoods)
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state and covariance that stand for all models."""
@@ -164,26 +144,13 @@ def update(
         return states, covariances, np.zeros(count) + log_likelihoods
     across = jacobians @ covariances
     innovations = across @ jacobians.swapaxes(1, 2) + noise  # VSMM 6.3b
-    log_determinants = 2.0 * np.log(np.diagonal(np.linalg.cholesky(innovations), axis1=1, axis2=2)).sum(axis=1)
+    log_determinants = np.linalg.slogdet(innovations)[1]
     solved = np.linalg.solve(innovations, np.concatenate([across, residuals[..., None]], axis=2))
     # the squared Mahalanobis distances of the residuals, also called the normalised innovations squared (NIS)
     distances = (residuals * solved[..., -1]).sum(axis=1)
     likelihoods = -0.5 * (distances + log_determinants + size * np.log(2.0 * np.pi))  # VSMM 6.3c
     gains = solved[..., :-1].swapaxes(1, 2)  # VSMM 6.3d
     rest = np.eye(covariances.shape[1]) - gains @ jacobians
-    after = rest @ covariances @ rest.swapaxes(1, 2) + gains @ noise @ gains.swapaxes(1, 2)  # Joseph's symmetric form
+    after = rest @ covariances @ rest.swapaxes(1, 2) + gains @ noise @ gains.swapaxes(1, 2)  # Joseph's form
+    after = 0.5 * (after + after.swapaxes(1, 2))
     return manifold.plus(states, (gains @ residuals[..., None])[..., 0]), after, likelihoods + log_likelihoods
-
-
-def positive_definite(covariances: Array) -> tuple[Array, int]:
-    """Return covariances (r, e, e), symmetric and of eigenvalues above 0, and how many had to be repaired for that."""
-    symmetric, repairs = 0.5 * (covariances + covariances.swapaxes(1, 2)), 0
-    for covariance in symmetric:
-        try:
-            np.linalg.cholesky(covariance)  # an eighth of the time of the eigenvalues
-        except np.linalg.LinAlgError:
-            values, vectors = np.linalg.eigh(covariance)
-            raised = np.maximum(values, max(MIN_EIGENVALUE, MIN_EIGENVALUE * float(values[-1])))
-            covariance[:] = (vectors * raised) @ vectors.T
-            repairs += 1
-    return symmetric, repairs

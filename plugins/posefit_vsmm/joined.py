@@ -18,7 +18,6 @@ from posefit.geometry.rotation import wrapped
 from posefit.registry import registry
 from posefit_vsmm.imm import Measure, Measurement
 from posefit_vsmm.motion import library
-from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import (
     ERROR,
     FIRST_BONE,
@@ -64,10 +63,6 @@ class Directions(Components):
         """Return the latents (n, m) that come nearest to joint angles (n, 63)."""
         return np.asarray(wrapped(angles - self.mean) @ np.linalg.pinv(self.components))
 
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m)."""
-        return np.asarray(self.mean + (latents[:, :, None] * self.components).sum(axis=1))
-
 
 class SearchResult(NamedTuple):
     """What a search around the filter's state finds."""
@@ -104,13 +99,10 @@ class Search:
         space = SearchSpace(prior, poses[0, :3], REACH * root, places[0], self.task.translation)
         zeros = np.zeros(space.dimensions)
         start = Start(zeros, np.full(space.dimensions, 1.0 / REACH), zeros)
-        space = space.around(space.centre, start)
-        if observation.translation is not None:
-            space = space.around(space.centre, space.start, observation.translation)
+        space = space.around(space.centre, start, observation.translation)
         penalty = 0.5 * REACH**2 / self.weight  # of a proposal at the box's border
-        problem = PoseProblem(
-            self.task.body, self.task.cameras, observation.silhouettes, space, threads=self.task.threads, blank=True
-        )
+        scene = self.task.body, self.task.cameras, observation.silhouettes
+        problem = PoseProblem(*scene, space, threads=self.task.threads, blank=True)
         optimiser = self.factory(space, rng, **of_plugins.planned(self.factory, {}, budget))
 
         def posterior(proposals: Array) -> Array:  # in units of cost, less a constant
@@ -128,12 +120,7 @@ class Search:
 
 
 def joined(
-    task: Task,
-    *,
-    optimiser: str = "sapso",
-    dimensions: int = 16,
-    weight: float = 0.25,
-    groups: str = "",
+    task: Task, *, optimiser: str = "sapso", dimensions: int = 16, weight: float = 0.25, groups: str = ""
 ) -> VSMM:
     """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
 
@@ -146,4 +133,4 @@ def joined(
     at_least("dimensions", dimensions, 1)
     positive("weight", weight)
     search = Search(task, library().dependent, registry().optimiser(optimiser), dimensions, weight)
-    return VSMM(task, Settings(groups=groups), search)
+    return VSMM(task, search, groups=groups)

@@ -15,12 +15,11 @@ from posefit.arrays import Array
 from posefit.fitting.landmarks import DEVIATION, GROUPS, MIRRORED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import BONES, JOINTS
+from posefit.geometry.skeleton import BONES
 from posefit_vsmm.imm import Measurement
 from posefit_vsmm.joints import detect, rule_errors
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import Lines
-from posefit_vsmm.settings import Settings
 from posefit_vsmm.state import ENDS, ERROR, DependentJoints, decode, differentiate
 
 MIN_DEPTH = 0.05  # metres: a smaller distance to the camera counts as this one
@@ -29,7 +28,7 @@ MIN_GATE, MAX_GATE = 0.35, 1.2  # legs: between these
 NO_GATE = 1e3  # legs: a gate that is none
 MAX_DISTANCE = 16.0  # squared standard deviations in the image: a detection farther off is rejected
 MIN_CONFIDENCE = 0.05  # a lower one counts as this one
-KNOWN_DEVIATION = 0.002  # metres: of a translation that is known
+KNOWN_VARIANCE = 0.002**2  # square metres: of a translation that is known
 
 
 def head_radius(body: Body) -> float:
@@ -62,9 +61,8 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
     for group in GROUPS:
         rows = np.flatnonzero(single & np.isin(joints, group) & (placed[:, 2] > 0.0))
         exchanged = landmarks[MIRRORED[joints[rows]]]
-        direct, other = (
-            np.linalg.norm(candidates[:, :2] - expected[rows], axis=1).sum() for candidates in (placed[rows], exchanged)
-        )
+        both = np.stack([placed[rows], exchanged])[..., :2]
+        direct, other = np.linalg.norm(both - expected[rows], axis=2).sum(axis=1)
         if other < direct:
             placed[rows] = exchanged
     return placed[:, :2], np.where(single, np.minimum(placed[:, 2], 1.0), 0.0)
@@ -77,7 +75,8 @@ class JointCameras:
     body: Body
     cameras: Sequence[Camera]
     dependent: DependentJoints
-    settings: Settings
+    patent: bool = False
+    joint_noise: float = 1.0
 
     def project(self, camera: Camera, states: Array) -> tuple[Array, Array]:
         """Return the projected points (r, 17, 2) of states (r, 43), in pixels, and their Jacobians (r, 17, 2, 33)."""
@@ -85,7 +84,8 @@ class JointCameras:
         def pixels(states: Array) -> Array:
             points = self.body.skeleton.joints(*decode(states, self.dependent))[..., ENDS, :].mean(axis=-2)
             inside = points @ camera.rotation.T + camera.translation
-            return inside[..., :2] / np.maximum(inside[..., 2:], MIN_DEPTH) * camera.focal + camera.centre
+            slopes = inside[..., :2] / np.maximum(inside[..., 2:], MIN_DEPTH)
+            return np.asarray(slopes * camera.focal + camera.centre)
 
         return differentiate(pixels, states)
 
@@ -103,7 +103,6 @@ class JointCameras:
     def _detect(
         self, camera: Camera, lines: Lines | None, expected: Array, spread: Array, landmarks: Array | None
     ) -> JointMeasurement:
-        literal = self.settings.patent
         pixels, jacobian = (part[0] for part in self.project(camera, expected[None]))
         if lines is None:
             return JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0)
@@ -112,13 +111,12 @@ class JointCameras:
         leg = leg_of(self.body.skeleton) * metre
         covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)
         gates = GATE_DEVIATIONS * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).max(axis=1))
-        gates = np.full_like(gates, NO_GATE * leg) if literal else np.clip(gates, MIN_GATE * leg, MAX_GATE * leg)
-        bias, deviation = rule_errors(literal)
-        points, confidence, unassigned = detect(
-            lines, pixels, gates, leg, head_radius(self.body) * metre, bias, nearest=literal
-        )
-        variances = self.settings.joint_noise * (deviation * leg) ** 2
-        if not literal:  # Interpretation V8
+        gates = np.full_like(gates, NO_GATE * leg) if self.patent else np.clip(gates, MIN_GATE * leg, MAX_GATE * leg)
+        bias, deviation = rule_errors(self.patent)
+        head = head_radius(self.body) * metre
+        points, confidence, unassigned = detect(lines, pixels, gates, leg, head, bias, nearest=self.patent)
+        variances = self.joint_noise * (deviation * leg) ** 2
+        if not self.patent:  # Interpretation V8
             variances = variances / np.maximum(confidence, MIN_CONFIDENCE)[:, None]
         if landmarks is not None and landmarks.any():
             placed, trust = with_sides(landmarks, pixels)
@@ -130,7 +128,7 @@ class JointCameras:
         residuals = points - pixels
         innovations = covariances + variances[:, :, None] * np.eye(2)
         distances = (residuals * np.linalg.solve(innovations, residuals[..., None])[..., 0]).sum(axis=1)
-        rejected = (distances >= MAX_DISTANCE) & (confidence > 0.0) & (not literal)
+        rejected = (distances >= MAX_DISTANCE) & (confidence > 0.0) & (not self.patent)
         confidence = np.where(rejected, 0.0, confidence)
         return JointMeasurement(points, confidence, variances, unassigned + int(np.count_nonzero(rejected)))
 
@@ -139,17 +137,13 @@ class JointCameras:
 
         `known` (3,) is the root's translation, where it is known.
         """
-        count = len(states)
-        residuals, jacobians, noise = [np.zeros((count, 0))], [np.zeros((count, 0, ERROR))], [np.zeros(0)]
+        count, parts = len(states), []
         for camera, joints in zip(self.cameras, measured, strict=True):
-            pixels, jacobian = self.project(camera, states)  # VSMM 6.1
             visible = joints.confidence > 0.0
-            residuals.append((joints.points - pixels)[:, visible].reshape(count, -1))
-            jacobians.append(jacobian[:, visible].reshape(count, -1, ERROR))
-            noise.append(joints.variances[visible].ravel())
+            pixels, jacobians = (part[:, visible] for part in self.project(camera, states))  # VSMM 6.1
+            parts.append((joints.points[visible] - pixels, jacobians, joints.variances[visible]))
         if known is not None:
-            residuals.append(known - states[:, :3])
-            jacobians.append(np.tile(np.eye(3, ERROR), (count, 1, 1)))
-            noise.append(np.full(3, KNOWN_DEVIATION**2))
-        covariance = np.diag(np.concatenate(noise))
-        return Measurement(np.concatenate(residuals, axis=1), np.concatenate(jacobians, axis=1), covariance)
+            parts.append((known - states[:, :3], np.tile(np.eye(3, ERROR), (count, 1, 1)), np.full(3, KNOWN_VARIANCE)))
+        residuals = np.concatenate([residual.reshape(count, -1) for residual, _, _ in parts], axis=1)
+        jacobians = np.concatenate([jacobian.reshape(count, -1, ERROR) for _, jacobian, _ in parts], axis=1)
+        return Measurement(residuals, jacobians, np.diag(np.concatenate([noise.ravel() for *_, noise in parts])))

@@ -44,7 +44,7 @@ SIZE_LIMIT = 10_000_000  # bytes of a file of models
 class MotionModels:
     """Models (r,) side by side, for a body and a frame rate. Each has a state of its own."""
 
-    names: Sequence[str]
+    names: tuple[str, ...]
     matrices: Array = field(repr=False)  # (r, 43, 40) F less the identity, of the quaternions
     offsets: Array = field(repr=False)  # (r, 43)
     noises: Array = field(repr=False)  # (r, 33, 33) covariance of W
@@ -56,15 +56,16 @@ class MotionModels:
     def of(self, names: Sequence[str]) -> "MotionModels":
         """Return some of the models."""
         rows = [self.names.index(name) for name in names]
-        parts = (self.matrices, self.offsets, self.noises, self.poses, self.captured)
-        return MotionModels(tuple(names), *(part[rows] for part in parts), self.leg, self.share)
+        chosen = {name: getattr(self, name)[rows] for name in ("matrices", "offsets", "noises", "poses", "captured")}
+        return replace(self, names=tuple(names), **chosen)
 
-    def fitted_to(self, skeleton: Skeleton, fps: float) -> "MotionModels":
+    def fitted_to(self, skeleton: Skeleton, fps: float, process_noise: float = 1.0) -> "MotionModels":
         """Return the models for a body's legs and another frame rate, of which a step is a share of a step at 30."""
         leg, share = leg_of(skeleton), FPS / fps
         scale = np.maximum(free_errors(skeleton), STIFF)
         scale[:3] = leg
-        return replace(self, noises=self.noises * np.outer(scale, scale) * share, leg=leg, share=share)
+        noises = process_noise * share * self.noises * np.outer(scale, scale)  # Interpretation V7
+        return replace(self, noises=noises, leg=leg, share=share)
 
     def predict(self, states: Array, covariances: Array) -> tuple[Array, Array]:
         """Return the states (r, 43) one frame later, and the covariances (r, 33, 33) of their errors."""
@@ -88,7 +89,7 @@ class MotionModels:
         The heading is taken out, the rest moved by F, and the heading put back.
         """
         headings, before = without_heading(states)
-        signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)
+        signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)  # F is that of quaternions with w above 0
         inputs = (signs * before).reshape(*states.shape[:-1], -1)
         change = self.share * (inputs @ self.matrices.swapaxes(1, 2) + self.offsets[:, None])
         after = before + signs * quaternions_of(change)

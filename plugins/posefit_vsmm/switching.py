@@ -7,25 +7,23 @@ speed, and a test of both ends one of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import final
+from typing import Literal, final
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import Skeleton
 from posefit_vsmm.groups import Topology, most_probable
 from posefit_vsmm.imm import IMM, QUATERNIONS, Belief, Measure, Measurement, start
-from posefit_vsmm.motion import CLIP_FPS, MotionModels, lifted
-from posefit_vsmm.settings import Settings
+from posefit_vsmm.motion import MotionModels, lifted
 from posefit_vsmm.state import AT, inverse_tangents, unit
 
 # where thighs and shanks begin and end
 _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right knee")]
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
+Structure = Literal["variable", "all"]
 MOST = 3  # of the four lower limbs. Interpretation V15
 FIRST_CYCLES = 10  # over all models before a group is chosen
-DWELL = 10  # frames that a group stays at least; none in the patent. Interpretation V10
 ENDED = 0.9  # the ratio, new to old, below which a new group ends
 
 
@@ -61,7 +59,7 @@ def regrouped(
     known = dict(zip(old, zip(belief.states, belief.covariances, belief.log_probabilities, strict=True), strict=True))
     parts = zip(*({**new, **known}[name] for name in models), strict=True)
     states, covariances, probabilities = (np.array(part) for part in parts)
-    return Belief(states, covariances, probabilities, np.zeros(len(models)), belief.repairs)
+    return Belief(states, covariances, probabilities, np.zeros(len(models)))
 
 
 def normalised(belief: Belief) -> Belief:
@@ -78,23 +76,20 @@ class Switching:
     """
 
     def __init__(
-        self, settings: Settings, models: MotionModels, topology: Topology, skeleton: Skeleton, fps: float
+        self, models: MotionModels, topology: Topology, *, patent: bool = False, structure: Structure = "variable"
     ) -> None:
         self.topology, self.groups = topology, topology.groups
-        self.every = topology.union(topology.groups)
-        self._patent, self._structure = settings.patent, settings.structure
-        fitted = models.of(self.every).fitted_to(skeleton, CLIP_FPS if self._patent else fps)  # Interpretation V6
-        self.models = replace(fitted, noises=settings.process_noise * fitted.noises)
-        self._filter = lru_cache(self._filter_of)
+        self.models = models.of(topology.union(topology.groups))
+        self._patent, self._structure, self._filter = patent, structure, lru_cache(self._filter_of)
         self.restart()
 
     def restart(self) -> None:
         """Bring all models into force; a group will be chosen among them."""
-        self.active = self.every
+        self.active = self.models.names
         self.group: str | None = None
         self.newcomer: str | None = None
         self._log_ratio = 0.0  # of the likelihoods since the newcomer came, new to old
-        self._cycles = self._cycles_of_group = 0
+        self._cycles = 0
         self._points: list[Array] = []
 
     def _filter_of(self, names: tuple[str, ...]) -> IMM:
@@ -160,14 +155,11 @@ class Switching:
             return after if self._cycles < FIRST_CYCLES else self._only(likely, after)
         if self.newcomer is not None:
             return self.decided(after)
-        self._cycles_of_group += 1
         number = requested_group(self._points)
         if number is None or number >= len(self.groups) or (newcomer := tuple(self.groups)[number]) == self.group:
             return after
         if self._patent:
             return self.decided(self.imm.cycle(self.joined(before, newcomer), measure))  # run again, and judged
-        if self._cycles_of_group <= DWELL:
-            return after
         # Interpretation V11: the cycle is run again over both groups; new models had a probability of 0
         old, fused = self.active, self.imm.fused(before)
         self.bring_in(newcomer)
@@ -188,7 +180,7 @@ class Switching:
     def bring_in(self, newcomer: str) -> None:
         """Bring another group into force beside the present one."""
         self.newcomer, self._log_ratio = newcomer, 0.0
-        self.active = self.topology.union((self.group, newcomer))  # VSMM 8.4
+        self.active = self.topology.union([self.group or newcomer, newcomer])  # VSMM 8.4
 
     def decided(self, after: Belief) -> Belief:
         """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
@@ -211,5 +203,5 @@ class Switching:
     def _only(self, group: str, belief: Belief) -> Belief:
         """Return the belief over one group, which alone stays in force."""
         old, self.active = self.active, self.groups[group]
-        self.group, self.newcomer, self._cycles_of_group = group, None, 0
+        self.group, self.newcomer = group, None
         return normalised(regrouped(belief, old, self.active, {}))

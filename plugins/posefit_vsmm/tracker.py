@@ -2,22 +2,23 @@
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, final
+from dataclasses import KW_ONLY, dataclass
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
+from posefit.fitting.check import choices, positive
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
-from posefit_vsmm.groups import most_probable, read_topology
+from posefit_vsmm.groups import Topology, most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
-from posefit_vsmm.motion import STIFF, library
+from posefit_vsmm.motion import CLIP_FPS, STIFF, Library, library
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.settings import Settings, Structure, Variant
 from posefit_vsmm.state import (
     AT,
     ERROR,
@@ -32,7 +33,7 @@ from posefit_vsmm.state import (
     plus,
     product,
 )
-from posefit_vsmm.switching import Switching
+from posefit_vsmm.switching import Structure, Switching
 
 if TYPE_CHECKING:
     from posefit_vsmm.joined import Search
@@ -52,13 +53,7 @@ LOST_IOU = 0.35  # below it, for so many frames, the track is lost
 LOST_FRAMES = 8
 MISSING_FRAMES = 2  # after these a limb that is not detected, while an end point is unassigned, is sought all around
 MISSING_DEVIATION = np.radians(15.0)  # that each of its joints then gains a frame
-# the bones whose turns a limb's end depends on
-_LIMBS = {
-    "left hand": ("lhumerus", "lradius"),
-    "right hand": ("rhumerus", "rradius"),
-    "left foot": ("lfemur", "ltibia"),
-    "right foot": ("rfemur", "rtibia"),
-}
+_LIMBS = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}  # bones whose turns a limb's end depends on
 
 
 def aligned_costs(
@@ -66,11 +61,8 @@ def aligned_costs(
 ) -> tuple[Array, Array]:
     """Return the costs (n,) of states (n, 43) in an observation, and the states, moved to where they fit it."""
     poses, places = decode(states, dependent)
-    scene = task.body, task.cameras, observation.silhouettes
-    if observation.translation is not None:
-        places[:] = observation.translation
-    else:
-        places = align(*scene, poses, places)
+    scene, known = (task.body, task.cameras, observation.silhouettes), observation.translation
+    places = align(*scene, poses, places) if known is None else np.tile(known, (len(states), 1))
     return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
 
 
@@ -79,34 +71,30 @@ class TrackFilter:
     """One track, as far as it has come; with a `search`, every frame ends in one."""
 
     def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
-        task, settings = tracker.task, tracker.settings
-        models = library(settings.models, settings.patent)
-        self._task, self._settings, self._search, self._rng = task, settings, tracker.search, rng
-        self._dependent = models.dependent
-        topology = read_topology(settings.groups, models.models.names)
-        self._switching = Switching(settings, models.models, topology, task.body.skeleton, task.fps)
-        self._cameras = JointCameras(task.body, task.cameras, self._dependent, settings)
-        self._recovers = not settings.patent if settings.recovery is None else settings.recovery
-        self._free = free_errors(task.body.skeleton)
+        task, library = tracker.task, tracker.library()
+        self._task, self._search, self._rng, self._patent = task, tracker.search, rng, tracker.patent
+        fps = CLIP_FPS if self._patent else task.fps  # Interpretation V6
+        models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
+        self._switching = Switching(models, tracker.topology(), patent=self._patent, structure=tracker.structure)
+        self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
+        self._cameras = JointCameras(task.body, task.cameras, self._dependent, self._patent, tracker.joint_noise)
+        self._recovers = not self._patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
         self._belief: Belief | None = None
         self._blind_frames = self._bad_frames = 0
-        self._missing = dict.fromkeys(_LIMBS, 0)
 
     def frame(self, observation: Observation) -> Frame:
         """Return the next frame."""
         self._seconds, self._cpu_seconds = time.perf_counter(), time.process_time()
-        switching, views = self._switching, [lines_of(view.mask) for view in observation.silhouettes]
-        if not observation.usable:
-            views = [None] * len(views)
+        switching, usable = self._switching, observation.usable
+        views = [lines_of(silhouette.mask) if usable else None for silhouette in observation.silhouettes]
         blind = all(lines is None for lines in views)
         self._blind_frames = self._blind_frames + 1 if blind else 0
         if self._recovers and (self._bad_frames >= LOST_FRAMES or self._blind_frames > MAX_BLIND_FRAMES):
             self._belief = None
         if self._belief is None and blind:  # the latest pose once more, or an upright one
-            pose = np.concatenate([[self._task.yaw or 0.0], np.zeros(65)])
-            place = self._task.anchor
+            pose, place = np.append(self._task.yaw or 0.0, np.zeros(65)), self._task.anchor
             if self._latest is not None:
                 pose, place = self._latest.pose, self._latest.translation
             return self._frame(pose, place, observation, 0, {})
@@ -124,9 +112,9 @@ class TrackFilter:
             for view, joint_filter in zip(measured, self._joint_filters, strict=True)
         ]
         joints = np.array([view.points for view in measured_or_predicted])
-        details = {"joints": joints, "confidence": np.array([view.confidence for view in measured])}
+        details: dict[str, Any] = {"joints": joints, "confidence": np.array([view.confidence for view in measured])}
         details["detection_seconds"] = time.perf_counter() - self._seconds
-        if self._settings.patent:  # Interpretation V9
+        if self._patent:  # Interpretation V9
             measured = measured_or_predicted
 
         def measure(states: Array) -> Measurement:
@@ -190,20 +178,19 @@ class TrackFilter:
         self._switching.restart()
         deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
         self._belief = self._switching.start(best, np.diag(deviations**2))
-        self._bad_frames = 0
-        self._missing = dict.fromkeys(_LIMBS, 0)
+        self._bad_frames, self._missing = 0, dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0)
         return evaluations
 
     def _missing_variances(self, measured: Sequence[JointMeasurement]) -> Array:
         """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
         extra = np.zeros(ERROR)
         unassigned = any(view.unassigned for view in measured)
-        for limb, bones in _LIMBS.items():
+        for limb, frames in self._missing.items():
             detected = any(view.confidence[AT[limb]] > 0.0 for view in measured)
-            self._missing[limb] = self._missing[limb] + 1 if unassigned and not detected else 0
-            if self._missing[limb] >= MISSING_FRAMES:
-                for bone in bones:
-                    extra[bone_errors(bone)] = MISSING_DEVIATION**2
+            self._missing[limb] = frames + 1 if unassigned and not detected else 0
+            side, end = limb.split()
+            for bone in _LIMBS[end] if self._missing[limb] >= MISSING_FRAMES else ():
+                extra[bone_errors(side[0] + bone)] = MISSING_DEVIATION**2
         return np.asarray(extra * np.maximum(self._free, STIFF) ** 2)
 
     def _frame(
@@ -222,50 +209,20 @@ class TrackFilter:
         models |= {"lost": belief is None, "models": switching.active}
         activity = None
         if belief is not None:
-            models |= {"probabilities": belief.probabilities, "repairs": belief.repairs}
+            models |= {"probabilities": belief.probabilities}
             activity = most_probable(switching.topology.activities, switching.active, belief.probabilities)
         seconds, cpu_seconds = time.perf_counter() - self._seconds, time.process_time() - self._cpu_seconds
-        self._latest = Frame(
-            *(pose, place, float(costs[0]), counts[:, 0], evaluations, seconds, costs),
-            details={**details, **models},
-            cpu_seconds=cpu_seconds,
-            activity=activity,
-        )
+        figures = pose, place, float(costs[0]), counts[:, 0], evaluations, seconds, costs
+        self._latest = Frame(*figures, details={**details, **models}, cpu_seconds=cpu_seconds, activity=activity)
         return self._latest
 
 
+@dataclass(frozen=True, eq=False)
 class VSMM:
-    """Follows a person by the joints that rules find in a silhouette, with the motion models of one group at a time.
-
-    With a `search`, every frame ends in one. Raises ValueError where a file of models or groups is none.
-    """
-
-    def __init__(self, task: Task, settings: Settings, search: "Search | None" = None) -> None:
-        self.task, self.settings, self.search = task, settings, search
-        read_topology(settings.groups, library(settings.models, settings.patent).models.names)
-
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""
-        track_filter = TrackFilter(self, rng)
-        for observation in observations:
-            yield track_filter.frame(observation)
-
-
-def vsmm(
-    task: Task,
-    *,
-    variant: Variant = "default",
-    structure: Structure = "variable",
-    groups: str = "",
-    models: str = "",
-    process_noise: float = 1.0,
-    joint_noise: float = 1.0,
-    recovery: bool | None = None,
-) -> VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
     `vsmm:patent` sets every interpretation to the patent's letter; the default differs from it where tracks are
-    better. Every other setting counts in both.
+    better. Every other setting counts in both. With a `search`, every frame ends in one.
 
     Settings:
         variant: "default", or the "patent"'s letter. Interpretations V4 to V6, V8, V9, V11, V14 and V15.
@@ -277,4 +234,39 @@ def vsmm(
         recovery: whether a lost pose is estimated again and a lost limb sought all around; none is no in the patent,
             else yes. Interpretation V14.
     """
-    return VSMM(task, Settings(variant, structure, groups, models, process_noise, joint_noise, recovery))
+
+    task: Task
+    search: "Search | None" = None
+    _: KW_ONLY
+    variant: Literal["default", "patent"] = "default"
+    structure: Structure = "variable"
+    groups: str = ""
+    models: str = ""
+    process_noise: float = 1.0
+    joint_noise: float = 1.0
+    recovery: bool | None = None
+
+    def __post_init__(self) -> None:
+        choices(VSMM, vars(self))
+        positive("process_noise", self.process_noise)
+        positive("joint_noise", self.joint_noise)
+        self.topology()
+
+    @property
+    def patent(self) -> bool:
+        """Whether interpretations are the patent's letter."""
+        return self.variant == "patent"
+
+    def library(self) -> Library:
+        """Return the motion models."""
+        return library(self.models, self.patent)
+
+    def topology(self) -> Topology:
+        """Return the groups of models."""
+        return read_topology(self.groups, self.library().models.names)
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""
+        track_filter = TrackFilter(self, rng)
+        for observation in observations:
+            yield track_filter.frame(observation)

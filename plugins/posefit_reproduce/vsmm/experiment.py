@@ -165,7 +165,6 @@ def switching_figures(film: Film, states: Sequence[State]) -> dict[str, Any]:
         "activations": len(newcomers),
         "wrong_activations": sum(not models for models in newcomers),
         "wrong_terminations": sum(map(bool, terminations)),
-        "repairs": int(states[-1]["repairs"]),
         "lost_frames": sum(bool(one["lost"]) for one in states),
     }
 
