@@ -159,7 +159,8 @@ class Switching:
         if number is None or number >= len(self.groups) or (newcomer := tuple(self.groups)[number]) == self.group:
             return after
         if self._patent:
-            return self.decided(self.imm.cycle(self.joined(before, newcomer), measure))  # run again, and judged
+            both = self.joined(before, newcomer)
+            return self.decided(self.imm.cycle(both, measure))  # run again, and judged
         # Interpretation V11: the cycle is run again over both groups; new models had a probability of 0
         old, fused = self.active, self.imm.fused(before)
         self.bring_in(newcomer)

@@ -75,7 +75,7 @@ class TrackFilter:
         self._task, self._search, self._rng, self._patent = task, tracker.search, rng, tracker.patent
         fps = CLIP_FPS if self._patent else task.fps  # Interpretation V6
         models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
-        self._switching = Switching(models, tracker.topology(), patent=self._patent, structure=tracker.structure)
+        self.switching = Switching(models, tracker.topology(), patent=self._patent, structure=tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
         self._cameras = JointCameras(task.body, task.cameras, self._dependent, self._patent, tracker.joint_noise)
         self._recovers = not self._patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
@@ -87,7 +87,7 @@ class TrackFilter:
     def frame(self, observation: Observation) -> Frame:
         """Return the next frame."""
         self._seconds, self._cpu_seconds = time.perf_counter(), time.process_time()
-        switching, usable = self._switching, observation.usable
+        switching, usable = self.switching, observation.usable
         views = [lines_of(silhouette.mask) if usable else None for silhouette in observation.silhouettes]
         blind = all(lines is None for lines in views)
         self._blind_frames = self._blind_frames + 1 if blind else 0
@@ -154,7 +154,7 @@ class TrackFilter:
         budget = task.evaluations - 1 if self._search is None else task.evaluations // 2
         yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
         headings = np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1) @ np.eye(4)[[0, 2]]
-        poses = self._switching.models.poses.reshape(-1, TURNS, 4)
+        poses = self.switching.models.poses.reshape(-1, TURNS, 4)
         turns = np.tile(poses, (len(yaws), 1, 1, 1))
         turns[:, :, 0] = product(headings[:, None], turns[:, :, 0])
         turns = turns.reshape(-1, TURNS, 4)
@@ -175,9 +175,9 @@ class TrackFilter:
             if costs.min() < best_cost:
                 best, best_cost = states[costs.argmin()], float(costs.min())
             evaluations += DRAWS
-        self._switching.restart()
+        self.switching.restart()
         deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
-        self._belief = self._switching.start(best, np.diag(deviations**2))
+        self._belief = self.switching.start(best, np.diag(deviations**2))
         self._bad_frames, self._missing = 0, dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0)
         return evaluations
 
@@ -197,7 +197,7 @@ class TrackFilter:
         self, pose: Array, place: Array, observation: Observation, evaluations: int, details: Mapping[str, Any]
     ) -> Frame:
         """Return a frame with its cost, the label of its activity, and the models in its details."""
-        task, belief, switching = self._task, self._belief, self._switching
+        task, belief, switching = self._task, self._belief, self.switching
         if observation.translation is not None:
             place = observation.translation
         pose, place = np.where(task.body.skeleton.free, pose, 0.0), np.array(place, dtype=np.float64)
