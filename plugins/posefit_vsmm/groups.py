@@ -55,10 +55,7 @@ def most_probable(sets: Mapping[str, Sequence[str]], models: Sequence[str], prob
 
 
 def read_topology(path: str | Path, known: Collection[str]) -> Topology:
-    """Return the topology of a TOML file; of "", the one that the package carries.
-
-    Raises ValueError naming the file where it is not what it should be, or names a model that is not known.
-    """
+    """Return the topology of a TOML file, "" for the package's own. Raises ValueError naming a file that is none."""
     label = str(path) or "groups.toml"
     try:
         text = read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / label).read_text("utf-8")

@@ -22,10 +22,7 @@ MAX_STEPS = 10  # to find the mean of several states; two or three are enough
 
 @dataclass(frozen=True)
 class Manifold:
-    """Where states live: `plus(states, errors)` moves states by errors, `minus(a, b)` leads from b to a.
-
-    Both take any number of leading axes.
-    """
+    """Where states live: `plus(states, errors)` moves states by errors, `minus(a, b)` leads from b to a."""
 
     plus: Callable[[Array, Array], Array] = np.add
     minus: Callable[[Array, Array], Array] = np.subtract
@@ -108,49 +105,37 @@ class IMM:
         return replace(after, log_probabilities=joint - np.logaddexp.reduce(joint))
 
     def mixed(self, belief: Belief) -> Belief:
-        """Return what each model starts its cycle from, and the probabilities c_j that it is the one.
-
-        A model that no other changes into starts from its own state.
-        """
+        """Return what each model starts its cycle from, and the probabilities c_j that it is the one."""
         with np.errstate(divide="ignore", invalid="ignore"):
             steps = np.log(self.transition) + belief.log_probabilities[:, None]
             after = np.logaddexp.reduce(steps, axis=0)  # log c_j
             weights = np.exp(steps - after)  # VSMM 6.2a
-        weights = np.where(np.isfinite(after), weights, np.eye(len(after))).T
+        weights = np.where(np.isfinite(after), weights, np.eye(len(after))).T  # its own, where none changes into it
         states = self.manifold.means(belief.states, weights)
         covariances = self.manifold.spreads(belief.states, belief.covariances, weights, states)  # VSMM 6.2b
         return Belief(states, covariances, after, belief.log_likelihoods)
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief after each model's state is measured, with the probabilities of before."""
-        before = belief.states, belief.covariances
-        states, covariances, likelihoods = update(*before, measure(belief.states), self.manifold)
-        return Belief(states, covariances, belief.log_probabilities, likelihoods)
+        residuals, jacobians, noise, log_likelihoods = measure(belief.states)
+        count, size = residuals.shape
+        if not size:
+            return replace(belief, log_likelihoods=np.zeros(count) + log_likelihoods)
+        across = jacobians @ belief.covariances
+        innovations = across @ jacobians.swapaxes(1, 2) + noise  # VSMM 6.3b
+        solved = np.linalg.solve(innovations, np.concatenate([across, residuals[..., None]], axis=2))
+        distances = (residuals * solved[..., -1]).sum(axis=1)  # squared Mahalanobis distances
+        log_determinants = np.linalg.slogdet(innovations)[1]
+        likelihoods = -0.5 * (distances + log_determinants + size * np.log(2.0 * np.pi))  # VSMM 6.3c
+        gains = solved[..., :-1].swapaxes(1, 2)  # VSMM 6.3d
+        rest = np.eye(jacobians.shape[2]) - gains @ jacobians
+        after = rest @ belief.covariances @ rest.swapaxes(1, 2) + gains @ noise @ gains.swapaxes(1, 2)  # Joseph's form
+        after = 0.5 * (after + after.swapaxes(1, 2))
+        states = self.manifold.plus(belief.states, (gains @ residuals[..., None])[..., 0])
+        return Belief(states, after, belief.log_probabilities, likelihoods + log_likelihoods)
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state and covariance that stand for all models."""
         weights = belief.probabilities[None]
         means = self.manifold.means(belief.states, weights)  # VSMM 6.5
         return means[0], self.manifold.spreads(belief.states, belief.covariances, weights, means)[0]
-
-
-def update(
-    states: Array, covariances: Array, measurement: Measurement, manifold: Manifold
-) -> tuple[Array, Array, Array]:
-    """Return states and covariances after a measurement, and the logs of its likelihoods; as they were without one."""
-    residuals, jacobians, noise, log_likelihoods = measurement
-    count, size = residuals.shape
-    if not size:
-        return states, covariances, np.zeros(count) + log_likelihoods
-    across = jacobians @ covariances
-    innovations = across @ jacobians.swapaxes(1, 2) + noise  # VSMM 6.3b
-    log_determinants = np.linalg.slogdet(innovations)[1]
-    solved = np.linalg.solve(innovations, np.concatenate([across, residuals[..., None]], axis=2))
-    # the squared Mahalanobis distances of the residuals, also called the normalised innovations squared (NIS)
-    distances = (residuals * solved[..., -1]).sum(axis=1)
-    likelihoods = -0.5 * (distances + log_determinants + size * np.log(2.0 * np.pi))  # VSMM 6.3c
-    gains = solved[..., :-1].swapaxes(1, 2)  # VSMM 6.3d
-    rest = np.eye(covariances.shape[1]) - gains @ jacobians
-    after = rest @ covariances @ rest.swapaxes(1, 2) + gains @ noise @ gains.swapaxes(1, 2)  # Joseph's form
-    after = 0.5 * (after + after.swapaxes(1, 2))
-    return manifold.plus(states, (gains @ residuals[..., None])[..., 0]), after, likelihoods + log_likelihoods

@@ -1,7 +1,6 @@
 """Where the 17 points are in a silhouette, by rules, and where hidden ones are by prediction. VSMM step 2.
 
-Distances are in legs (hip to ankle, projected at the person's depth), so that neither the size of the image nor that of
-the person matters.
+Errors and gates are in legs (hip to ankle, projected at the person's depth), whatever the sizes of image and person.
 """
 
 import json
@@ -88,8 +87,7 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
 def _tips(ends: Array, expected: Array, gates: Array, nearest: bool) -> tuple[dict[str, Array], int]:
     """Return which end points (n, 2) are hands and feet, and how many are unassigned. Interpretation V15.
 
-    All have their own, by the linear sum assignment of least distance, or each has the end point nearest to it.
-    Distances are counted in gates; the head takes part, since the skeleton line ends in it too.
+    All have their own, or each has the nearest. The head takes part, since the skeleton line ends in it too.
     """
     from scipy.optimize import linear_sum_assignment  # half a second to import
 

@@ -1,8 +1,6 @@
 """What cameras measure of a state: the rules' joints, against the projected points of the state. VSMM 6.1.
 
-How far off a detected joint is, is counted in the standard deviations of its prediction and its detection together:
-the squared Mahalanobis distance, known as the normalised innovation squared (NIS). A validation gate on it decides
-which detections are accepted.
+A validation gate on the squared Mahalanobis distance decides which detections are accepted.
 """
 
 from collections.abc import Sequence
@@ -94,7 +92,6 @@ class JointCameras:
     ) -> list[JointMeasurement]:
         """Return the joints that each camera shows, where a state (43,) is expected with a covariance (33, 33).
 
-        Detections outside the Mahalanobis gate are rejected. Where a camera shows nobody, no joint is detected.
         `landmarks` (V, 27, 3) are those of an `Observation`; a joint is where they and the rules have it on average.
         """
         each = zip(self.cameras, views, [None] * len(views) if landmarks is None else landmarks, strict=True)
@@ -133,10 +130,7 @@ class JointCameras:
         return JointMeasurement(points, confidence, variances, unassigned + int(np.count_nonzero(rejected)))
 
     def measure(self, states: Array, measured: Sequence[JointMeasurement], known: Array | None) -> Measurement:
-        """Return the residuals of detected joints for states (r, 43). Hidden joints have no column. Interpretation V9.
-
-        `known` (3,) is the root's translation, where it is known.
-        """
+        """Return the residuals of detected joints, and of a known translation (3,), for states (r, 43). V9."""
         count, parts = len(states), []
         for camera, joints in zip(self.cameras, measured, strict=True):
             visible = joints.confidence > 0.0

@@ -74,20 +74,14 @@ class MotionModels:
         return moved, jacobians @ covariances @ jacobians.swapaxes(1, 2) + self.noises
 
     def predict_numbers(self, states: Array, covariances: Array) -> tuple[Array, Array]:
-        """Return the same for covariances (r, 43, 43) of the states' numbers. Interpretation V4.
-
-        Quaternions are brought to unit length before the step.
-        """
+        """Return the same for covariances (r, 43, 43) of the states' numbers. Interpretation V4."""
         before = unit(states)
         changes = inverse_tangents(before)
         moved, after = self.predict(before, changes @ covariances @ changes.swapaxes(1, 2))
         return moved, lifted(moved, after)
 
     def step(self, states: Array) -> Array:
-        """Return the states (r, n, 43) one frame later, n of each model.
-
-        The heading is taken out, the rest moved by F, and the heading put back.
-        """
+        """Return the states (r, n, 43) one frame later, n of each model: moved by F without their headings."""
         headings, before = without_heading(states)
         signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)  # F is that of quaternions with w above 0
         inputs = (signs * before).reshape(*states.shape[:-1], -1)
@@ -113,10 +107,7 @@ class MotionModels:
 
 
 def without_heading(states: Array) -> tuple[Array, Array]:
-    """Return the headings (..., 4) of states (..., 43), and their quaternions (..., 10, 4) without them.
-
-    The heading is the twist of the first one about the vertical: (w, 0, y, 0), made a unit.
-    """
+    """Return the headings (..., 4), twists about the vertical, of states (..., 43), and their quaternions without."""
     turns = quaternions_of(states).copy()
     headings = turns[..., 0, :] * [1.0, 0.0, 1.0, 0.0]
     sizes = np.linalg.norm(headings, axis=-1, keepdims=True)

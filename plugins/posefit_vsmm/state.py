@@ -34,12 +34,6 @@ _PRODUCTS = np.array([_W, _X, _Y, _Z, _X, -_W, _Z, -_Y, _Y, -_Z, -_W, _X, _Z, _Y
 _NUMBERS, _VECTORS = np.arange(3, STATE).reshape(TURNS, 4, 1), np.arange(3, ERROR).reshape(TURNS, 1, 3)
 
 
-def bone_errors(bone: str) -> slice:
-    """Return where in an error (33,) the rotation vector of a bone is."""
-    first = FIRST_BONE + 3 * BONES.index(bone)
-    return slice(first, first + 3)
-
-
 def free_errors(skeleton: Skeleton) -> Array:
     """Return 1 for each error (33,) that a skeleton's joints allow, and 0 for the others: a knee is a hinge."""
     return np.concatenate([np.ones(FIRST_BONE), skeleton.free[HELD_ANGLES].astype(np.float64)])
@@ -100,10 +94,7 @@ def minus(first: Array, second: Array) -> Array:
 
 
 def differentiate(function: Callable[[Array], Array], states: Array) -> tuple[Array, Array]:
-    """Return a function of states (r, 43), and its derivatives (r, ..., 33) by their errors: central differences.
-
-    The function is one of states (r, n, 43).
-    """
+    """Return a function, of (r, n, 43), of states (r, 43), and its derivatives (r, ..., 33) by errors."""
     errors = DIFFERENCE * np.concatenate([np.zeros((1, ERROR)), np.eye(ERROR), -np.eye(ERROR)])
     values = function(plus(states[:, None], errors))
     derivatives = (values[:, 1 : 1 + ERROR] - values[:, 1 + ERROR :]) / (2.0 * DIFFERENCE)
@@ -120,10 +111,8 @@ def tangents(states: Array) -> Array:
 
 
 def inverse_tangents(states: Array) -> Array:
-    """Return how the errors of states (r, 43) change with their numbers: (r, 33, 43).
-
-    The columns of a quaternion's tangents are orthogonal and of length 1/2.
-    """
+    """Return how the errors of states (r, 43) change with their numbers: (r, 33, 43)."""
+    # the columns of a quaternion's tangents are orthogonal and of length 1/2
     return np.asarray(tangents(states).swapaxes(1, 2) * np.repeat([1.0, 4.0], [3, STATE - 3]))
 
 

@@ -13,18 +13,19 @@ from posefit.fitting.check import choices, positive
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
-from posefit_vsmm.groups import Topology, most_probable, read_topology
+from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
 from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
-from posefit_vsmm.motion import CLIP_FPS, STIFF, Library, library
+from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.state import (
     AT,
+    BONES,
     ERROR,
+    FIRST_BONE,
     TURNS,
     DependentJoints,
-    bone_errors,
     decode,
     encode,
     free_errors,
@@ -71,11 +72,11 @@ class TrackFilter:
     """One track, as far as it has come; with a `search`, every frame ends in one."""
 
     def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
-        task, library = tracker.task, tracker.library()
-        self._task, self._search, self._rng, self._patent = task, tracker.search, rng, tracker.patent
+        task, library = tracker.task, tracker.library
+        self._task, self._search, self._rng, self._patent = task, tracker.search, rng, tracker.variant == "patent"
         fps = CLIP_FPS if self._patent else task.fps  # Interpretation V6
         models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
-        self.switching = Switching(models, tracker.topology(), patent=self._patent, structure=tracker.structure)
+        self.switching = Switching(models, tracker.topology, patent=self._patent, structure=tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
         self._cameras = JointCameras(task.body, task.cameras, self._dependent, self._patent, tracker.joint_noise)
         self._recovers = not self._patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
@@ -190,7 +191,7 @@ class TrackFilter:
             self._missing[limb] = frames + 1 if unassigned and not detected else 0
             side, end = limb.split()
             for bone in _LIMBS[end] if self._missing[limb] >= MISSING_FRAMES else ():
-                extra[bone_errors(side[0] + bone)] = MISSING_DEVIATION**2
+                extra[FIRST_BONE:].reshape(-1, 3)[BONES.index(side[0] + bone)] = MISSING_DEVIATION**2
         return np.asarray(extra * np.maximum(self._free, STIFF) ** 2)
 
     def _frame(
@@ -217,12 +218,12 @@ class TrackFilter:
         return self._latest
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
     `vsmm:patent` sets every interpretation to the patent's letter; the default differs from it where tracks are
-    better. Every other setting counts in both. With a `search`, every frame ends in one.
+    better. The other settings count in both. With a `search`, every frame ends in one.
 
     Settings:
         variant: "default", or the "patent"'s letter. Interpretations V4 to V6, V8, V9, V11, V14 and V15.
@@ -231,8 +232,8 @@ class VSMM:
         models: path of a file of models, with another lambda; "" is the package's own. Step 3, Interpretation V5.
         process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
         joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
-        recovery: whether a lost pose is estimated again and a lost limb sought all around; none is no in the patent,
-            else yes. Interpretation V14.
+        recovery: whether a lost pose is estimated again and a lost limb sought all around; by default yes, and no in
+            the patent. Interpretation V14.
     """
 
     task: Task
@@ -250,20 +251,8 @@ class VSMM:
         choices(VSMM, vars(self))
         positive("process_noise", self.process_noise)
         positive("joint_noise", self.joint_noise)
-        self.topology()
-
-    @property
-    def patent(self) -> bool:
-        """Whether interpretations are the patent's letter."""
-        return self.variant == "patent"
-
-    def library(self) -> Library:
-        """Return the motion models."""
-        return library(self.models, self.patent)
-
-    def topology(self) -> Topology:
-        """Return the groups of models."""
-        return read_topology(self.groups, self.library().models.names)
+        self.library = library(self.models, self.variant == "patent")
+        self.topology = read_topology(self.groups, self.library.models.names)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; its `details` hold models, probabilities, group and joints."""

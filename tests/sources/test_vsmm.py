@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from posefit.arrays import Array
-from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, start, update
+from posefit_vsmm.imm import IMM, Belief, Manifold, Measurement, start
 from tests.cases import each
 
 STEP, SIGMA = 1.0, 20.0  # seconds between measurements, metres of noise in each
@@ -126,20 +126,24 @@ def test_a_model_predicts_by_its_own_motion() -> None:  # VSMM 6.3a
     np.testing.assert_allclose(after.probabilities, 0.5)  # nothing was measured
 
 
-FOUR = Measurement(np.array([[4.0]]), np.ones((1, 1, 1)), np.eye(1))
+ALONE = imm_of([Linear(np.eye(1), np.eye(1))], np.eye(1))
+
+
+def measured_four() -> Belief:
+    """Return the belief of one number, 0 with a variance of 3, after 4 was measured with a variance of 1."""
+    belief = start(np.zeros(1), 3.0 * np.eye(1), 1)
+    return ALONE.updated(belief, lambda _: Measurement(np.array([[4.0]]), np.ones((1, 1, 1)), np.eye(1)))
 
 
 def test_the_innovation_has_the_noise_of_state_and_measurement() -> None:  # VSMM 6.3b
     # by hand: variance 3 of the state and 1 of the measurement: a gain of 3/4, and 3/4 left
-    state, left, _ = update(np.zeros((1, 1)), np.full((1, 1, 1), 3.0), FOUR, Manifold())
-    np.testing.assert_allclose(state, 3.0)
-    np.testing.assert_allclose(left, 0.75)
+    np.testing.assert_allclose(measured_four().states, 3.0)
+    np.testing.assert_allclose(measured_four().covariances, 0.75)
 
 
 def test_the_likelihood_is_the_gaussian_of_the_residual() -> None:  # VSMM 6.3c
     # S = 4, residual 4: -1/2 (16 / 4 + ln 4 + ln 2 pi)
-    likelihoods = update(np.zeros((1, 1)), np.full((1, 1, 1), 3.0), FOUR, Manifold())[2]
-    assert likelihoods[0] == pytest.approx(-0.5 * (4.0 + np.log(4.0) + np.log(2.0 * np.pi)))
+    assert measured_four().log_likelihoods[0] == pytest.approx(-0.5 * (4.0 + np.log(4.0) + np.log(2.0 * np.pi)))
 
 
 def test_the_gain_is_that_of_least_variance() -> None:  # VSMM 6.3d
@@ -147,7 +151,7 @@ def test_the_gain_is_that_of_least_variance() -> None:  # VSMM 6.3d
     root, jacobian = rng.normal(size=(4, 4)), rng.normal(size=(2, 4))
     covariance, noise = root @ root.T, np.diag([0.5, 2.0])
     measurement = Measurement(np.zeros((1, 2)), jacobian[None], noise)
-    left = update(np.zeros((1, 4)), covariance[None], measurement, Manifold())[1][0]
+    left = ALONE.updated(start(np.zeros(4), covariance, 1), lambda _: measurement).covariances[0]
     information = np.linalg.inv(covariance) + jacobian.T @ np.linalg.inv(noise) @ jacobian
     np.testing.assert_allclose(left, np.linalg.inv(information), rtol=1e-9, atol=1e-12)
 
