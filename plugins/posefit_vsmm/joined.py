@@ -18,23 +18,15 @@ from posefit.geometry.rotation import wrapped
 from posefit.registry import registry
 from posefit_vsmm.imm import Measure, Measurement
 from posefit_vsmm.motion import library
-from posefit_vsmm.state import (
-    ERROR,
-    FIRST_BONE,
-    YAW_PITCH_ROLL,
-    DependentJoints,
-    decode,
-    encode,
-    free_errors,
-    minus,
-    plus,
-)
+from posefit_vsmm.state import ERROR, FIRST_BONE, DependentJoints, decode, encode, free_errors, minus, plus
 from posefit_vsmm.tracker import VSMM, aligned_costs
 
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 MIN_BUDGET = 80  # evaluations; with fewer, the filter's own pose is as good
 REACH = 3.5  # deviations to either side
 ADDED_DEVIATIONS = np.repeat([0.02, np.radians(4.0)], [3, ERROR - 3])  # metres and radians, to the filter's
+# Where in an error the whole body's yaw, pitch and roll are: small turns about its y, x and z
+YAW_PITCH_ROLL = [4, 3, 5]
 MIN_ROOT_DEVIATIONS = np.radians([6.0, 4.0, 4.0])  # of yaw, pitch and roll
 # How far what a search finds is off, as one silhouette lets it be: metres across, up and along the depth, then radians
 # of the whole body and of the bones
@@ -95,7 +87,7 @@ class Search:
         poses, places = decode(state[None], self.dependent)
         around = spread + np.diag((ADDED_DEVIATIONS * free_errors(self.task.body.skeleton)) ** 2)
         prior = Directions.of(state, around, self.dependent, self.dimensions)
-        root = np.maximum(np.sqrt(np.diag(around)[[*YAW_PITCH_ROLL]]), MIN_ROOT_DEVIATIONS)
+        root = np.maximum(np.sqrt(np.diag(around)[YAW_PITCH_ROLL]), MIN_ROOT_DEVIATIONS)
         space = SearchSpace(prior, poses[0, :3], REACH * root, places[0], self.task.translation)
         zeros = np.zeros(space.dimensions)
         start = Start(zeros, np.full(space.dimensions, 1.0 / REACH), zeros)

@@ -47,7 +47,7 @@ def detect(
         distance = float(np.linalg.norm(point - expected[AT[name]]) / gates[AT[name]])
         points[AT[name]], confidence[AT[name]] = point, max(0.0, 1.0 - distance * distance)
 
-    points[AT["root"]], confidence[AT["root"]] = lines.centroid, 1.0  # VSMM 2.2
+    points[AT["root"]], confidence[AT["root"]] = lines.pixels.mean(axis=0), 1.0  # VSMM 2.2
     centre = _head(lines, expected[AT["head"]], head, gates[AT["head"]])
     if centre is not None:
         points[AT["head"]], confidence[AT["head"]] = centre

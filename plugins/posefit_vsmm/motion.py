@@ -5,7 +5,6 @@ body's, its origin the root, so that places and directions do not matter. Length
 them; the models that the package carries are fitted to CMU clips by docs/studies/make_models.py.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -95,6 +94,13 @@ class MotionModels:
         way = np.stack([cosine * side + sine * ahead, up, cosine * ahead - sine * side], axis=-1)
         return joined_state(states[..., :3] + way, after)
 
+    def typical_states(self, yaws: Array, place: Array) -> Array:
+        """Return the states (n, 43) of all typical poses at a place (3,), turned by each of some yaws."""
+        headings = np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1) @ np.eye(4)[[0, 2]]
+        turns = np.tile(self.poses.reshape(-1, TURNS, 4), (len(yaws), 1, 1, 1))
+        turns[:, :, 0] = product(headings[:, None], turns[:, :, 0])
+        return joined_state(np.tile(place, (turns.shape[0] * turns.shape[1], 1)), turns.reshape(-1, TURNS, 4))
+
     def captured_nearest(self, name: str, state: Array) -> Array:
         """Return a state (43,) with its place and heading, in the captured pose of a model nearest to it."""
         poses = self.captured[self.names.index(name)].reshape(-1, TURNS, 4)
@@ -138,23 +144,19 @@ def library(path: str = "", literal: bool = False) -> Library:
     Literal ones are shrunk towards zero, as in the patent; else towards the identity. Interpretation V5. Raises
     ValueError naming the file where it holds no such models.
     """
-    if not path:
-        return _library(json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8")), literal)
     try:
-        return _library(parsed_json(read_text(path, SIZE_LIMIT)), literal)
+        text = read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / "models.json").read_text("utf-8")
+        stored = parsed_json(text)
+        models: dict[str, Any] = stored["models"]
+        fits = [model["zero" if literal else "identity"] for model in models.values()]
+        matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
+        poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
+        turns = captured.reshape(*captured.shape[:2], TURNS, 4)
+        captured = (turns / np.linalg.norm(turns, axis=-1, keepdims=True)).reshape(captured.shape)
+        dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
+        reports = {name: model["report"] for name, model in models.items()}
     except (FileNotFoundError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"{path}: expected motion models as make_models.py writes them, got {error!r}") from None
-
-
-def _library(stored: dict[str, Any], literal: bool) -> Library:
-    models = stored["models"]
-    fits = [model["zero" if literal else "identity"] for model in models.values()]
-    matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
-    poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
-    turns = captured.reshape(*captured.shape[:2], TURNS, 4)
-    captured = (turns / np.linalg.norm(turns, axis=-1, keepdims=True)).reshape(captured.shape)
-    dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
-    reports = {name: model["report"] for name, model in models.items()}
     return Library(MotionModels(tuple(models), matrices, offsets, noises, poses, captured), dependent, reports)
 
 

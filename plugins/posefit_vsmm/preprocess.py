@@ -24,11 +24,6 @@ class Lines(NamedTuple):
     skeleton: Array  # (n, 2) the skeleton line
     ends: Array  # (n, 2) its end points
 
-    @property
-    def centroid(self) -> Array:
-        """The mean (2,) of all pixels."""
-        return np.asarray(self.pixels.mean(axis=0))
-
 
 def lines_of(mask: Mask) -> Lines | None:
     """Return the lines of a mask (height, width); None where it is empty."""

@@ -20,9 +20,6 @@ BONES = ("lfemur", "ltibia", "rfemur", "rtibia", "lhumerus", "lradius", "rhumeru
 TURNS = 1 + len(BONES)  # quaternions of a state: the whole body's, and each bone's
 STATE, ERROR = 3 + 4 * TURNS, 3 + 3 * TURNS
 FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and the whole body's rotation vector
-# Where in an error the whole body's yaw, pitch and roll are: small turns about its y, x and z, whereas a rotation
-# vector has them in the order x, y, z.
-YAW_PITCH_ROLL = (4, 3, 5)
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
 HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in INNER if joint not in HELD])
 DIFFERENCE = 1e-4  # metres and radians to either side, from which functions of a state are differentiated

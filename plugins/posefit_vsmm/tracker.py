@@ -19,21 +19,7 @@ from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.state import (
-    AT,
-    BONES,
-    ERROR,
-    FIRST_BONE,
-    TURNS,
-    DependentJoints,
-    decode,
-    encode,
-    free_errors,
-    joined_state,
-    minus,
-    plus,
-    product,
-)
+from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, DependentJoints, decode, encode, free_errors, minus, plus
 from posefit_vsmm.switching import Structure, Switching
 
 if TYPE_CHECKING:
@@ -154,12 +140,7 @@ class TrackFilter:
             known_pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
         budget = task.evaluations - 1 if self._search is None else task.evaluations // 2
         yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
-        headings = np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1) @ np.eye(4)[[0, 2]]
-        poses = self.switching.models.poses.reshape(-1, TURNS, 4)
-        turns = np.tile(poses, (len(yaws), 1, 1, 1))
-        turns[:, :, 0] = product(headings[:, None], turns[:, :, 0])
-        turns = turns.reshape(-1, TURNS, 4)
-        states = joined_state(np.tile(anchor, (len(turns), 1)), turns)
+        states = self.switching.models.typical_states(yaws, anchor)
         count = max(1, min(len(states), int(TYPICAL_SHARE * budget)) - (known_pose is not None))
         states = states[np.linspace(0, len(states) - 1, count).astype(np.int64)]
         if known_pose is not None:
