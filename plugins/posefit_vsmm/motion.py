@@ -26,6 +26,7 @@ from posefit_vsmm.state import (
     free_errors,
     inverse_tangents,
     joined_state,
+    lengths,
     product,
     quaternions_of,
     tangents,
@@ -86,7 +87,7 @@ class MotionModels:
         inputs = (signs * before).reshape(*states.shape[:-1], -1)
         change = self.share * (inputs @ self.matrices.swapaxes(1, 2) + self.offsets[:, None])
         after = before + signs * quaternions_of(change)
-        after /= np.linalg.norm(after, axis=-1, keepdims=True)
+        after /= lengths(after)
         after[..., 0, :] = product(headings, after[..., 0, :])
         w, y = headings[..., 0], headings[..., 2]
         sine, cosine = 2.0 * w * y, w * w - y * y
@@ -116,7 +117,7 @@ def without_heading(states: Array) -> tuple[Array, Array]:
     """Return the headings (..., 4), twists about the vertical, of states (..., 43), and their quaternions without."""
     turns = quaternions_of(states).copy()
     headings = turns[..., 0, :] * [1.0, 0.0, 1.0, 0.0]
-    sizes = np.linalg.norm(headings, axis=-1, keepdims=True)
+    sizes = lengths(headings)
     headings = np.where(sizes > 1e-9, headings / np.maximum(sizes, 1e-9), [1.0, 0.0, 0.0, 0.0])
     turns[..., 0, :] = product(headings * [1.0, 1.0, -1.0, 1.0], turns[..., 0, :])
     return headings, turns
@@ -152,7 +153,7 @@ def library(path: str = "", literal: bool = False) -> Library:
         matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
         poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
         turns = captured.reshape(*captured.shape[:2], TURNS, 4)
-        captured = (turns / np.linalg.norm(turns, axis=-1, keepdims=True)).reshape(captured.shape)
+        captured = (turns / lengths(turns)).reshape(captured.shape)
         dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
         reports = {name: model["report"] for name, model in models.items()}
     except (FileNotFoundError, LookupError, TypeError, ValueError) as error:

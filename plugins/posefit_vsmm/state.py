@@ -46,10 +46,15 @@ def quaternions_of(states: Array) -> Array:
     return states[..., 3:].reshape(*states.shape[:-1], TURNS, 4)
 
 
+def lengths(vectors: Array) -> Array:
+    """Return the lengths (..., 1) of vectors (..., n)."""
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None])
+
+
 def unit(states: Array) -> Array:
     """Return states (..., 43) whose quaternions have length 1."""
     turns = quaternions_of(states)
-    return joined_state(states[..., :3], turns / np.linalg.norm(turns, axis=-1, keepdims=True))
+    return joined_state(states[..., :3], turns / lengths(turns))
 
 
 def product(first: Array, second: Array) -> Array:
@@ -71,7 +76,7 @@ def rotation_matrices(turns: Array) -> Array:
 def rotation_vectors(turns: Array) -> Array:
     """Return the rotation vectors (..., 3) of unit quaternions (..., 4), none longer than pi."""
     turns = np.where(turns[..., :1] < 0.0, -turns, turns)
-    sines = np.linalg.norm(turns[..., 1:], axis=-1, keepdims=True)
+    sines = lengths(turns[..., 1:])
     angles = 2.0 * np.arctan2(sines, turns[..., :1])
     return np.asarray(turns[..., 1:] * np.where(sines < 1e-8, 2.0, angles / np.maximum(sines, 1e-8)))
 
@@ -79,7 +84,7 @@ def rotation_vectors(turns: Array) -> Array:
 def plus(states: Array, errors: Array) -> Array:
     """Return states (..., 43) moved by errors (..., 33)."""
     vectors = errors[..., 3:].reshape(*errors.shape[:-1], TURNS, 3)
-    halves = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    halves = 0.5 * lengths(vectors)
     turns = np.concatenate([np.cos(halves), 0.5 * np.sinc(halves / np.pi) * vectors], axis=-1)
     return unit(joined_state(states[..., :3] + errors[..., :3], product(quaternions_of(states), turns)))
 
