@@ -4,7 +4,6 @@ A state is a pose of the exemplars and a yaw. Its total is the cost of the best 
 and jumps.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -167,32 +166,25 @@ def root_deviation_costs(places: Array, expected: Array, eye: Array | None, step
     return np.asarray(np.log1p(0.5 * (across / steps.straying**2 + along / steps.depth**2)))
 
 
-@dataclass(frozen=True, eq=False)
-class Transition:
-    """From one frame to the next: all that a model of transitions may know."""
+def transition_costs(
+    exemplars: Exemplars,
+    before: Beam,
+    beam: Beam,
+    seconds: float,
+    steps: Steps,
+    root: Array | None = None,
+    eye: Array | None = None,
+) -> Array:
+    """Return what each step from a state of one frame to one of the next, `seconds` later, costs (n, m).
 
-    exemplars: Exemplars
-    before: Beam  # n states of a frame
-    beam: Beam  # m states of the next one
-    seconds: float  # between them; negative where a track goes back in time
-    root: Array | None  # (3,) metres: where the root is in the next one, if it is known
-    eye: Array | None  # (3,) metres: where the only camera stands; None where there are several
-
-
-Transitions = Callable[[Transition], Array]
-
-
-def transition_costs(transition: Transition, *, steps: Steps) -> Array:
-    """Return what each step from a state of one frame to one of the next costs (n, m).
-
-    None costs more than a jump, unless it turns faster than possible.
+    None costs more than a jump, unless it turns faster than possible. `root` (3,) is where the root is in the next
+    frame, if it is known, and `eye` (3,) where the only camera stands.
     """
-    exemplars, before, beam, root = transition.exemplars, transition.before, transition.beam, transition.root
-    ahead = Continuations.of(exemplars, before, transition.seconds, steps, root)
+    ahead = Continuations.of(exemplars, before, seconds, steps, root)
     costs = ahead.costs(exemplars.codes[beam.states], steps)  # TOYAMA2001 (dynamics)
     costs += 0.5 * (wrapped(beam.yaws - ahead.yaws[:, None]) / steps.turning) ** 2
     if root is None:
-        costs += root_deviation_costs(beam.places, ahead.places[:, None], transition.eye, steps)
+        costs += root_deviation_costs(beam.places, ahead.places[:, None], eye, steps)
     costs = np.minimum(costs, steps.jump)
     if steps.fastest < np.pi:
         turned = np.abs(wrapped(beam.yaws - before.yaws[:, None]))

@@ -1,14 +1,10 @@
 """The tracker: its settings, the work of each frame, and the path that is reported `lag` frames later."""
 
-import importlib
 import math
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import tee
-from typing import cast
 
 import numpy as np
 
@@ -18,15 +14,11 @@ from posefit.fitting.check import at_least, positive
 from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
-from posefit.tracking.method import Method, prepare
-from posefit.tracking.options import TrackOptions
 from posefit_exemplars import hypotheses
 from posefit_exemplars.beam import (
     TURN,
     Beam,
     Steps,
-    Transition,
-    Transitions,
     diverse_best,
     merged,
     next_states,
@@ -88,10 +80,8 @@ class ExemplarTracker:
         pace: distance of a known root from where its clip goes on, metres; above 0.
         lag: later frames that are used before a pose is reported, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
-        path: whose pose the hypotheses of a frame begin with: "clips", or a method such as "sapso@pca" in their place.
         fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
         samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
         posterior_temperature: divides silhouette costs in that posterior; above 0.
     """
@@ -109,10 +99,8 @@ class ExemplarTracker:
         pace: float = 0.008,
         lag: int = 20,
         mirrored: bool = True,
-        path: str = "clips",
         fitted: bool = True,
         smoothing: float = 1.0,
-        transitions: str = "clips",
         samples: int = 24,
         posterior_temperature: float = 8.0,
     ) -> None:
@@ -132,9 +120,6 @@ class ExemplarTracker:
         self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
         self.seconds = (-1.0 if task.backwards else 1.0) / task.fps  # from a frame to the next one
         self.steps = Steps(spread * slack, turning * slack, jump, straying, depth, pace * intervals, fastest)
-        self.transitions: Transitions = partial(transition_costs, steps=self.steps)
-        if transitions != "clips":
-            self.transitions = partial(_checked, _named(transitions))
         self.temperature = temperature / intervals
         self.smoothing = smoothing * task.fps / 30.0  # frames
         # the number of waiting frames that are only for smoothing
@@ -143,24 +128,16 @@ class ExemplarTracker:
         self.hypotheses: hypotheses.HypothesisFilter | None = None
         self.samples, self.power = samples, temperature / posterior_temperature  # of likelihoods in the posterior
         share = FITTED * task.evaluations
-        self.proposer: Method | None = None
         if fitted and share >= hypotheses.MIN_EVALUATIONS:
             self.evaluations -= share
-            delay = lag - self.ahead
-            if path == "clips":
-                delay //= 2
-            else:
-                self.proposer = prepare(TrackOptions(method=path), self._proposing)
+            delay = (lag - self.ahead) // 2
             self.hypotheses = hypotheses.HypothesisFilter(
                 task, self.exemplars, self.steps, self.temperature, share, delay, samples, self.power
             )
-        elif path != "clips":
-            least = math.ceil(hypotheses.MIN_EVALUATIONS / FITTED)
-            raise InputError(f"path {path} needs hypotheses: fitted, and evaluations of at least {least}")
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        estimates = self._path(observations, rng) if self.proposer is None else self._proposed(observations, rng)
+        estimates = self._path(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
         frames = smoothed(estimates, self.smoothing, self.ahead)
@@ -186,18 +163,6 @@ class ExemplarTracker:
                 yield self._estimated(waiting, sampler)
         while waiting:
             yield self._estimated(waiting, sampler)
-
-    @property
-    def _proposing(self) -> Task:
-        return replace(self.task, evaluations=int(self.evaluations))
-
-    def _proposed(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
-        """Yield the estimate of each frame by another method."""
-        assert self.proposer is not None
-        coming, again = tee(observations)
-        for frame, observation in zip(self.proposer.follow(self._proposing, coming, rng), again, strict=False):
-            effort = frame.evaluations, frame.seconds, frame.cpu_seconds or 0.0
-            yield Estimate(frame.pose, frame.translation, FrameCosts(self.task, observation), *effort)
 
     def _evaluated(
         self, look: FrameCosts, before: FrameStates[Beam] | None, everywhere: bool, rng: np.random.Generator
@@ -246,8 +211,8 @@ class ExemplarTracker:
         """Return a frame, joined to the one before."""
         if before is None:
             return frame_states(beam, fits, None, None)
-        transition = Transition(self.exemplars, before.beam, beam, self.seconds, look.root, look.eye)
-        return frame_states(beam, fits, before, self.transitions(transition))
+        steps = transition_costs(self.exemplars, before.beam, beam, self.seconds, self.steps, look.root, look.eye)
+        return frame_states(beam, fits, before, steps)
 
     def _elsewhere(
         self, look: FrameCosts, before: Beam | None, most: int, rng: np.random.Generator
@@ -324,25 +289,3 @@ def yaw_costs(yaws: Array, known: float | None) -> Array:
     if known is None:
         return np.zeros(len(yaws))
     return np.asarray(AWAY * np.clip(np.abs(wrapped(yaws - known)) / FACING - 1.0, 0.0, 1.0))
-
-
-def _named(name: str) -> Transitions:
-    """Return the function MODULE:FUNCTION. Raises ValueError where there is none."""
-    module, _, function = name.partition(":")
-    try:
-        model = getattr(importlib.import_module(module), function)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(
-            f"transitions must be clips or MODULE:FUNCTION that can be imported, got {name}: {error}"
-        ) from None
-    if not callable(model):
-        raise InputError(f"transitions must name a function, got {name}, which is a {type(model).__name__}")
-    return cast(Transitions, model)
-
-
-def _checked(transitions: Transitions, transition: Transition) -> Array:
-    """Return the costs of a model of transitions. Raises ValueError where they are not one finite number a step."""
-    costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
-    if costs.shape != shape or not np.isfinite(costs).all():
-        raise InputError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
-    return costs

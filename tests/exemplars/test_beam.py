@@ -16,7 +16,6 @@ from posefit_exemplars.beam import (
     TURN,
     Beam,
     Steps,
-    Transition,
     bins_of,
     diverse_best,
     next_states,
@@ -42,8 +41,8 @@ def steps_to(
     exemplars: Exemplars, before: Beam, beam: Beam, root: Array | None = None, fastest: float = np.inf
 ) -> Array:
     """Return the costs (n, m) of steps between two beams, before a camera at x = 3."""
-    transition = Transition(exemplars, before, beam, SECONDS, root, np.array([3.0, 1.0, 0.0]))
-    return transition_costs(transition, steps=replace(STEPS, fastest=fastest))
+    eye = np.array([3.0, 1.0, 0.0])
+    return transition_costs(exemplars, before, beam, SECONDS, replace(STEPS, fastest=fastest), root, eye)
 
 
 def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:

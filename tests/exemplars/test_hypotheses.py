@@ -101,18 +101,3 @@ def test_hypotheses_are_as_many_as_the_budget_allows(walker: Walk) -> None:
     assert many.hypotheses.unlike(4) < many.hypotheses.unlike(1)  # several cameras leave less open
     assert ExemplarTracker(replace(walker.task, evaluations=600)).hypotheses is None  # too few: the path alone
     assert ExemplarTracker(walker.task, fitted=False).hypotheses is None
-
-
-def test_hypotheses_may_begin_with_the_poses_of_another_method(walker: Walk) -> None:
-    tracker = ExemplarTracker(replace(walker.task, evaluations=BUDGET), path="cma@pca")
-    assert tracker.proposer is not None
-    task, costs = replace(walker.task, evaluations=int(tracker.evaluations)), []
-    for seed in range(3):
-        shown = walker.observations[:6]
-        frames = list(tracker.track(shown, np.random.default_rng(seed)))
-        alone = list(tracker.proposer.follow(task, shown, np.random.default_rng(seed)))
-        assert len(frames) == 6
-        assert all(frame.evaluations <= BUDGET for frame in frames)
-        costs.append([np.mean([frame.cost for frame in some]) for some in (frames, alone)])
-    fitted, begun = np.sum(costs, axis=0)
-    assert fitted < 0.9 * begun

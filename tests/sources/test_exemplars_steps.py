@@ -9,7 +9,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
+from posefit_exemplars.beam import Beam, Steps, transition_costs
 from posefit_exemplars.exemplars import Exemplars, groups
 from posefit_exemplars.window import FrameStates, frame_states, state_weights, viterbi_state
 
@@ -114,9 +114,7 @@ def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:  # TOYAMA20
         beams = Beam(
             np.array([state + 1, after]), np.repeat(yaws[1:], 2), np.zeros(2, int), np.zeros(2), np.zeros((2, 3))
         )
-        following, last = transition_costs(
-            Transition(clips, before, beams, seconds, clips.paths[state + 1], None), steps=steps
-        )[0]
+        following, last = transition_costs(clips, before, beams, seconds, steps, clips.paths[state + 1])[0]
         assert following == pytest.approx(0.0, abs=1e-4)
         off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
         assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4  # or less, at another speed
