@@ -1,125 +1,100 @@
-"""Poses to keep of clips, and those that a beam may go on to, in numba: plain functions over arrays."""
+"""Distances between the codes of poses, in numba: plain functions over arrays, shapes checked by the callers.
 
-from typing import Any
+The codes of `LANES` poses lie side by side in a tile, so that loops over lanes run in vector registers. `tiles` are
+`exemplars.Tiles`.
+"""
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, overload
 
-from posefit.arrays import jit
-from posefit.arrays.instructions import in_all_lanes
+from posefit.arrays import inlined, jit
 
 DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
-TILE = 32  # codes side by side: four vector registers of AVX2, whose sums need not wait for each other
+LANES = 32
 
 
-def lower(least: Any, start: Any, code: Any, tile: Any) -> None:
-    """Lower `least` (TILE,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, TILE) from one."""
-    away = np.full(TILE, start, dtype=np.float32)
-    for d in range(DIMENSIONS):
-        away += (tile[d] - code[d]) ** 2
-    least[:] = np.minimum(least, away)
-
-
-@intrinsic
-def _lower(typing_context: Any, least: Any, start: Any, code: Any, tile: Any) -> Any:  # noqa: ARG001
-    return types.void(least, types.float32, code, tile), _build_lower
-
-
-@overload(lower, inline="always")
-def _lower_compiled(least, start, code, tile):  # noqa: ARG001
-    return lambda least, start, code, tile: _lower(least, start, code, tile)  # type: ignore[call-arg]
-
-
-def _build_lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Write `lower` as instructions for a whole tile at once."""
-    vector, index = ir.VectorType(ir.FloatType(), TILE), ir.IntType(64)
-    least, code, tile = (context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 2, 3))
-
-    def lanes(data: Any, at: int) -> Any:
-        return builder.bitcast(builder.gep(data, [index(at)]), vector.as_pointer())
-
-    away = in_all_lanes(builder, arguments[1], TILE)
-    for d in range(DIMENSIONS):
-        middle = in_all_lanes(builder, builder.load(builder.gep(code, [index(d)])), TILE)
-        step = builder.fsub(builder.load(lanes(tile, TILE * d), align=4), middle)
-        away = builder.fadd(away, builder.fmul(step, step, flags=("contract",)), flags=("contract",))
-    before = builder.load(lanes(least, 0), align=4)
-    nearer = builder.select(builder.fcmp_ordered("<", away, before), away, before)
-    builder.store(nearer, lanes(least, 0), align=4)
-    return context.get_dummy_value()
+@inlined
+def lower_distances(distances, start, code, tile):
+    """Lower `distances` (LANES,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, LANES)."""
+    for lane in range(LANES):
+        total = start
+        for d in range(DIMENSIONS):
+            difference = tile[d, lane] - code[d]
+            total += difference * difference
+        distances[lane] = min(distances[lane], total)
 
 
 @jit
-def keep_apart(codes, least, kept):
-    """Return how many frames of a clip are kept, of codes (T, D), and write them to `kept` (T,).
+def frames_apart(codes, min_square):
+    """Return the frames of a clip with codes (T, D) that are the first, the last, or far from the one before them.
 
-    They are the first, the last, and each whose squared distance from the one kept before it is above `least`.
+    That is where the squared distance from the latest returned frame is above `min_square`.
     """
-    kept[0] = 0
+    frames = np.zeros(len(codes), np.int64)
     count, last = 1, len(codes) - 1
     for k in range(1, len(codes)):
-        away = np.float32(0.0)
+        square = np.float32(0.0)
         for d in range(codes.shape[1]):
-            step = codes[k, d] - codes[kept[count - 1], d]
-            away += step * step
-        if k == last or away > least:
-            kept[count] = k
+            difference = codes[k, d] - codes[frames[count - 1], d]
+            square += difference * difference
+        if k == last or square > min_square:
+            frames[count] = k
             count += 1
-    return count
+    return frames[:count]
 
 
 @jit
-def nearest_codes(some, near, tiles, bounds, squares, places):
-    """Write which `places` (n, count) of tiles are nearest to `some` codes (n, D), and their squared distances.
+def nearest_codes(codes, groups, tiles, count):
+    """Return the states nearest to codes (n, D), and their squared distances, (n, count) both, the nearest first.
 
-    Looked at are the groups `near` (n, g) each; see `cheapest_steps`. The nearest comes first; where there are fewer
-    than `count`, squared distances are infinite.
+    Only states in `groups` (n, g) are compared. Where these have fewer than `count`, squared distances are infinite.
     """
-    away = np.empty(TILE, dtype=np.float32)
-    squares[:], places[:] = np.inf, 0
-    for i in range(len(some)):
-        for g in near[i]:
-            for t in range(bounds[g], bounds[g + 1]):
-                away[:] = np.inf
-                lower(away, np.float32(0.0), some[i], tiles[t])
-                for k in range(TILE):
-                    at = squares.shape[1] - 1
-                    if away[k] < squares[i, at]:
-                        while at > 0 and away[k] < squares[i, at - 1]:
-                            squares[i, at], places[i, at] = squares[i, at - 1], places[i, at - 1]
-                            at -= 1
-                        squares[i, at], places[i, at] = away[k], TILE * t + k
+    squares = np.full((len(codes), count), np.inf, np.float32)
+    states = np.zeros((len(codes), count), np.int64)
+    distances = np.empty(LANES, np.float32)
+    for i in range(len(codes)):
+        for group in groups[i]:
+            for t in range(tiles.starts[group], tiles.starts[group + 1]):
+                distances[:] = np.inf
+                lower_distances(distances, np.float32(0.0), codes[i], tiles.codes[t])
+                for lane in range(LANES):
+                    rank = count - 1
+                    if distances[lane] < squares[i, rank]:
+                        while rank > 0 and distances[lane] < squares[i, rank - 1]:
+                            squares[i, rank], states[i, rank] = squares[i, rank - 1], states[i, rank - 1]
+                            rank -= 1
+                        squares[i, rank], states[i, rank] = distances[lane], tiles.states[LANES * t + lane]
+    return states, squares
 
 
 @jit
-def cheapest_steps(ahead, ways, totals, rows, near, tiles, bounds, scale, limit, least, owners, touched):
-    """Return how many poses some states of a beam go on to, each by its cheapest step.
+def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit):
+    """Return the states that some `rows` of a beam continue to, the row of each one's cheapest step, and its total.
 
-    `ahead` (speeds, n, D) is where clips go on, `ways` (speeds, n) what the root's way costs there; `rows` are the
-    states of the beam, `near` (n, g) the groups that each looks at; `tiles` (T, D, TILE) are the codes of all poses,
-    group by group from the tiles `bounds` (G + 1,) on. A step costs the squared distance of codes by `scale`. `least`
-    (T TILE,) has to hold infinity; it gets the totals below `limit`, `owners` whose they are, and `touched` which
-    places of tiles they are.
+    The clips of the beam's states continue at `codes` (speeds, n, D), each of which costs `start_costs` (speeds, n).
+    A step to a state costs its squared distance times `scale`, at the cheapest speed. Row i continues to the states in
+    `groups` (n, g), where its total (n,) with the step is below `limit`.
     """
+    best = np.full(len(tiles.states), np.inf)
+    parents, reached = np.empty(len(best), np.int64), np.empty(len(best), np.int64)
+    distances = np.empty(LANES, np.float32)
     count = 0
-    nearest = np.empty(TILE, dtype=np.float32)
-    for r in rows:
-        if totals[r] >= limit:
+    for row in rows:
+        if totals[row] >= limit:
             continue
-        enough = np.float32((limit - totals[r]) / scale)
-        for g in near[r]:
-            for t in range(bounds[g], bounds[g + 1]):
-                nearest[:] = enough
-                for s in range(len(ahead)):
-                    lower(nearest, np.float32(ways[s, r] / scale), ahead[s, r], tiles[t])
-                for k in range(TILE):
-                    if nearest[k] < enough:
-                        total, place = totals[r] + scale * nearest[k], TILE * t + k
-                        if total < least[place]:
-                            if least[place] == np.inf:
-                                touched[count] = place
+        farthest = np.float32((limit - totals[row]) / scale)
+        for group in groups[row]:
+            for t in range(tiles.starts[group], tiles.starts[group + 1]):
+                distances[:] = farthest
+                for speed in range(len(codes)):
+                    start = np.float32(start_costs[speed, row] / scale)
+                    lower_distances(distances, start, codes[speed, row], tiles.codes[t])
+                for lane in range(LANES):
+                    if distances[lane] < farthest:
+                        total, place = totals[row] + scale * distances[lane], LANES * t + lane
+                        if total < best[place]:
+                            if best[place] == np.inf:
+                                reached[count] = place
                                 count += 1
-                            least[place], owners[place] = total, r
-    return count
+                            best[place], parents[place] = total, row
+    reached = reached[:count]
+    return tiles.states[reached], parents[reached], best[reached]

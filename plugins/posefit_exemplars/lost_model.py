@@ -15,11 +15,10 @@ import json
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from importlib.resources import files
-from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -32,12 +31,10 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, second_side
 from posefit_exemplars.frame_costs import FrameCosts
 
-FILE = "calibration.json"
-ARRAYS = ("slopes", "joint_spreads", "angle_spreads", "joint_factors", "angle_factors", "none")  # of a `Calibration`
 MIN_COST = 0.1  # per cent
 MIN_SPREAD = 0.002  # metres
 MAX_LOG_ODDS = 30.0  # logarithm
-LANDMARK_SECONDS = 0.5  # that the mean of what landmarks tell of sides reaches back
+LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
 MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known
 
 
@@ -58,18 +55,18 @@ def probability_of(odds: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """The corrections with which a frame's intervals and weights of modes hold as often as they claim."""
 
     slopes: Array  # (4,) of the logarithm of the expected error, over `evidence`
     range: tuple[float, float]  # of that logarithm in the training data
-    joint_spreads: Array = field(repr=False)  # (27,) standard deviations of each axis, in expected errors
-    angle_spreads: Array = field(repr=False)  # (66,) radians, for an expected error of a metre
-    joint_factors: Array = field(repr=False)  # (levels, 27)
-    angle_factors: Array = field(repr=False)  # (levels, 66)
+    joint_spreads: Array  # (27,) standard deviations of each axis, in expected errors
+    angle_spreads: Array  # (66,) radians, for an expected error of a metre
+    joint_factors: Array  # (levels, 27)
+    angle_factors: Array  # (levels, 66)
     sharpness: float  # the power of modes' weights
-    none: Array = field(repr=False)  # (3,) of the log-odds that no mode is right, over `none_features`
+    none: Array  # (3,) of the log-odds that no mode is right, over `none_features`
 
     def log(self, evidence: Array) -> float:
         """Return the logarithm of the expected error, from `evidence` (4,)."""
@@ -78,44 +75,44 @@ class Calibration:
     def recalibration(self, log: float) -> Recalibration:
         """Return the recalibration of a frame, from the logarithm of its expected error."""
         spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
-        factors = self.joint_factors, self.angle_factors
         none = probability_of(float(self.none @ none_features(log)))
-        return Recalibration(*spreads, *factors, sharpness=self.sharpness, none=none)
+        return Recalibration(*spreads, self.joint_factors, self.angle_factors, sharpness=self.sharpness, none=none)
+
+
+def _stored(name: str) -> dict[str, Any]:
+    return dict(json.loads(files("posefit_exemplars").joinpath(name).read_text("utf-8")))
 
 
 @cache
 def stored_calibration() -> Calibration:
     """Return the calibration that was fitted on the library's own people by `docs/studies/posterior.py`."""
-    stored = json.loads(files("posefit_exemplars").joinpath(FILE).read_text("utf-8"))
-    low, high = stored["range"]
-    arrays = {name: np.array(stored[name]) for name in ARRAYS}
-    return Calibration(range=(low, high), sharpness=stored["sharpness"], **arrays)
+    stored = _stored("calibration.json")
+    (low, high), sharpness = stored.pop("range"), stored.pop("sharpness")
+    arrays = {name: np.array(values) for name, values in stored.items() if name != "temperature"}
+    return Calibration(range=(low, high), sharpness=sharpness, **arrays)
 
 
-def recalibrated(posterior: Posterior, pose: Array, cost: float, look: FrameCosts) -> Posterior:
-    """Return the posterior around a reported pose (66,) and its cost, recalibrated.
-
-    Where nothing is visible, the cost means nothing, and the expected error is the greatest of the training data.
-    """
+def recalibrated(posterior: Posterior, pose: Array, cost: float, frame_costs: FrameCosts) -> Posterior:
+    """Return the posterior around a reported pose (66,) and its cost, recalibrated; the cost of nothing is infinite."""
     calibration = stored_calibration()
-    values = evidence(look.skeleton, posterior, pose, cost if look.usable else math.inf, look.cameras)
+    cost = cost if frame_costs.usable else math.inf
+    values = evidence(frame_costs.skeleton, posterior, pose, cost, frame_costs.camera_count)
     return replace(posterior, recalibration=calibration.recalibration(calibration.log(values)))
 
 
-FITTED = Path(__file__).with_name("lost_model.json")  # made by `docs/studies/lost.py --store`
-REACHES = {"lately": 0.2, "in general": 1.0}  # seconds that the means reach back
+MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back
 
 
-def _log_above(floor: float) -> Callable[[float], float]:
-    return lambda value: math.log(max(value, 0.0) + floor)
+def _log_above(floor: float, value: float) -> float:
+    return math.log(max(value, 0.0) + floor)
 
 
 # The evidence of a frame, each with the scale on which it enters the models.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
-    "cost": _log_above(1.0),  # of the reported pose, where the person is visible
+    "cost": partial(_log_above, 1.0),  # of the reported pose, where the person is visible
     "reflected": math.log,  # the least cost of poses reflected along a line of sight, over the cost
     "mirrored": math.log,  # the cost of the mirror image, over the cost
-    "farthest": _log_above(0.01),  # metres between the reported pose and the farthest sampled track
+    "farthest": partial(_log_above, 0.01),  # metres between the reported pose and the farthest sampled track
     "second": float,  # weight of the tracks that have left and right exchanged
     "ahead": float,  # metres a second by which the root goes where it faces
     "speed": float,  # metres a second by which it goes anywhere
@@ -124,16 +121,16 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
 }
 DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}  # before the first value; of other evidence 0
 MAX_VIEWS = 4  # nothing was fitted with more cameras
-TWIN_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
+MIRROR_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
 MOTION_SECONDS = 0.5  # over which the root's motion is measured
 MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
-NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in REACHES for name in EVIDENCE))  # of features
+NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in MEAN_SECONDS for name in EVIDENCE))  # of features
 
 
 def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> dict[str, float]:
     """Return the values of `EVIDENCE` that a frame with a posterior has by itself.
 
-    Its `details` hold whether it is `usable` and the costs of its `twins`; see `FrameCosts.twins`.
+    Its `details` hold whether it is `usable`, and its `FrameCosts.mirror_costs`.
     """
     assert frame.posterior is not None
     distances = joint_distances(skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose))
@@ -145,7 +142,7 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
         "views": float(min(len(visible), MAX_VIEWS)),
     }
     if frame.details["usable"]:
-        mirrored, *reflected = (frame.details["twins"] + TWIN_COST_OFFSET) / (frame.cost + TWIN_COST_OFFSET)
+        mirrored, *reflected = (frame.details["mirror_costs"] + MIRROR_COST_OFFSET) / (frame.cost + MIRROR_COST_OFFSET)
         values |= {"cost": frame.cost, "reflected": float(min(reflected)), "mirrored": float(mirrored)}
     return values
 
@@ -174,9 +171,9 @@ class EvidenceMeans:
     """The evidence of the frames so far, and its exponentially weighted means."""
 
     def __init__(self, fps: float) -> None:
-        self._keep = np.exp([[-1.0 / (seconds * fps)] for seconds in REACHES.values()])
+        self._decays = np.exp([[-1.0 / (seconds * fps)] for seconds in MEAN_SECONDS.values()])
         self._latest: dict[str, float] = {}
-        self._sums, self._weight = np.zeros((len(REACHES), len(EVIDENCE))), np.zeros((len(REACHES), 1))
+        self._sums, self._weight = np.zeros((len(MEAN_SECONDS), len(EVIDENCE))), np.zeros((len(MEAN_SECONDS), 1))
 
     def features(self, values: Mapping[str, float]) -> Array:
         """Return the evidence of the next frame and its means so far (3 E,), on the scale that was fitted.
@@ -186,16 +183,15 @@ class EvidenceMeans:
         """
         self._latest |= values
         now = np.array([scale(self._latest.get(name, DEFAULTS.get(name, 0.0))) for name, scale in EVIDENCE.items()])
-        self._sums, self._weight = self._sums * self._keep + now, self._weight * self._keep + 1.0
+        self._sums, self._weight = self._sums * self._decays + now, self._weight * self._decays + 1.0
         return np.concatenate([now, (self._sums / self._weight).ravel()])
 
 
-@dataclass(frozen=True, eq=False)
-class LogisticModel:
+class LogisticModel(NamedTuple):
     """A logistic model of some features of a frame."""
 
     rows: list[int]  # of the features that it uses
-    weights: Array = field(repr=False)
+    weights: Array
     bias: float
 
     def probability(self, features: Array) -> float:
@@ -209,13 +205,12 @@ class LogisticModel:
         return cls(rows, np.array(list(stored["weights"].values()), dtype=np.float64), float(stored["bias"]))
 
 
-@dataclass(frozen=True, eq=False)
-class FailureClassifier:
+class FailureClassifier(NamedTuple):
     """The models of lost frames and of exchanged sides, and the probability from which sides are unknown."""
 
     lost: LogisticModel
     sides: LogisticModel
-    unknown: float  # the probability of exchanged sides from which they are
+    unknown: float
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
@@ -226,8 +221,8 @@ class FailureClassifier:
 
 @cache
 def stored_classifier() -> FailureClassifier:
-    """Return the models that were fitted to people who are not in the library."""
-    return FailureClassifier.from_dict(json.loads(FITTED.read_text(encoding="utf-8")))
+    """Return the models that `docs/studies/lost.py` fitted to people who are not in the library."""
+    return FailureClassifier.from_dict(_stored("lost_model.json"))
 
 
 def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
@@ -236,7 +231,7 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
     Their `details` hold the evidence and the probability of exchanged sides. Frames without sampled tracks stay as
     they are.
     """
-    memory, sides, keep = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
+    means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         if frame.posterior is None:
@@ -245,15 +240,14 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         places.append(frame.translation)
         evidence = evidence_of(task.body.skeleton, frame, task.cameras)
         evidence |= root_motion(places, float(frame.pose[0]), task.fps, backwards=task.backwards)
-        features = memory.features(evidence)
+        features = means.features(evidence)
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
         known = exchanged < classifier.unknown
         if (odds := frame.details.get("sides")) is not None:  # landmarks know better
-            sides = keep * sides + [odds, 1.0]
-            known = bool(sides[0] >= MIN_SIDE_ODDS * sides[1])
-        second_side = float(known)
-        recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=second_side)
+            side_sums = decay * side_sums + [odds, 1.0]
+            known = bool(side_sums[0] >= MIN_SIDE_ODDS * side_sums[1])
+        recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))
         yield replace(
             frame,
             lost=classifier.lost.probability(features),

@@ -16,7 +16,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.testing import run_checks, tracker_checks
-from posefit_exemplars.tracker import AWAY, MIN_EVALUATIONS, ExemplarTracker, yaw_costs
+from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
@@ -87,7 +87,7 @@ def test_an_interrupted_track_is_continued(walker: Walk, seed: int) -> None:
     [
         ("spread=0", "spread must be above 0, got 0"),
         ("temperature=nan", "temperature must be above 0, got nan"),
-        ("jump=-1", "jump must be at least 0, got -1"),
+        ("lag=-1", "lag must be at least 0, got -1"),
     ],
 )
 def test_a_wrong_setting_is_refused_in_one_line(setting: str, message: str) -> None:
@@ -100,7 +100,7 @@ def test_a_wrong_setting_is_refused_in_one_line(setting: str, message: str) -> N
 
 def test_a_yaw_away_from_the_known_one_costs_more() -> None:
     yaws = np.radians([10.0, 55.0, 77.5, 100.0, -170.0, 370.0])
-    expected = AWAY * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
+    expected = WRONG_YAW_COST * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
     np.testing.assert_allclose(yaw_costs(yaws, np.radians(10.0)), expected, atol=1e-12)
     np.testing.assert_array_equal(yaw_costs(yaws, None), np.zeros(6))
 
