@@ -6,14 +6,15 @@ a similar clip, turn, or jump, and the likeliest path through the frames is foll
 Probabilistic tracking in a metric space, 2001. From there every joint gives way, until contours are those of the masks:
 several hypotheses of each frame are fitted, and the likeliest sequence of them is reported some frames later.
 
-- `exemplars` has the poses, what came after each, and codes to compare them; `kernels` has its loops.
+- `exemplars` has the poses, what came after each, and codes to compare them.
 - `beam` has the states that a frame may be in, and the costs of steps between them.
 - `frame_costs` has the costs of poses in a frame.
 - `markov` has the likeliest path through the last frames, the weights of states, and sampled paths.
-- `contours` fits poses to the contours of a frame; `contour_kernels` has its loops.
+- `contours` fits poses to the contours of a frame.
 - `hypotheses` has those of each frame, and the likeliest sequence.
 - `smoothing` filters the estimates over time.
 - `lost_model` makes the posterior's intervals hold, and gives the probability that a frame is lost.
+- `kernels` has the compiled loops.
 - `tracker` has the settings, and processes one frame after the other.
 
 >>> import posefit

@@ -6,7 +6,7 @@ and jumps.
 
 import math
 from dataclasses import dataclass, field
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -92,8 +92,7 @@ def yaw_bins(yaws: Array) -> Rows:
     return np.round(yaws * (YAW_BINS / (2.0 * np.pi))).astype(np.int64) % YAW_BINS
 
 
-@dataclass(frozen=True, eq=False)
-class Continuations:
+class Continuations(NamedTuple):
     """Where the clips of a beam's states continue, at each of the speeds."""
 
     codes: Codes  # (speeds, n, D)
@@ -104,22 +103,15 @@ class Continuations:
     @classmethod
     def of(cls, exemplars: Exemplars, beam: Beam, seconds: float, scales: StepScales, root: Array | None) -> Self:
         """Return where clips are `seconds` later, and the costs of their distances from a known `root` (3,)."""
-        continued = [exemplars.continuation(beam.states, seconds * speed) for speed in CLIP_SPEEDS]
-        places = [beam.places + about_vertical(displacements, beam.yaws) for _, _, displacements in continued]
+        codes, turns, displacements = zip(
+            *(exemplars.continuation(beam.states, seconds * speed) for speed in CLIP_SPEEDS), strict=True
+        )
+        places = [beam.places + about_vertical(displacement, beam.yaws) for displacement in displacements]
         costs = np.zeros((len(CLIP_SPEEDS), len(beam)))
         if root is not None:
             squares = ((np.array(places) - root) ** 2).sum(axis=2) / (2.0 * scales.known_root**2)
             costs = np.minimum(np.log1p(squares), JUMP_COST)  # or nothing might be within reach
-        yaws = beam.yaws + continued[RECORDED_SPEED][1]
-        return cls(np.stack([codes for codes, _, _ in continued]), costs, yaws, places[RECORDED_SPEED])
-
-    def step_costs(self, codes: Codes, scales: StepScales) -> Array:
-        """Return the costs (n, m) of steps to poses of these codes (m, D), at the best speed."""
-        double = 2.0 * scales.pose**2
-        speeds = zip(self.codes, self.displacement_costs, strict=True)
-        return np.asarray(
-            np.minimum.reduce([squared_distances(code, codes) / double + cost[:, None] for code, cost in speeds])
-        )
+        return cls(np.stack(codes), costs, beam.yaws + turns[RECORDED_SPEED], places[RECORDED_SPEED])
 
 
 def next_states(
@@ -188,8 +180,11 @@ def transition_costs(
     frame, if it is known, and `camera` (3,) the position of the only camera.
     """
     continued = Continuations.of(exemplars, before, seconds, scales, root)
-    costs = continued.step_costs(exemplars.codes[after.states], scales)  # TOYAMA2001 (dynamics)
-    costs += 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / scales.turn) ** 2
+    codes, double = exemplars.codes[after.states], 2.0 * scales.pose**2
+    speeds = zip(continued.codes, continued.displacement_costs, strict=True)
+    squares = [squared_distances(code, codes) / double + cost[:, None] for code, cost in speeds]
+    costs: Array = np.minimum.reduce(squares)  # TOYAMA2001 (dynamics)
+    costs = costs + 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / scales.turn) ** 2
     if root is None:
         costs += root_deviation_costs(after.places, continued.places[:, None], camera)
     costs = np.minimum(costs, JUMP_COST)

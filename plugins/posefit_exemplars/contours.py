@@ -12,7 +12,7 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES
 from posefit.tracking.smoothing.contours import Distances, MaskContours
-from posefit_exemplars.contour_kernels import RIGID, Pull, step_poses
+from posefit_exemplars.kernels import RIGID, Pull, step_poses
 
 POINT_SPACING = 0.04  # metres, about, between two points of a mask's border
 STEP_EVALUATIONS = 27.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures

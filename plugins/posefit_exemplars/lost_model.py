@@ -8,7 +8,6 @@ The probabilities are those of two logistic models of the same evidence: what th
 mirrored and reflected poses, the spread of the sampled tracks, how many of them have the other side, whether the person
 moves where they face, the angle of view and the number of cameras. Each value stands beside its means over a moment and
 over a second: a lost track stays lost for a while, and masks that never fit mean less than one that fits worse now.
-`docs/studies/lost.py` fits the models.
 """
 
 import json
@@ -128,10 +127,7 @@ NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in MEAN_SECONDS for name in E
 
 
 def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> dict[str, float]:
-    """Return the values of `EVIDENCE` that a frame with a posterior has by itself.
-
-    Its `details` hold whether it is `usable`, and its `FrameCosts.mirror_costs`.
-    """
+    """Return the values of `EVIDENCE` that a frame with a posterior has by itself."""
     assert frame.posterior is not None
     distances = joint_distances(skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose))
     visible = [camera for camera, counts in zip(cameras, frame.areas, strict=True) if counts.any()] or cameras
@@ -160,10 +156,7 @@ def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: b
 
 
 def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
-    """Return how far a person at a place (3,) faces across the only camera's line of sight: 1 in a side view.
-
-    0 with several cameras, as one of them shows what another does not.
-    """
+    """Return how far a person at a place (3,) faces across the only camera's line of sight: 1 in a side view."""
     return abs(math.sin(yaw - facing(cameras[0], place))) if len(cameras) == 1 else 0.0
 
 
@@ -226,11 +219,7 @@ def stored_classifier() -> FailureClassifier:
 
 
 def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
-    """Yield frames with the probability that each is lost, and whether its left and right are unknown.
-
-    Their `details` hold the evidence and the probability of exchanged sides. Frames without sampled tracks stay as
-    they are.
-    """
+    """Yield frames that have sampled tracks with the probabilities that they are lost, or have sides exchanged."""
     means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
@@ -248,9 +237,6 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
             side_sums = decay * side_sums + [odds, 1.0]
             known = bool(side_sums[0] >= MIN_SIDE_ODDS * side_sums[1])
         recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))
-        yield replace(
-            frame,
-            lost=classifier.lost.probability(features),
-            posterior=replace(frame.posterior, recalibration=recalibration),
-            details={**frame.details, "evidence": evidence, "exchanged": exchanged},
-        )
+        posterior, lost = replace(frame.posterior, recalibration=recalibration), classifier.lost.probability(features)
+        details = {**frame.details, "evidence": evidence, "exchanged": exchanged}
+        yield replace(frame, lost=lost, posterior=posterior, details=details)

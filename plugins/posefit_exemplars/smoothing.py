@@ -3,7 +3,7 @@
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -75,15 +75,5 @@ def _frame(estimates: Sequence[Estimate], k: int, spread: float) -> Frame:
         evaluations += len(details["mirror_costs"])
         posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, frame_costs)
     _, seconds, cpu_seconds = (estimate.effort + clocks() - start).tolist()
-    return Frame(
-        pose,
-        place,
-        cost,
-        areas,
-        evaluations,
-        seconds,
-        np.array([cost]),
-        details=details,
-        cpu_seconds=cpu_seconds,
-        posterior=posterior,
-    )
+    frame = Frame(pose, place, cost, areas, evaluations, seconds, np.array([cost]), details=details)
+    return replace(frame, cpu_seconds=cpu_seconds, posterior=posterior)

@@ -13,18 +13,9 @@ from posefit.fitting.check import at_least, positive
 from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
+from posefit_exemplars import beam as beams
 from posefit_exemplars import hypotheses, markov
-from posefit_exemplars.beam import (
-    CANDIDATE_TURN,
-    JUMP_COST,
-    Beam,
-    StepScales,
-    diverse_best,
-    merged,
-    next_states,
-    root_deviation_costs,
-    transition_costs,
-)
+from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
@@ -94,7 +85,7 @@ class ExemplarTracker:
         training = [motion.reversed() for motion in task.training] if task.backwards else task.training
         self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
         self.frame_seconds = (-1.0 if task.backwards else 1.0) / task.fps
-        self.scales = StepScales.at(task.fps, spread, task.fastest_turn)
+        self.scales = beams.StepScales.at(task.fps, spread, task.fastest_turn)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
         self.ahead = min(math.ceil(FILTER_REACH * self.smoothing), lag)  # frames of the lag that are only for smoothing
@@ -148,7 +139,9 @@ class ExemplarTracker:
                 states = markov.frame_states(costs)
             else:
                 known = frame_costs.root, frame_costs.camera_position
-                steps = transition_costs(self.exemplars, latest.beam, beam, self.frame_seconds, self.scales, *known)
+                steps = beams.transition_costs(
+                    self.exemplars, latest.beam, beam, self.frame_seconds, self.scales, *known
+                )
                 states = markov.frame_states(costs, latest.states, steps)
             beam = replace(beam, totals=states.totals)
             latest = _BeamFrame(beam, states, frame_costs, clocks(evaluations) - start)
@@ -160,7 +153,7 @@ class ExemplarTracker:
         """Return the states of a frame, from `everywhere` or where clips continue, their costs, and the evaluations."""
         root, step = frame_costs.root, (self.frame_seconds, self.scales)
         if before is not None and not frame_costs.usable:
-            beam = next_states(self.exemplars, before, *step, BEAM_STATES, root)
+            beam = beams.next_states(self.exemplars, before, *step, BEAM_STATES, root)
             return replace(beam, places=frame_costs.at_root(beam.places)), np.zeros(len(beam)), 0.0
         # the reported pose, its mirror images, and the fraction of a small picture's share
         reserve = 3 + frame_costs.camera_count
@@ -171,25 +164,25 @@ class ExemplarTracker:
         full = int(min(FULL_SHARE * evaluations, (evaluations - reserve) / (1.0 + frame_costs.small_share)))
         small = int((evaluations - full - reserve) / frame_costs.small_share)
         nearby = int(CONTINUED_SHARE * small) if before is not None or self.task.first_pose is not None else 0
-        beams, small_count = list[Beam](), 0
+        parts, small_count = list[Beam](), 0
         if everywhere or before is None:
             elsewhere, small_count = self._elsewhere(frame_costs, before, small - nearby, rng)
-            beams.append(elsewhere)
+            parts.append(elsewhere)
         if before is not None:
-            beams.append(next_states(self.exemplars, before, *step, nearby, root))
+            parts.append(beams.next_states(self.exemplars, before, *step, nearby, root))
         elif self.task.first_pose is not None:
             first = self._first_states(self.task.first_pose, nearby)
-            beams = [replace(elsewhere, totals=elsewhere.totals + JUMP_COST), first]
-        beam = self._placed(frame_costs, merged(*beams), before is not None)
+            parts = [replace(elsewhere, totals=elsewhere.totals + JUMP_COST), first]
+        beam = self._placed(frame_costs, beams.merged(*parts), before is not None)
         turn_costs = yaw_costs(beam.yaws, frame_costs.yaw) * 30.0 / self.task.fps
         totals = beam.totals + turn_costs + frame_costs.small(self._poses(beam), beam.places) / self.temperature
         small_count += len(beam)
-        rows = diverse_best(self.exemplars, beam, totals, full)
+        rows = beams.diverse_best(self.exemplars, beam, totals, full)
         beam = beam.rows(rows)
         poses, full_count = self._poses(beam), len(beam)
         silhouette_costs = frame_costs.full(poses, beam.places) / self.temperature
         costs = turn_costs[rows] + silhouette_costs + landmark_costs(frame_costs.landmarks(poses, beam.places))
-        best = diverse_best(self.exemplars, beam, beam.totals + costs, BEAM_STATES)
+        best = beams.diverse_best(self.exemplars, beam, beam.totals + costs, BEAM_STATES)
         return beam.rows(best), costs[best], small_count * frame_costs.small_share + full_count
 
     def _elsewhere(
@@ -216,7 +209,7 @@ class ExemplarTracker:
         yaw, codes = self.task.yaw or 0.0, self.exemplars.codes
         code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
         squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)  # and a constant
-        turns = [-CANDIDATE_TURN, 0.0, CANDIDATE_TURN]
+        turns = [-beams.CANDIDATE_TURN, 0.0, beams.CANDIDATE_TURN]
         nearest = np.argsort(squares, kind="stable")[: min(count // len(turns), BEAM_STATES)]
         return self._started(np.tile(nearest, len(turns)), yaw + np.repeat(turns, len(nearest)), None)
 
@@ -235,7 +228,7 @@ class ExemplarTracker:
         """Return states with aligned roots; where they were `expected`, the distance from there adds to their costs."""
         places, totals = frame_costs.aligned(self._poses(beam), beam.places), beam.totals
         if expected and self.task.translation != "known":
-            totals = totals + root_deviation_costs(places, beam.places, frame_costs.camera_position)
+            totals = totals + beams.root_deviation_costs(places, beam.places, frame_costs.camera_position)
         return replace(beam, places=places, totals=totals)
 
     def _estimated(self, frame: _BeamFrame, row: int, weights: Array) -> Estimate:
@@ -243,7 +236,7 @@ class ExemplarTracker:
         beam, frame_costs, alternatives = frame.beam, frame.frame_costs, None
         if self.hypotheses is not None:
             count = self.hypotheses.diverse_count(frame_costs.camera_count)
-            diverse = beam.rows(diverse_best(self.exemplars, beam, beam.totals, count))
+            diverse = beam.rows(beams.diverse_best(self.exemplars, beam, beam.totals, count))
             alternatives = self._poses(diverse), diverse.places
         codes = self.exemplars.codes[beam.states]
         squares = state_distances(codes, codes[row], beam.yaws - beam.yaws[row])
