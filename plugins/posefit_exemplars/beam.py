@@ -11,6 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars import kernels
 from posefit_exemplars.exemplars import Codes, Exemplars, Rows, about_vertical
@@ -30,22 +31,21 @@ KNOWN_ROOT_SPREAD = 0.008  # metres that a known root is off where its clip cont
 FAST_TURN_COST = 100.0  # of each radian beyond the fastest possible turn
 
 
-@dataclass(frozen=True)
-class StepScales:
-    """What differences count little in a step from one frame to the next."""
+class Step(NamedTuple):
+    """From one frame to the next: the time between them, and which differences are usual in it."""
 
+    seconds: float  # negative where a track goes back in time
     pose: float  # metres, root mean square over joints, that a pose is off where its clip continues
     turn: float = TURN_SPREAD
     known_root: float = KNOWN_ROOT_SPREAD
-    max_turn: float = math.inf  # radians: the fastest possible turn in a step
+    max_turn: float = math.inf  # radians: the fastest possible turn
 
     @classmethod
-    def at(cls, fps: float, pose: float, fastest_turn: float | None) -> Self:
-        """Return the scales at a frame rate, from the `pose` spread of a thirtieth of a second and radians a second."""
-        intervals = 30.0 / fps
-        slack = math.sqrt(intervals)
-        max_turn = math.inf if fastest_turn is None else fastest_turn / fps
-        return cls(pose * slack, TURN_SPREAD * slack, KNOWN_ROOT_SPREAD * intervals, max_turn)
+    def of(cls, task: Task, spread: float) -> Self:
+        """Return a step of a track; `spread` is that of poses in a thirtieth of a second."""
+        seconds, intervals = (-1.0 if task.backwards else 1.0) / task.fps, 30.0 / task.fps
+        max_turn, slack = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps, math.sqrt(intervals)
+        return cls(seconds, spread * slack, TURN_SPREAD * slack, KNOWN_ROOT_SPREAD * intervals, max_turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,31 +101,29 @@ class Continuations(NamedTuple):
     places: Array  # (n, 3) at the recorded speed
 
     @classmethod
-    def of(cls, exemplars: Exemplars, beam: Beam, seconds: float, scales: StepScales, root: Array | None) -> Self:
-        """Return where clips are `seconds` later, and the costs of their distances from a known `root` (3,)."""
+    def of(cls, exemplars: Exemplars, beam: Beam, step: Step, root: Array | None) -> Self:
+        """Return where clips are a step later, and the costs of their distances from a known `root` (3,)."""
         codes, turns, displacements = zip(
-            *(exemplars.continuation(beam.states, seconds * speed) for speed in CLIP_SPEEDS), strict=True
+            *(exemplars.continuation(beam.states, step.seconds * speed) for speed in CLIP_SPEEDS), strict=True
         )
         places = [beam.places + about_vertical(displacement, beam.yaws) for displacement in displacements]
         costs = np.zeros((len(CLIP_SPEEDS), len(beam)))
         if root is not None:
-            squares = ((np.array(places) - root) ** 2).sum(axis=2) / (2.0 * scales.known_root**2)
+            squares = ((np.array(places) - root) ** 2).sum(axis=2) / (2.0 * step.known_root**2)
             costs = np.minimum(np.log1p(squares), JUMP_COST)  # or nothing might be within reach
         return cls(np.stack(codes), costs, beam.yaws + turns[RECORDED_SPEED], places[RECORDED_SPEED])
 
 
-def next_states(
-    exemplars: Exemplars, beam: Beam, seconds: float, scales: StepScales, count: int, root: Array | None = None
-) -> Beam:
-    """Return the states that those of a beam may reach in `seconds`, each by its cheapest step; at most `count`.
+def next_states(exemplars: Exemplars, beam: Beam, step: Step, count: int, root: Array | None = None) -> Beam:
+    """Return the states that those of a beam may reach in a step, each at its cheapest; at most `count`.
 
-    A pose costs half the square of its distance, over its scale, from what its parent's clip did next at one of the
+    A pose costs half the square of its distance, over its spread, from what its parent's clip did next at one of the
     speeds; a yaw half the square of its turn away from the clip's. Where the root is known to be at `root` (3,), its
-    distance d from where the clip leads costs log(1 + d^2 / 2 / scale^2): a person may be faster than all clips.
+    distance d from where the clip leads costs log(1 + d^2 / 2 / spread^2): a person may be faster than all clips.
     """
-    continued = Continuations.of(exemplars, beam, seconds, scales, root)
+    continued = Continuations.of(exemplars, beam, step, root)
     groups = exemplars.near_groups(continued.codes[RECORDED_SPEED])
-    limit, scale = beam.totals.min() + JUMP_COST + MAX_EXCESS_COST, 1.0 / (2.0 * scales.pose**2)
+    limit, scale = beam.totals.min() + JUMP_COST + MAX_EXCESS_COST, 1.0 / (2.0 * step.pose**2)
     costs, bins = continued.displacement_costs, yaw_bins(continued.yaws)
     by_bin: list[tuple[Rows, Rows, Array]] = []
     for number in np.unique(bins):
@@ -139,7 +137,7 @@ def next_states(
         by_bin.append((states, parents, totals))
     states, parents, totals = (np.tile(np.concatenate(parts), 3) for parts in zip(*by_bin, strict=True))
     turns = np.repeat([0.0, -CANDIDATE_TURN, CANDIDATE_TURN], len(states) // 3)
-    totals = totals + 0.5 * (turns / scales.turn) ** 2
+    totals = totals + 0.5 * (turns / step.turn) ** 2
     candidates = merged(Beam(states, continued.yaws[parents] + turns, totals, continued.places[parents]))
     return candidates.rows(diverse_best(exemplars, candidates, candidates.totals, count))
 
@@ -166,29 +164,23 @@ def root_deviation_costs(places: Array, expected: Array, camera: Array | None) -
 
 
 def transition_costs(
-    exemplars: Exemplars,
-    before: Beam,
-    after: Beam,
-    seconds: float,
-    scales: StepScales,
-    root: Array | None = None,
-    camera: Array | None = None,
+    exemplars: Exemplars, before: Beam, after: Beam, step: Step, root: Array | None = None, camera: Array | None = None
 ) -> Array:
-    """Return the costs (n, m) of steps from each state of one frame to each of the next, `seconds` later.
+    """Return the costs (n, m) of steps from each state of one frame to each of the next.
 
     None costs more than a jump, unless it turns faster than possible. `root` (3,) is where the root is in the next
     frame, if it is known, and `camera` (3,) the position of the only camera.
     """
-    continued = Continuations.of(exemplars, before, seconds, scales, root)
-    codes, double = exemplars.codes[after.states], 2.0 * scales.pose**2
+    continued = Continuations.of(exemplars, before, step, root)
+    codes, double = exemplars.codes[after.states], 2.0 * step.pose**2
     speeds = zip(continued.codes, continued.displacement_costs, strict=True)
     squares = [squared_distances(code, codes) / double + cost[:, None] for code, cost in speeds]
     costs: Array = np.minimum.reduce(squares)  # TOYAMA2001 (dynamics)
-    costs = costs + 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / scales.turn) ** 2
+    costs = costs + 0.5 * (wrapped(after.yaws - continued.yaws[:, None]) / step.turn) ** 2
     if root is None:
         costs += root_deviation_costs(after.places, continued.places[:, None], camera)
     costs = np.minimum(costs, JUMP_COST)
-    if scales.max_turn < np.pi:
+    if step.max_turn < np.pi:
         turns = np.abs(wrapped(after.yaws - before.yaws[:, None]))
-        costs += FAST_TURN_COST * np.maximum(turns - scales.max_turn, 0.0)
+        costs += FAST_TURN_COST * np.maximum(turns - step.max_turn, 0.0)
     return costs

@@ -83,10 +83,7 @@ def farthest_first(codes: Codes, max_groups: int) -> tuple[Rows, Rows]:
 
 
 class Tiles(NamedTuple):
-    """The codes of states in groups, a few states side by side, as loops over many of them need them.
-
-    The last tile of a group is filled up with codes that are infinitely far away.
-    """
+    """The codes of states in groups, `LANES` side by side; codes that fill up a group are infinitely far away."""
 
     codes: Codes  # (T, D, LANES)
     states: Rows  # (T LANES,) whose codes they are
@@ -125,11 +122,7 @@ class Exemplars:
 
     @classmethod
     def of(cls, motions: Sequence[Motion], skeleton: Skeleton, *, mirrored: bool = False) -> Self:
-        """Return the states of motions as the person with this skeleton would move, and of their mirror images.
-
-        A frame nearer than two centimetres to the latest state is left out. Raises ValueError where a motion has a
-        single frame.
-        """
+        """Return the states of motions as the person with this skeleton would move, and of their mirror images."""
         if not motions:
             raise InputError("exemplars must have motions to learn from, got none")
         for motion in motions:
@@ -202,10 +195,7 @@ class Exemplars:
         return self.members[self.starts[group] : self.starts[group + 1]]
 
     def nearest(self, poses: Array, count: int) -> tuple[Rows, Codes]:
-        """Return the states nearest to `poses` (n, 66) and their squared distances, both (n, count), nearest first.
-
-        Only the groups whose centres are nearest are searched; where they have fewer poses, distances are infinite.
-        """
+        """Return the states nearest to `poses` (n, 66) in the groups near them; see `kernels.nearest_codes`."""
         codes = self.coding.of_poses(poses)
         states, squares = kernels.nearest_codes(codes, self.near_groups(codes), self.tiles, count)
         return states, squares
@@ -217,10 +207,7 @@ class Exemplars:
         return self.groups[states]
 
     def nearby_mean(self, poses: Array, count: int, spread: float) -> Array:
-        """Return the mean (n, 66) of the `count` poses of clips nearest to each of `poses`, whose yaw it has.
-
-        Weights fall with squared distances, over the `spread`.
-        """
+        """Return the mean (n, 66) of the `count` poses of clips nearest to each of `poses`, whose yaw it has."""
         states, squares = self.nearest(poses, count)
         weights = np.exp(-0.5 * (squares - squares[:, :1]) / spread**2)
         differences = wrapped(self.poses[states] - poses[:, None])
@@ -240,10 +227,7 @@ _latest: tuple[bytes, Exemplars] | None = None
 
 
 def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
-    """Return the states of motions; the latest are cached for the same motions, and for all lengths of bones.
-
-    Poses are compared by the joints of a person of average lengths, so a build that is fitted learns nothing again.
-    """
+    """Return the states of motions, by the joints of a person of average lengths; the latest are cached."""
     global _latest
     digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
     arrays = [skeleton.axes]

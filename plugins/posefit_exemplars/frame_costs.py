@@ -22,20 +22,17 @@ class FrameCosts:
         self._task, self._observation, silhouettes = task, observation, observation.silhouettes
         side = min(side for camera in task.cameras for side in (camera.width, camera.height))
         factor = next((factor for factor in SMALL_FACTORS if side >= factor * MIN_SMALL_SIDE), 1)
-        self._scene = task.body, task.cameras, silhouettes
-        self._small_scene = (
-            task.body,
-            [coarser_camera(camera, factor) for camera in task.cameras],
-            [coarser_silhouette(silhouette, factor) for silhouette in silhouettes],
-        )
+        cameras = [coarser_camera(camera, factor) for camera in task.cameras]
+        pictures = [coarser_silhouette(silhouette, factor) for silhouette in silhouettes]
+        self._scene, self._small_scene = (task.body, task.cameras, silhouettes), (task.body, cameras, pictures)
         self.small_share = 1.0 / factor**2  # effort of a cost in the small picture, as a share of one at full size
-        self._showing = known_views(task.cameras, silhouettes)
-        self.skeleton, self.camera_count = task.body.skeleton, len(self._showing)  # of cameras that show something
+        self._views = known_views(task.cameras, silhouettes)
+        self.skeleton, self.camera_count = task.body.skeleton, len(self._views)  # of cameras that show something
         self.yaw, self.usable = observation.yaw, observation.usable
         known = observation.translation if task.translation == "known" else None
         self.root = None if known is None else np.asarray(known, dtype=np.float64)  # (3,) metres, where it is known
         # (3,) of the only camera that shows the person; None with several, which also show the depth
-        self.camera_position: Array | None = self._showing[0].position if self.camera_count == 1 else None
+        self.camera_position: Array | None = self._views[0].position if self.camera_count == 1 else None
 
     def aligned(self, poses: Array, places: Array) -> Array:
         """Return the places (n, 3) of poses (n, 66): of the known root, or those near `places` (n, 3) that fit."""
@@ -62,10 +59,7 @@ class FrameCosts:
         return landmark_likelihoods(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
 
     def side_odds(self, pose: Array, place: Array) -> float | None:
-        """Return the logarithm of the odds that left and right are as in a pose (66,).
-
-        None without landmarks, and with several cameras, whose silhouettes know better.
-        """
+        """Return the logarithm of the odds that left and right are as in a pose (66,), by one camera's landmarks."""
         if self.camera_count > 1 or self._observation.landmarks is None:
             return None
         known = self._observation.landmarks[..., 2].any()
@@ -82,9 +76,7 @@ class FrameCosts:
 
     def reflected(self, poses: Array, place: Array) -> Array:
         """Return poses (n, 66) at about `place` (3,) reflected along each line of sight (cameras n, 66)."""
-        return np.concatenate(
-            [reflected_poses(self.skeleton, poses, facing(camera, place)) for camera in self._showing]
-        )
+        return np.concatenate([reflected_poses(self.skeleton, poses, facing(view, place)) for view in self._views])
 
     def mirror_costs(self, pose: Array, place: Array) -> Array:
         """Return the costs (1 + cameras,) of a pose's mirror image, and of its reflection along each line of sight.

@@ -27,7 +27,7 @@ from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit_exemplars import markov
-from posefit_exemplars.beam import StepScales, root_deviation_costs, squared_distances
+from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
 from posefit_exemplars.contours import STEP_EVALUATIONS, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
@@ -126,22 +126,21 @@ def step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
 class HypothesisFilter:
     """Fits the hypotheses of one frame after the other, and reports the likeliest sequence `delay` frames later.
 
-    `evaluations` are for each frame, and decide how many hypotheses there are; `temperature` and `sampling` are those
-    of the path.
+    `evaluations` of a frame decide how many there are; `temperature` and `sampling` are those of the path.
     """
 
     def __init__(
         self,
         task: Task,
         exemplars: Exemplars,
-        scales: StepScales,
+        step: Step,
         temperature: float,
         evaluations: float,
         delay: int,
         sampling: markov.Sampling,
     ) -> None:
         self._task, self._exemplars, self.delay = task, exemplars, delay
-        self._temperature, self._spread = temperature / SHARPNESS, STEP_SPREAD * scales.pose
+        self._temperature, self._spread = temperature / SHARPNESS, STEP_SPREAD * step.pose
         self._sampling = markov.Sampling(sampling.paths, sampling.power / SHARPNESS)
         self._library_cost = LIBRARY_COST * 30.0 / task.fps
         self._costs: deque[float] = deque(maxlen=max(round(MEMORY_SECONDS * task.fps), 1))  # of the best hypotheses
@@ -241,10 +240,7 @@ class HypothesisFilter:
         return states, exchanged_given(likelihoods, exchanged)
 
     def _noise(self, frame_costs: FrameCosts, poses: Array, places: Array) -> float:
-        """Return how many times less precise masks are than clean ones, 1 or more, by the best frames so far.
-
-        Before the first, by the costs of its hypotheses' poses (n, 66) at places (n, 3). With several cameras it is 1.
-        """
+        """Return how many times less precise one camera's masks are than clean ones, by the best frames so far."""
         if frame_costs.camera_count > 1:
             return 1.0
         if frame_costs.usable and not self._costs:
@@ -252,10 +248,7 @@ class HypothesisFilter:
         return max(float(np.quantile(self._costs or [0.0], BEST_SHARE)) / CLEAN_COST, 1.0)
 
     def _fresh(self, estimate: Estimate, before: _FittedFrame | None, rows: Rows | None) -> tuple[Array, Array]:
-        """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest.
-
-        These are of `rows` of the frame before; in the first frame, the path and the states are reflected.
-        """
+        """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest."""
         poses, places = estimate.pose[None], estimate.place[None]
         if estimate.alternatives is not None:
             other_poses, other_places = estimate.alternatives

@@ -33,10 +33,7 @@ def lower_distances(distances, start, code, tile):
 
 @jit
 def frames_apart(codes, min_square):
-    """Return the frames of a clip with codes (T, D) that are the first, the last, or far from the one before them.
-
-    That is where the squared distance from the latest returned frame is above `min_square`.
-    """
+    """Return the first frame of a clip with codes (T, D), those far from the latest returned one, and the last."""
     frames = np.zeros(len(codes), np.int64)
     count, last = 1, len(codes) - 1
     for k in range(1, len(codes)):
@@ -52,9 +49,9 @@ def frames_apart(codes, min_square):
 
 @jit
 def nearest_codes(codes, groups, tiles, count):
-    """Return the states nearest to codes (n, D), and their squared distances, (n, count) both, the nearest first.
+    """Return the states in `groups` (n, g) nearest to codes (n, D), and squared distances, both (n, count), in order.
 
-    Only states in `groups` (n, g) are compared. Where these have fewer than `count`, squared distances are infinite.
+    Where there are fewer states, squared distances are infinite.
     """
     squares = np.full((len(codes), count), np.inf, np.float32)
     states = np.zeros((len(codes), count), np.int64)
@@ -146,10 +143,7 @@ def _solve(matrix, vector):
 
 @jit
 def step_poses(kinematics, chain, radii, contours, pull, reach, poses, places):
-    """Move poses (n, 66) at `places` (n, 3) by one step towards the contours of all views.
-
-    Distances beyond `reach`, metres, count less. First comes the address of `place_lanes`.
-    """
+    """Move poses (n, 66) at `places` (n, 3) by a step to the contours; distances beyond `reach`, metres, count less."""
     joints = chain.parents.size + 1
     frames, sines, cosines = np.empty((joints, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
     curves, forces = np.empty((joints, 6, 6)), np.empty((joints, 6, 1))

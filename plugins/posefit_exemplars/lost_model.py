@@ -15,7 +15,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from importlib.resources import files
 from typing import Any, NamedTuple, Self
 
@@ -78,14 +78,10 @@ class Calibration:
         return Recalibration(*spreads, self.joint_factors, self.angle_factors, sharpness=self.sharpness, none=none)
 
 
-def _stored(name: str) -> dict[str, Any]:
-    return dict(json.loads(files("posefit_exemplars").joinpath(name).read_text("utf-8")))
-
-
 @cache
 def stored_calibration() -> Calibration:
     """Return the calibration that was fitted on the library's own people by `docs/studies/posterior.py`."""
-    stored = _stored("calibration.json")
+    stored = json.loads(files("posefit_exemplars").joinpath("calibration.json").read_text("utf-8"))
     (low, high), sharpness = stored.pop("range"), stored.pop("sharpness")
     arrays = {name: np.array(values) for name, values in stored.items() if name != "temperature"}
     return Calibration(range=(low, high), sharpness=sharpness, **arrays)
@@ -102,16 +98,12 @@ def recalibrated(posterior: Posterior, pose: Array, cost: float, frame_costs: Fr
 MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back
 
 
-def _log_above(floor: float, value: float) -> float:
-    return math.log(max(value, 0.0) + floor)
-
-
 # The evidence of a frame, each with the scale on which it enters the models.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
-    "cost": partial(_log_above, 1.0),  # of the reported pose, where the person is visible
+    "cost": lambda value: math.log(max(value, 0.0) + 1.0),  # of the reported pose, where the person is visible
     "reflected": math.log,  # the least cost of poses reflected along a line of sight, over the cost
     "mirrored": math.log,  # the cost of the mirror image, over the cost
-    "farthest": partial(_log_above, 0.01),  # metres between the reported pose and the farthest sampled track
+    "farthest": lambda value: math.log(max(value, 0.0) + 0.01),  # metres to the farthest sampled track
     "second": float,  # weight of the tracks that have left and right exchanged
     "ahead": float,  # metres a second by which the root goes where it faces
     "speed": float,  # metres a second by which it goes anywhere
@@ -144,10 +136,7 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
 
 
 def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False) -> dict[str, float]:
-    """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places (3,).
-
-    Metres a second, at most `MAX_SPEED`. Empty for a single place. With `backwards` the frames come in reverse.
-    """
+    """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places."""
     if len(places) < 2:
         return {}
     way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
@@ -171,8 +160,7 @@ class EvidenceMeans:
     def features(self, values: Mapping[str, float]) -> Array:
         """Return the evidence of the next frame and its means so far (3 E,), on the scale that was fitted.
 
-        A missing value is that of the frame before, at first that of `DEFAULTS`. In a mean, the weight of a frame
-        falls by a factor e for each reach.
+        A missing value is that of the frame before, at first that of `DEFAULTS`.
         """
         self._latest |= values
         now = np.array([scale(self._latest.get(name, DEFAULTS.get(name, 0.0))) for name, scale in EVIDENCE.items()])
@@ -215,7 +203,8 @@ class FailureClassifier(NamedTuple):
 @cache
 def stored_classifier() -> FailureClassifier:
     """Return the models that `docs/studies/lost.py` fitted to people who are not in the library."""
-    return FailureClassifier.from_dict(_stored("lost_model.json"))
+    stored = files("posefit_exemplars").joinpath("lost_model.json").read_text("utf-8")
+    return FailureClassifier.from_dict(json.loads(stored))
 
 
 def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:

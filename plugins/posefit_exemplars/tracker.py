@@ -74,18 +74,18 @@ class ExemplarTracker:
         samples: int = 24,
         posterior_temperature: float = 8.0,
     ) -> None:
-        temperatures = {"temperature": temperature, "posterior_temperature": posterior_temperature}
-        for name, value in {"spread": spread, **temperatures}.items():
-            positive(name, value)
-        for name, value in {"smoothing": smoothing, "lag": lag, "samples": samples}.items():
-            at_least(name, value, 0)
+        positive("spread", spread)
+        positive("temperature", temperature)
+        positive("posterior_temperature", posterior_temperature)
+        at_least("smoothing", smoothing, 0)
+        at_least("lag", lag, 0)
+        at_least("samples", samples, 0)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
         # one set of states serves both directions
         training = [motion.reversed() for motion in task.training] if task.backwards else task.training
         self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
-        self.frame_seconds = (-1.0 if task.backwards else 1.0) / task.fps
-        self.scales = beams.StepScales.at(task.fps, spread, task.fastest_turn)
+        self.step = beams.Step.of(task, spread)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
         self.ahead = min(math.ceil(FILTER_REACH * self.smoothing), lag)  # frames of the lag that are only for smoothing
@@ -102,7 +102,7 @@ class ExemplarTracker:
             delay = self.delay // 2
             self.delay -= delay
             self.hypotheses = hypotheses.HypothesisFilter(
-                task, self.exemplars, self.scales, self.temperature, share, delay, self.sampling
+                task, self.exemplars, self.step, self.temperature, share, delay, self.sampling
             )
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -139,9 +139,7 @@ class ExemplarTracker:
                 states = markov.frame_states(costs)
             else:
                 known = frame_costs.root, frame_costs.camera_position
-                steps = beams.transition_costs(
-                    self.exemplars, latest.beam, beam, self.frame_seconds, self.scales, *known
-                )
+                steps = beams.transition_costs(self.exemplars, latest.beam, beam, self.step, *known)
                 states = markov.frame_states(costs, latest.states, steps)
             beam = replace(beam, totals=states.totals)
             latest = _BeamFrame(beam, states, frame_costs, clocks(evaluations) - start)
@@ -151,9 +149,9 @@ class ExemplarTracker:
         self, frame_costs: FrameCosts, before: Beam | None, everywhere: bool, rng: np.random.Generator
     ) -> tuple[Beam, Array, float]:
         """Return the states of a frame, from `everywhere` or where clips continue, their costs, and the evaluations."""
-        root, step = frame_costs.root, (self.frame_seconds, self.scales)
+        root = frame_costs.root
         if before is not None and not frame_costs.usable:
-            beam = beams.next_states(self.exemplars, before, *step, BEAM_STATES, root)
+            beam = beams.next_states(self.exemplars, before, self.step, BEAM_STATES, root)
             return replace(beam, places=frame_costs.at_root(beam.places)), np.zeros(len(beam)), 0.0
         # the reported pose, its mirror images, and the fraction of a small picture's share
         reserve = 3 + frame_costs.camera_count
@@ -169,7 +167,7 @@ class ExemplarTracker:
             elsewhere, small_count = self._elsewhere(frame_costs, before, small - nearby, rng)
             parts.append(elsewhere)
         if before is not None:
-            parts.append(beams.next_states(self.exemplars, before, *step, nearby, root))
+            parts.append(beams.next_states(self.exemplars, before, self.step, nearby, root))
         elif self.task.first_pose is not None:
             first = self._first_states(self.task.first_pose, nearby)
             parts = [replace(elsewhere, totals=elsewhere.totals + JUMP_COST), first]

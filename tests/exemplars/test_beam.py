@@ -1,7 +1,5 @@
 """Steps from the states of one frame to those of the next, against twins that compare every pair."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ from posefit_exemplars.beam import (
     MAX_EXCESS_COST,
     YAW_SHARES,
     Beam,
-    StepScales,
+    Step,
     diverse_best,
     next_states,
     root_deviation_costs,
@@ -27,8 +25,8 @@ from posefit_exemplars.beam import (
 from posefit_exemplars.exemplars import Exemplars, about_vertical
 from tests.cases import each
 
-SCALES = StepScales(0.03, np.radians(8.0), 0.008)
 SECONDS = 1.0 / 30.0
+STEP = Step(SECONDS, 0.03, np.radians(8.0), 0.008)
 MOST = 4000
 
 
@@ -43,7 +41,7 @@ def steps_to(
 ) -> Array:
     """Return the costs (n, m) of steps between two beams, before a camera at x = 3."""
     camera = np.array([3.0, 1.0, 0.0])
-    return transition_costs(exemplars, before, beam, SECONDS, replace(SCALES, max_turn=max_turn), root, camera)
+    return transition_costs(exemplars, before, beam, STEP._replace(max_turn=max_turn), root, camera)
 
 
 def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:
@@ -55,9 +53,9 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
             pace = 0.0
             if root is not None:
                 off = before.places[row] + about_vertical(way, before.yaws[row : row + 1])[0] - root
-                pace = np.log1p(off @ off / 2.0 / SCALES.known_root**2)
+                pace = np.log1p(off @ off / 2.0 / STEP.known_root**2)
             for pose in range(len(exemplars)):
-                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (2.0 * SCALES.pose**2)
+                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (2.0 * STEP.pose**2)
                 costs[row, pose] = min(costs[row, pose], away + min(pace, JUMP_COST))
     return costs
 
@@ -66,7 +64,7 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
 def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | None) -> None:
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 5.0]]) if root is None else None
     before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0], places)
-    beams = next_states(small, before, SECONDS, SCALES, MOST, root)
+    beams = next_states(small, before, STEP, MOST, root)
     steps = costs_of_steps(small, before, root) + before.totals[:, None]
     codes, turned, ways = small.continuation(before.states, SECONDS)
     twin: dict[tuple[int, int], float] = {}
@@ -75,14 +73,14 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | 
             for turn in (-CANDIDATE_TURN, 0.0, CANDIDATE_TURN):
                 facing = np.array([before.yaws[row] + turned[row] + turn])
                 key = state, int(yaw_bins(facing)[0])
-                twin[key] = min(twin.get(key, np.inf), steps[row, state] + 0.5 * (turn / SCALES.turn) ** 2)
+                twin[key] = min(twin.get(key, np.inf), steps[row, state] + 0.5 * (turn / STEP.turn) ** 2)
     keys = zip(beams.states.tolist(), yaw_bins(beams.yaws).tolist(), strict=True)
     totals = dict(zip(keys, beams.totals, strict=True))
     assert len(totals) == len(beams)
     for key, total in totals.items():
         assert total == pytest.approx(twin[key], rel=1e-4, abs=1e-3)
     assert min(totals.values()) == pytest.approx(min(twin.values()), abs=1e-3)
-    highest = before.totals.min() + JUMP_COST + MAX_EXCESS_COST + 0.5 * (CANDIDATE_TURN / SCALES.turn) ** 2
+    highest = before.totals.min() + JUMP_COST + MAX_EXCESS_COST + 0.5 * (CANDIDATE_TURN / STEP.turn) ** 2
     assert beams.totals.max() < highest
     for row in range(3):  # the next pose of each clip is among them
         assert int(squared_distances(codes[row : row + 1], small.codes).argmin()) in beams.states
@@ -95,7 +93,7 @@ def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | 
 
 def test_a_beam_is_limited_and_each_yaw_has_its_share(small: Exemplars) -> None:
     before = beam([3, 3, 3], [0.0, 2.0, 4.0])
-    every, few = (next_states(small, before, SECONDS, SCALES, most) for most in (MOST, 8))
+    every, few = (next_states(small, before, STEP, most) for most in (MOST, 8))
     assert len(few) <= 8 < len(every)
     for yaw in (0.0, 2.0, 4.0):  # 8 / YAW_SHARES poses, each with three yaws
         share = int((np.abs(wrapped(few.yaws - yaw)) < 0.5).sum())
@@ -134,7 +132,7 @@ def test_steps_between_beams_cost_what_the_twin_says_and_a_jump_at_most(small: E
     twin = costs_of_steps(small, before, root)[:, after.states]
     for i in range(3):
         for j in range(4):
-            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / SCALES.turn) ** 2
+            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEP.turn) ** 2
             if root is None:
                 place = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
                 camera = np.array([3.0, 1.0, 0.0])

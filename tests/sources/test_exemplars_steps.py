@@ -9,7 +9,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit_exemplars.beam import Beam, StepScales, transition_costs
+from posefit_exemplars.beam import Beam, Step, transition_costs
 from posefit_exemplars.exemplars import Exemplars, farthest_first
 from posefit_exemplars.markov import FrameStates, frame_states, state_weights, viterbi_state
 
@@ -102,14 +102,13 @@ def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:  # TOYAMA20
     # a clip of 30 frames a second: who does what it did next pays nothing, who is 3 cm off half a unit
     walk = built_in.motion("walk-a", frames=20)
     clips = Exemplars.of([walk], average_skeleton())
-    scales = StepScales(0.03)
     after = int(clips.last_states[0])
     for state in range(after):
         seconds = float(clips.times[state + 1] - clips.times[state])
         yaws = clips.poses[[state, state + 1], 0]
         before = Beam(np.array([state]), yaws[:1], np.zeros(1), clips.places[[state]])
         beams = Beam(np.array([state + 1, after]), np.repeat(yaws[1:], 2), np.zeros(2), np.zeros((2, 3)))
-        following, last = transition_costs(clips, before, beams, seconds, scales, clips.places[state + 1])[0]
+        following, last = transition_costs(clips, before, beams, Step(seconds, 0.03), clips.places[state + 1])[0]
         assert following == pytest.approx(0.0, abs=1e-4)
         off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
         assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4  # or less, at another speed
