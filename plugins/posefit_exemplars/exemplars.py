@@ -230,11 +230,10 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
     """Return the states of motions, by the joints of a person of average lengths; the latest are cached."""
     global _latest
     digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
-    arrays = [skeleton.axes]
+    digest.update(skeleton.axes.tobytes())
     for motion in motions:
-        arrays += [motion.skeleton.axes, motion.poses, motion.translations]
-    for array in arrays:
-        digest.update(array.tobytes())
+        for array in (motion.skeleton.axes, motion.poses, motion.translations):
+            digest.update(array.tobytes())
     key = digest.digest()
     latest = _latest  # read once: another thread may replace it at any time
     if latest is None or latest[0] != key:

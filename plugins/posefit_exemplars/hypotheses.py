@@ -16,7 +16,7 @@ After Sminchisescu and Triggs, Kinematic jump processes for monocular 3D human t
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -62,8 +62,7 @@ SPEED_COSTS: Mapping[float, float] = {0.0: 0.3, 0.5: 0.1, 1.0: 0.0, 1.4: 0.15}  
 MAX_PART_COST = 4.0  # of a step of one part
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Hypotheses:
+class Hypotheses(NamedTuple):
     """The hypotheses of one frame."""
 
     poses: Array  # (n, 66)
@@ -103,8 +102,7 @@ def step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
     """Return the costs (n, m) of steps between hypotheses of successive frames.
 
     For the trunk and each limb, half the square, over the `spread`, of its joints' distance from where the mean of both
-    rates leads, and of the difference of the rates; at the cheapest of a few speeds. A distance is over all joints,
-    root mean square.
+    rates leads, and of the difference of the rates, root mean square over all joints; at the cheapest of a few speeds.
     """
     scale = 0.5 / (spread**2 * len(JOINTS))
     total = np.zeros((len(before.joints), len(after.joints)))

@@ -7,7 +7,6 @@ the posterior of the whole clip: the backward messages of the later frames weigh
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -25,8 +24,7 @@ MAX_KERNEL_COST = 80.0  # of a step: beyond it the likelihood would be 0, and so
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FrameStates:
+class FrameStates(NamedTuple):
     """The costs, parents and weights of a frame's states, by the frames so far."""
 
     totals: Array  # (n,) costs of the likeliest path to each

@@ -88,12 +88,8 @@ class ExemplarTracker:
         self.step = beams.Step.of(task, spread)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
-        self.ahead = min(math.ceil(FILTER_REACH * self.smoothing), lag)  # frames of the lag that are only for smoothing
-        self.lag, self.delay, self.evaluations = (
-            lag,
-            lag - self.ahead,
-            float(task.evaluations),
-        )  # the last two of the beam
+        self.lag, self.ahead = lag, min(math.ceil(FILTER_REACH * self.smoothing), lag)  # the latter for smoothing alone
+        self.delay, self.evaluations = lag - self.ahead, float(task.evaluations)  # of the beam
         self.sampling = markov.Sampling(samples, temperature / posterior_temperature)
         self.hypotheses: hypotheses.HypothesisFilter | None = None
         share = FIT_SHARE * task.evaluations
@@ -115,12 +111,11 @@ class ExemplarTracker:
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame on the likeliest path of the beam."""
-        sampled = self.hypotheses is None and self.sampling.paths > 0
-        rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else rng
+        rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else None
         for window in markov.windows(self._beams(observations, rng), self.delay):
             start, frame, states = clocks(), window[0], [frame.states for frame in window]
             estimate = self._estimated(frame, markov.viterbi_state(states), markov.state_weights(states))
-            if sampled:
+            if sampler is not None and self.sampling.paths:
                 rows = markov.sample_states(states, rows, self.sampling, sampler)
                 poses, places = self._poses(frame.beam)[rows], frame.beam.places[rows]
                 paths = markov.SampledPaths.of(self.task.body.skeleton, poses, places, estimate.pose)
@@ -135,9 +130,8 @@ class ExemplarTracker:
             start, frame_costs = clocks(), FrameCosts(self.task, observation)
             before = None if latest is None else latest.beam
             beam, costs, evaluations = self._candidates(frame_costs, before, number % interval == 0, rng)
-            if latest is None:
-                states = markov.frame_states(costs)
-            else:
+            states = markov.frame_states(costs)
+            if latest is not None:
                 known = frame_costs.root, frame_costs.camera_position
                 steps = beams.transition_costs(self.exemplars, latest.beam, beam, self.step, *known)
                 states = markov.frame_states(costs, latest.states, steps)
