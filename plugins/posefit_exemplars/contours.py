@@ -57,10 +57,9 @@ class FrameContours(NamedTuple):
     def fitted(
         self, task: Task, poses: Array, places: Array, means: Array, precisions: Array, reaches: Sequence[float]
     ) -> tuple[Array, Array]:
-        """Return poses (n, 66) and places (n, 3) after a step for each of `reaches`.
+        """Return poses (n, 66) and places (n, 3) after a step for each of `reaches`; see `step_poses`.
 
-        A distance of contours counts less beyond that many metres. An angle is pulled to its mean, of `means` (n, 66),
-        and the place to where it was, with `precisions` (69,): of the place, then of the angles.
+        Angles are pulled to `means` (n, 66), places to where they were, with `precisions` (69,) of places and angles.
         """
         free = task.body.skeleton.free
         precisions = np.where(np.append([True] * 3, free), precisions, RIGID)

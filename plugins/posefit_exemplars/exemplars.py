@@ -1,7 +1,4 @@
-"""The states of the model: poses of clips, with what came after each of them, and groups of similar poses.
-
-Poses are compared by codes: a few numbers a pose.
-"""
+"""The states of the model: poses of clips, what came after each of them, and codes by which they are compared."""
 
 import hashlib
 from collections.abc import Iterable, Sequence
@@ -128,7 +125,6 @@ class Exemplars:
         for motion in motions:
             if len(motion) < 2:
                 raise InputError(f"{motion.name} must have at least 2 frames to be followed, got 1")
-
         joints = [facing_joints(skeleton, motion.poses) for motion in motions]
         if mirrored:
             joints += [facing_joints(skeleton, mirror_image(motion).poses) for motion in motions]
@@ -189,10 +185,6 @@ class Exemplars:
         ends = np.cumsum(np.sqrt(sizes))
         group = np.minimum(np.searchsorted(ends, rng.uniform(0.0, ends[-1], count), "right"), len(sizes) - 1)
         return self.members[self.starts[group] + (rng.random(count) * sizes[group]).astype(np.int64)]
-
-    def group_members(self, group: int) -> Rows:
-        """Return the poses of a group."""
-        return self.members[self.starts[group] : self.starts[group + 1]]
 
     def nearest(self, poses: Array, count: int) -> tuple[Rows, Codes]:
         """Return the states nearest to `poses` (n, 66) in the groups near them; see `kernels.nearest_codes`."""

@@ -79,10 +79,7 @@ class FrameCosts:
         return np.concatenate([reflected_poses(self.skeleton, poses, facing(view, place)) for view in self._views])
 
     def mirror_costs(self, pose: Array, place: Array) -> Array:
-        """Return the costs (1 + cameras,) of a pose's mirror image, and of its reflection along each line of sight.
-
-        Where roots are aligned, these are as far from the reported place as from the pose's own aligned place.
-        """
+        """Return the costs (1 + cameras,) of a pose's mirror image, and of its reflection along each line of sight."""
         poses = pose[None]
         poses = np.concatenate([poses, mirrored_poses(self.skeleton, poses), self.reflected(poses, place)])
         places = self.aligned(poses, np.repeat(place[None], len(poses), axis=0))

@@ -122,10 +122,7 @@ def step_costs(spread: float, before: Hypotheses, after: Hypotheses) -> Array:
 
 
 class HypothesisFilter:
-    """Fits the hypotheses of one frame after the other, and reports the likeliest sequence `delay` frames later.
-
-    `evaluations` of a frame decide how many there are; `temperature` and `sampling` are those of the path.
-    """
+    """Fits the hypotheses of one frame after the other, and reports the likeliest sequence `delay` frames later."""
 
     def __init__(
         self,

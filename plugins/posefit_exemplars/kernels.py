@@ -49,10 +49,7 @@ def frames_apart(codes, min_square):
 
 @jit
 def nearest_codes(codes, groups, tiles, count):
-    """Return the states in `groups` (n, g) nearest to codes (n, D), and squared distances, both (n, count), in order.
-
-    Where there are fewer states, squared distances are infinite.
-    """
+    """Return the states in `groups` (n, g) nearest to codes (n, D), and squared distances (or inf), both (n, count)."""
     squares = np.full((len(codes), count), np.inf, np.float32)
     states = np.zeros((len(codes), count), np.int64)
     distances = np.empty(LANES, np.float32)
@@ -75,9 +72,8 @@ def nearest_codes(codes, groups, tiles, count):
 def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit):
     """Return the states that some `rows` of a beam continue to, the row of each one's cheapest step, and its total.
 
-    The clips of the beam's states continue at `codes` (speeds, n, D), each of which costs `start_costs` (speeds, n).
-    A step to a state costs its squared distance times `scale`, at the cheapest speed. Row i continues to the states in
-    `groups` (n, g), where its total (n,) with the step is below `limit`.
+    Row i continues at `codes` (speeds, n, D), which cost `start_costs` (speeds, n); a step to a state in its `groups`
+    (n, g) costs the squared distance times `scale`, at the cheapest speed. Totals (n,) with a step are below `limit`.
     """
     best = np.full(len(tiles.states), np.inf)
     parents, reached = np.empty(len(best), np.int64), np.empty(len(best), np.int64)

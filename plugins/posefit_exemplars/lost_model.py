@@ -1,8 +1,7 @@
 """How far a frame can be trusted: its calibrated posterior, and the probabilities that it is lost or exchanged.
 
-The calibration is fitted on the people of the library, each followed without their own clips. The error of a pose
-depends on the cost of the silhouette, the spread of the sampled tracks and the number of cameras: they give the
-expected error of the frame, in metres, and standard deviations of joints and angles are multiples of it.
+The error of a pose depends on the cost of the silhouette, the spread of the sampled tracks and the number of cameras:
+they give a frame's expected error, in metres; standard deviations of joints and angles are multiples of it.
 
 The probabilities are those of two logistic models of the same evidence: what the pose costs, the cost ratios of its
 mirrored and reflected poses, the spread of the sampled tracks, how many of them have the other side, whether the person
@@ -30,8 +29,7 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, second_side
 from posefit_exemplars.frame_costs import FrameCosts
 
-MIN_COST = 0.1  # per cent
-MIN_SPREAD = 0.002  # metres
+MIN_COST, MIN_SPREAD = 0.1, 0.002  # per cent, and metres
 MAX_LOG_ODDS = 30.0  # logarithm
 LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
 MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known

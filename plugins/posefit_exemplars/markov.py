@@ -142,10 +142,7 @@ class SampledPaths(NamedTuple):
         return cls(poses, places, (distances**2).mean(axis=1) <= MODE_DISTANCE**2)
 
     def about(self, pose: Array, place: Array) -> Posterior:
-        """Return the posterior in which the mean of the paths similar to the likeliest is the reported pose.
-
-        Refinement is relative to the likeliest path; for other paths it is unknown.
-        """
+        """Return the posterior in which the mean of the paths similar to the likeliest is the reported pose."""
         poses, places = self.poses.copy(), self.places.copy()
         if self.similar.any():
             differences = wrapped(poses[self.similar] - pose)

@@ -36,10 +36,7 @@ class Estimate:
 
 
 def smoothed(estimates: Iterable[Estimate], spread: float, ahead: int) -> Iterator[Frame]:
-    """Yield each frame as the weighted mean of those up to `ahead` before and after it, `ahead` frames later.
-
-    `spread` is the standard deviation of the weights, in frames; 0 leaves everything as it is.
-    """
+    """Yield each frame as a mean of those up to `ahead` before and after it; the weights `spread` over some frames."""
     before: deque[Estimate] = deque(maxlen=ahead)
     for window in windows(estimates, ahead):
         yield _frame([*before, *window], len(before), spread)

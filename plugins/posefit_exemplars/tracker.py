@@ -191,7 +191,8 @@ class ExemplarTracker:
         yaws = middle + rng.uniform(-reach, reach, drawn)
         beam = self._placed(frame_costs, self._started(states, yaws, before), False)
         best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[:group_count]
-        groups = [self.exemplars.group_members(self.exemplars.groups[states[row]]) for row in best]
+        members, starts = self.exemplars.members, self.exemplars.starts
+        groups = [members[starts[group] : starts[group + 1]] for group in self.exemplars.groups[states[best]]]
         poses = [rows if len(rows) <= GROUP_POSES else rng.choice(rows, GROUP_POSES, replace=False) for rows in groups]
         yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
         return self._started(np.concatenate(poses), yaws, before), len(beam)

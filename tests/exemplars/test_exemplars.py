@@ -47,7 +47,7 @@ def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> Non
     away = np.linalg.norm(two.codes[:, None] - two.codes[two.centres], axis=-1)
     np.testing.assert_allclose(away[np.arange(len(two)), two.groups], away.min(axis=1), atol=1e-6)
     for group in range(len(two.centres)):
-        assert (two.groups[two.group_members(group)] == group).all()
+        assert (two.groups[two.members[two.starts[group] : two.starts[group + 1]]] == group).all()
 
 
 def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
