@@ -29,7 +29,7 @@ from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE
 from posefit.suites.problem import EVALUATIONS, Infeasible, Problem, suite
 
 if TYPE_CHECKING:
-    from ioh.problem import RealSingleObjective
+    from ioh import problem as problems
     from nevergrad.benchmark.xpbase import Experiment
     from nevergrad.functions import ExperimentFunction
     from optunahub.benchmarks import BaseProblem
@@ -39,20 +39,20 @@ FIRST_IOH_ID = 26_300  # function 1 of posefit-2026.3 is 26301: none of IOHexper
 OPTIMISERS = ("CMA", "OnePlusOne", "PSO", "RandomSearch", "TwoPointsDE")  # of the plan, by Nevergrad's names
 
 
-def ioh_problem(problem: Problem) -> "RealSingleObjective":
+def ioh_problem(problem: Problem) -> "problems.RealSingleObjective":
     """Return a problem of IOHexperimenter with the number, instance, bounds and, where known, the optimum.
 
     Its count is the problem's, whose budget holds here too, and its `reset` resets both. J. de Nobel et al.,
     IOHexperimenter: benchmarking platform for iterative optimization heuristics, Evolutionary Computation 32(3), 2024.
     """
+    from ioh import problem as problems
     from ioh.iohcpp import RealBounds, RealSolution
-    from ioh.problem import RealSingleObjective
 
     d, name = problem.dimension, f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
     unknown = problem.optimum is None
     optimum = RealSolution([], np.nan) if unknown else RealSolution(problem.made.truth, problem.truth_cost)
 
-    class IOHProblem(RealSingleObjective):
+    class IOHProblem(problems.RealSingleObjective):
         def __init__(self) -> None:
             super().__init__(name, d, problem.instance, bounds=RealBounds(d, -1.0, 1.0), optimum=optimum)
             self.set_id(FIRST_IOH_ID + problem.id_function)

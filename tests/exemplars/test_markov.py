@@ -6,27 +6,17 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit_exemplars.beam import Beam
+from posefit_exemplars.markov import FrameStates, SampledPaths, frame_states, mean_near, state_weights
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
-from posefit_exemplars.window import (
-    SIMILAR,
-    FrameStates,
-    SampledPaths,
-    frame_states,
-    mean_near,
-    squares_apart,
-    state_weights,
-)
+from posefit_exemplars.tracker import SIMILAR_DISTANCE, state_distances
 from tests.cases import each
 
 
-def window(fits: list[list[float]], steps: list[Array]) -> list[FrameStates[Beam]]:
-    """Return frames with these costs of fit, joined by these costs of steps."""
-    frames: list[FrameStates[Beam]] = []
-    for k, fit in enumerate(fits):
-        many = len(fit)
-        beam = Beam(np.arange(many), np.zeros(many), np.full(many, -1), np.zeros(many), np.zeros((many, 3)))
-        frames.append(frame_states(beam, np.array(fit), frames[-1] if k else None, steps[k - 1] if k else None))
+def window(costs: list[list[float]], steps: list[Array]) -> list[FrameStates]:
+    """Return frames whose states cost so much, joined by these costs of steps."""
+    frames: list[FrameStates] = []
+    for k, of_frame in enumerate(costs):
+        frames.append(frame_states(np.array(of_frame), frames[-1] if k else None, steps[k - 1] if k else None))
     return frames
 
 
@@ -42,13 +32,13 @@ def test_the_mean_is_of_states_similar_to_the_path() -> None:
     poses = np.zeros((3, 66))
     poses[:, 5] = [0.0, 0.1, 2.0]
     places = np.array([[0.0, 1.0, 0.0], [0.3, 1.0, 0.0], [9.0, 9.0, 9.0]])
-    codes = np.array([[0.0], [SIMILAR], [100.0]], dtype=np.float32)
-    pose, place = mean_near(0, np.array([0.2, 0.4, 0.4]), squares_apart(codes, codes[0], np.zeros(3)), poses, places)
+    codes = np.array([[0.0], [SIMILAR_DISTANCE], [100.0]], dtype=np.float32)
+    pose, place = mean_near(0, np.array([0.2, 0.4, 0.4]), state_distances(codes, codes[0], np.zeros(3)), poses, places)
     share = 0.4 * np.exp(-0.5) / (0.2 + 0.4 * np.exp(-0.5))
     assert pose[5] == pytest.approx(0.1 * share)
     np.testing.assert_allclose(place, [0.3 * share, 1.0, 0.0])
     # a state on the path counts even where it has no weight
-    pose, place = mean_near(2, np.array([0.5, 0.5, 0.0]), squares_apart(codes, codes[2], np.zeros(3)), poses, places)
+    pose, place = mean_near(2, np.array([0.5, 0.5, 0.0]), state_distances(codes, codes[2], np.zeros(3)), poses, places)
     np.testing.assert_allclose([*pose, *place], [*poses[2], *places[2]])
 
 
@@ -56,7 +46,7 @@ def test_a_mean_of_yaws_goes_the_short_way_round() -> None:
     poses = np.zeros((2, 66))
     poses[:, 0] = np.radians([179.0, -179.0])
     codes, places = np.zeros((2, 1), dtype=np.float32), np.zeros((2, 3))
-    squares = squares_apart(codes, codes[0], poses[:, 0] - poses[0, 0])
+    squares = state_distances(codes, codes[0], poses[:, 0] - poses[0, 0])
     pose, _ = mean_near(0, np.array([0.5, 0.5]), squares, poses, places)
     other = np.exp(-0.5 * 0.1**2)  # two degrees away, a tenth of a standard deviation
     assert np.degrees(pose[0]) == pytest.approx(179.0 + 2.0 * other / (1.0 + other))
@@ -77,7 +67,7 @@ def test_sampled_paths_similar_to_the_likeliest_are_moved_to_the_reported_pose()
     np.testing.assert_array_equal(far.poses, poses)
 
 
-class Look:
+class Costs:
     """A frame whose cost is where the pose is, for nothing."""
 
     usable = True
@@ -85,12 +75,12 @@ class Look:
     def __init__(self, root: Array | None = None) -> None:
         self.root = root
 
-    def measured(self, pose: Array, place: Array) -> tuple[float, Array]:
+    def cost_and_areas(self, pose: Array, place: Array) -> tuple[float, Array]:
         return float(place[0]), np.zeros((1, 3), dtype=np.int64)
 
 
-def estimate(pose: Array, place: Array, look: Any = None) -> Estimate:
-    return Estimate(pose, place, look or Look(), 10.4, 0.5, 0.25)
+def estimate(pose: Array, place: Array, frame_costs: Any = None) -> Estimate:
+    return Estimate(pose, place, frame_costs or Costs(), np.array([10.4, 0.5, 0.25]))
 
 
 def steady(k: float) -> Estimate:
@@ -133,7 +123,7 @@ def test_the_weights_are_gaussian() -> None:
 
 def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> None:
     rng = np.random.default_rng(0)
-    rough = [estimate(rng.normal(size=66), rng.normal(size=3), Look(np.zeros(3))) for _ in range(6)]
+    rough = [estimate(rng.normal(size=66), rng.normal(size=3), Costs(np.zeros(3))) for _ in range(6)]
     for spread, ahead in ((2.0, 0), (0.0, 3), (2.0, 2)):
         for before, frame in zip(rough, smoothed(rough, spread, ahead), strict=True):
             np.testing.assert_array_equal(frame.translation, before.place)
