@@ -10,7 +10,7 @@ models knows what the person does: walking, arms held out, jumping jacks, jumps,
 - 6: `measurement`, what cameras measure of a state (6.1), and `imm`, the filter.
 - 7 to 9: `switching`, when a group comes into force and when it ends.
 
-`tracker` is `vsmm`, from its settings to a frame; `joined` leads a swarm by the models.
+`tracker` is `vsmm`, from its settings to a frame; `search` is that of `sapso+vsmm`, in every frame.
 
 >>> import posefit
 >>> track = posefit.track("jacks", method="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0)
@@ -25,8 +25,7 @@ from posefit.hooks import RegisterTracker
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `vsmm` and `sapso+vsmm`."""
-    from posefit_vsmm.joined import joined
-    from posefit_vsmm.tracker import VSMM
+    from posefit_vsmm.tracker import VSMM, swarm_led_by_models
 
     register("vsmm", VSMM)
-    register("sapso+vsmm", joined)
+    register("sapso+vsmm", swarm_led_by_models)

@@ -3,15 +3,15 @@
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.check import choices, positive
-from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.registry import registry
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
@@ -19,11 +19,9 @@ from posefit_vsmm.joints import JointFilter
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, DependentJoints, decode, encode, free_errors, minus, plus
+from posefit_vsmm.search import Search, aligned_costs
+from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, decode, encode, free_errors, minus, plus
 from posefit_vsmm.switching import Structure, Switching
-
-if TYPE_CHECKING:
-    from posefit_vsmm.joined import Search
 
 # The first pose: typical poses at several yaws, then draws around the best so far
 YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # where the yaw is about known
@@ -41,16 +39,6 @@ LOST_FRAMES = 8
 MISSING_FRAMES = 2  # after these a limb that is not detected, while an end point is unassigned, is sought all around
 MISSING_DEVIATION = np.radians(15.0)  # that each of its joints then gains a frame
 _LIMBS = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}  # bones whose turns a limb's end depends on
-
-
-def aligned_costs(
-    task: Task, observation: Observation, dependent: DependentJoints, states: Array
-) -> tuple[Array, Array]:
-    """Return the costs (n,) of states (n, 43) in an observation, and the states, moved to where they fit it."""
-    poses, places = decode(states, dependent)
-    scene, known = (task.body, task.cameras, observation.silhouettes), observation.translation
-    places = align(*scene, poses, places) if known is None else np.tile(known, (len(states), 1))
-    return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
 
 
 @final
@@ -218,7 +206,7 @@ class VSMM:
     """
 
     task: Task
-    search: "Search | None" = None
+    search: Search | None = None
     _: KW_ONLY
     variant: Literal["default", "patent"] = "default"
     structure: Structure = "variable"
@@ -240,3 +228,14 @@ class VSMM:
         track_filter = TrackFilter(self, rng)
         for observation in observations:
             yield track_filter.frame(observation)
+
+
+def swarm_led_by_models(task: Task, *, optimiser: str = "sapso", weight: float = 0.25) -> VSMM:
+    """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
+
+    Settings:
+        optimiser: name of any registered one, with its own defaults.
+        weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
+    """
+    positive("weight", weight)
+    return VSMM(task, Search(task, library().dependent, registry().optimiser(optimiser), weight))

@@ -22,11 +22,11 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
 from posefit_vsmm.groups import most_probable, read_topology
-from posefit_vsmm.joined import Search, joined
 from posefit_vsmm.motion import library as library_of_models
+from posefit_vsmm.search import Search
 from posefit_vsmm.state import decode, encode, plus
 from posefit_vsmm.switching import Switching
-from posefit_vsmm.tracker import MAX_BLIND_FRAMES, VSMM
+from posefit_vsmm.tracker import MAX_BLIND_FRAMES, VSMM, swarm_led_by_models
 from tests.cases import each
 
 SIZE = (200, 240)
@@ -67,7 +67,7 @@ def iou(frames: list[Frame]) -> np.ndarray:
 
 
 @pytest.mark.slow
-@each("factory", [VSMM, joined])
+@each("factory", [VSMM, swarm_led_by_models])
 def test_it_keeps_the_rules_of_a_tracker(factory: Any) -> None:
     result = check_tracker(factory)
     assert result, str(result)
@@ -90,7 +90,7 @@ def test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it
         spaces.append(space)
         return registry().optimiser("random")(space, rng)
 
-    search = Search(task, dependent, factory, 16, 0.25)
+    search = Search(task, dependent, factory, 0.25)
     search.best(state, spread, observations[0], 200, np.random.default_rng(0))
     # 3.5 deviations to either side, of the filter's and 4 degrees more
     yaw, pitch, roll = 3.5 * np.hypot([0.5, 0.3, 0.7], np.radians(4.0))
@@ -145,7 +145,7 @@ def test_nothing_is_ever_seen() -> None:
     assert all(frame.evaluations == 0 for frame in frames)
 
 
-@pytest.mark.parametrize("factory", [VSMM, pytest.param(joined, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("factory", [VSMM, pytest.param(swarm_led_by_models, marks=pytest.mark.slow)])
 def test_what_is_no_person_is_no_reason_to_fail(factory: Any) -> None:
     task, observations = seen(frames=24)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -198,7 +198,7 @@ def test_an_activity_is_as_probable_as_its_models_together() -> None:
         ("vsmm", "groups=no.toml", "no.toml: expected a file of groups, got none"),
         ("vsmm", "models=no.json", "no.json: expected motion models as make_models.py writes them"),
         ("vsmm:letter", "structure=all", "variant must be one of default, patent, got 'letter'"),
-        ("sapso+vsmm", "dimensions=0", "dimensions must be"),
+        ("sapso+vsmm", "weight=0", "weight must be"),
         ("sapso+vsmm", "optimiser=spaso", "optimiser must be"),
     ],
 )

@@ -1,4 +1,4 @@
-"""`sapso+vsmm`: the motion models of `vsmm` predict where a swarm starts, and learn from what it finds."""
+"""A search around what the filter holds: its models predict where a swarm starts, and learn from its result."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -8,19 +8,17 @@ import numpy as np
 from posefit import settings as of_plugins
 from posefit.arrays import Array
 from posefit.fitting.box import Start
-from posefit.fitting.check import at_least, positive
 from posefit.fitting.optimiser import OptimiserFactory, minimise
 from posefit.fitting.prior import Components
-from posefit.fitting.problem import PoseProblem
+from posefit.fitting.problem import PoseProblem, align
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.rotation import wrapped
-from posefit.registry import registry
+from posefit.silhouette.cost import pose_costs
 from posefit_vsmm.imm import Measure, Measurement
-from posefit_vsmm.motion import library
 from posefit_vsmm.state import ERROR, FIRST_BONE, DependentJoints, decode, encode, free_errors, minus, plus
-from posefit_vsmm.tracker import VSMM, aligned_costs
 
+DIRECTIONS = 16  # that are searched beside the root: those in which the filter is least certain
 STEP = 0.05  # radians to either side, from which a direction's angles are differentiated
 MIN_BUDGET = 80  # evaluations; with fewer, the filter's own pose is as good
 REACH = 3.5  # deviations to either side
@@ -71,7 +69,6 @@ class Search:
     task: Task
     dependent: DependentJoints
     factory: OptimiserFactory = field(repr=False)
-    dimensions: int
     weight: float  # of a silhouette's cost in a model's log-likelihood
 
     def log_likelihoods(self, states: Array, observation: Observation) -> Array:
@@ -86,7 +83,7 @@ class Search:
             return None
         poses, places = decode(state[None], self.dependent)
         around = spread + np.diag((ADDED_DEVIATIONS * free_errors(self.task.body.skeleton)) ** 2)
-        prior = Directions.of(state, around, self.dependent, self.dimensions)
+        prior = Directions.of(state, around, self.dependent, DIRECTIONS)
         root = np.maximum(np.sqrt(np.diag(around)[YAW_PITCH_ROLL]), MIN_ROOT_DEVIATIONS)
         space = SearchSpace(prior, poses[0, :3], REACH * root, places[0], self.task.translation)
         zeros = np.zeros(space.dimensions)
@@ -111,18 +108,11 @@ class Search:
         return SearchResult(pose[0], best.evaluations, measure)
 
 
-def joined(
-    task: Task, *, optimiser: str = "sapso", dimensions: int = 16, weight: float = 0.25, groups: str = ""
-) -> VSMM:
-    """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
-
-    Settings:
-        optimiser: name of any registered one, with its own defaults.
-        dimensions: directions that it searches beside the root, 1 or more; those in which the filter is least certain.
-        weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
-        groups: path of a TOML file of groups and neighbours; "" is the package's own. VSMM step 4, Interpretation V1.
-    """
-    at_least("dimensions", dimensions, 1)
-    positive("weight", weight)
-    search = Search(task, library().dependent, registry().optimiser(optimiser), dimensions, weight)
-    return VSMM(task, search, groups=groups)
+def aligned_costs(
+    task: Task, observation: Observation, dependent: DependentJoints, states: Array
+) -> tuple[Array, Array]:
+    """Return the costs (n,) of states (n, 43) in an observation, and the states, moved to where they fit it."""
+    poses, places = decode(states, dependent)
+    scene, known = (task.body, task.cameras, observation.silhouettes), observation.translation
+    places = align(*scene, poses, places) if known is None else np.tile(known, (len(states), 1))
+    return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
