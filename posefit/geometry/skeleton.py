@@ -164,5 +164,5 @@ class Skeleton:
         if where.shape != (*lead, 3):
             raise InputError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
         flat = writeable(poses.reshape(-1, ANGLES))
-        positions = kernels.joint_positions(kernels.kinematics(), self.chain, flat, writeable(where.reshape(-1, 3)))
+        positions = kernels.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)
