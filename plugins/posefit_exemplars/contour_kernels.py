@@ -45,11 +45,9 @@ def _solve(matrix, vector):
 
 @jit
 def fit_poses(
-    kinematics,
     parents,
     angles,
     turns,
-    turned,
     offsets,
     radii,
     rotations,
@@ -71,28 +69,28 @@ def fit_poses(
 ):
     """Move poses (n, 66) at `places` (n, 3) by a step for each of `reaches`, metres, towards the contours of all views.
 
-    First come the address of `place_lanes` and the fields of `Chain`, then radii, cameras, and the fields of
+    First come the fields of `Chain`, then radii, cameras, and the fields of
     `FrameContours`. Angles are pulled to `means` (n, 66), and places to where they were, with `precisions` (69,), of a
     place and a pose; no angle turns by more than `most` a step.
     """
-    chain = Chain(parents, angles, turns, turned, offsets)
-    frames = np.empty((parents.size + 1, 4, 3))
-    sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
+    chain = Chain(parents, angles, turns, offsets)
+    frames = np.empty((1, parents.size + 1, 4, 3))
+    sines, cosines = np.empty((1, ANGLES)), np.empty((1, ANGLES))
     curves, forces = np.empty((parents.size + 1, 6, 6)), np.empty((parents.size + 1, 6, 1))
     screws, matrix, slopes = np.empty((NUMBERS, 6)), np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, 1))
     grown = np.empty((0, parents.size + 1, 3)), np.empty((0, parents.size, 2)), np.zeros((1, 1))
     for n in range(poses.shape[0]):
         start = places[n].copy()
         for reach in reaches:
-            place_frames(kinematics, chain, poses[n : n + 1], places[n : n + 1], sines, cosines, frames)
+            place_frames(chain, poses[n : n + 1], places[n : n + 1], sines, cosines, frames)
             forces[:] = 0.0
             curves[:] = 0.0
             for v in range(len(steps)):
                 if starts[v] < starts[v + 1]:
                     camera = rotations[v], translations[v], focals[v], centres[v]
                     contour = fields[v], corners[v], sizes[v], points[starts[v] : starts[v + 1]], steps[v]
-                    add_view(chain.parents, radii, camera, frames, contour, reach, grown, curves, forces)
-            write_screws(chain, frames, sines, cosines, screws)
+                    add_view(chain.parents, radii, camera, frames[0], contour, reach, grown, (curves, forces))
+            write_screws(chain, frames[0], sines[0], cosines[0], screws)
             screws[precisions >= RIGID] = 0.0
             add_bones(chain, screws, curves, forces, matrix, slopes)
             for a in range(NUMBERS):

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES
 from posefit.tracking.smoothing.contours import Distances, MaskContours
 from posefit_exemplars import contour_kernels
@@ -65,7 +64,6 @@ class FrameContours:
         precisions = np.where(np.append([True] * 3, free), precisions, contour_kernels.RIGID)
         moved, places = poses.copy(), places.copy()
         contour_kernels.fit_poses(
-            kinematics(),
             *task.body.skeleton.chain,
             task.body.radii,
             *self.cameras,

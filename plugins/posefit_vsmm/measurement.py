@@ -14,7 +14,6 @@ from posefit.arrays import Array
 from posefit.fitting.landmarks import DEVIATION, GROUPS, MIRRORED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics, place_frames
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
 from posefit_vsmm.imm import Measurement
 from posefit_vsmm.joints import OWN, Lines, detected, rule_errors
@@ -50,13 +49,11 @@ class Figure:
         matrix, offset = self.reliance.matrix, self.reliance.offset
         pose, chained = np.empty(ANGLES), np.empty(matrix.shape)
         bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
-        sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
-        frames = np.empty((len(JOINTS), 4, 3))
-        place_frames(kinematics(), self.skeleton.chain, pose[None], state[None, :3], sines, cosines, frames)
+        frames, (sines,), (cosines,) = self.skeleton.frames(pose[None], state[None, :3])
         count = len(POINTS)
         points, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
         others = np.empty((count, 3, len(offset)))
-        points_and_jacobian(sines, cosines, frames, frames[:, 3].copy(), points, jacobian, others)
+        points_and_jacobian(sines, cosines, frames[0], frames[0, :, 3].copy(), points, jacobian, others)
         jacobian[:, :, FIRST_BONE:] += (others.reshape(-1, len(offset)) @ chained).reshape(count, 3, -1)
         return points, jacobian
 

@@ -2,8 +2,7 @@
 
 LANES poses are moved at a time, side by side in vector registers. All numbers of them are in one flat array, LANES of a
 kind after those of another: offsets known to the compiler are what lets it see that loops over lanes may run in
-registers. A loop whose places it does not know runs there only if it is long enough: so bones are moved in rows of all
-three coordinates of all lanes.
+registers. Of rows whose places it does not know it compares the places first, and only for loops of 16 and more.
 """
 
 from typing import NamedTuple
@@ -13,24 +12,21 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, inlined, jit
 
-LANES = 8  # poses side by side: with more, a call for a few poses takes longer
-_ROW = 3 * LANES  # three coordinates of LANES poses
+LANES = 16  # poses side by side: the fewest that bones are moved for in vector registers
 
 # pi in two parts, so that angles of many turns keep their digits; then Taylor's coefficients on [-pi/2, pi/2],
 # where the first term left out is below 1e-10.
 PI_HIGH, PI_LOW = 3.141592653589793, 1.2246467991473532e-16
 
-# Where rows of lanes begin: angles; their sines and cosines; the same again for three coordinates, with those of three
-# angles more, which are always 0; a matrix (3, 4) from the world to the frame that joints are placed in; bones (26, 3)
-# in their own frames; frames (27, 4) of joints, three axes and a place each; and X, Y and Z of these places.
+# Where rows of lanes begin: angles; their sines and cosines, and those of three angles more that are always 0; a matrix
+# (3, 4) from the world to the frame that joints are placed in; bones (26, 3) in their own frames; frames (27, 4, 3) of
+# joints, three axes and a place each; and these places once more, each coordinate of all 27 in turn.
 _ANGLES, _BONES, _JOINTS = 66, 26, 27
-_ANGLE, _SINE, _COSINE = (kind * _ANGLES * LANES for kind in range(3))
-_SINES = 3 * _ANGLES * LANES
-_COSINES = _SINES + (_ANGLES + 3) * _ROW
-_VIEW = _COSINES + (_ANGLES + 3) * _ROW
-_OFFSETS = _VIEW + 4 * _ROW
-_FRAMES = _OFFSETS + 3 * _BONES * _ROW
-X, Y, Z = (_FRAMES + 4 * _JOINTS * _ROW + i * _JOINTS * LANES for i in range(3))
+_ANGLE, _SINE, _COSINE = (kind * (_ANGLES + 3) * LANES for kind in range(3))
+_VIEW = _COSINE + (_ANGLES + 3) * LANES
+_OFFSETS = _VIEW + 12 * LANES
+_FRAMES = _OFFSETS + 3 * _BONES * LANES
+X, Y, Z = (_FRAMES + (12 + i) * _JOINTS * LANES for i in range(3))
 _END = Z + _JOINTS * LANES
 NATURAL = 0x7FFFFFFF  # an index that is provably not negative needs no check whether it counts from the end
 
@@ -96,8 +92,8 @@ def empty_lanes():
     lanes = np.empty(_END)
     for k in range(12 * LANES):
         lanes[_VIEW + k] = 1.0 if k // LANES % 5 == 0 else 0.0
-    for k in range(3 * _ROW):
-        lanes[_SINES + _ANGLES * _ROW + k], lanes[_COSINES + _ANGLES * _ROW + k] = 0.0, 1.0
+    for k in range(3 * LANES):
+        lanes[_SINE + _ANGLES * LANES + k], lanes[_COSINE + _ANGLES * LANES + k] = 0.0, 1.0
     return lanes
 
 
@@ -117,9 +113,8 @@ def set_offsets(lanes, first, stop, offsets):
     """Give some lanes the bones of a body (26, 3)."""
     for b in range(offsets.shape[0]):  # numbers known to the compiler would have it write out every turn
         for i in range(offsets.shape[1]):
-            for c in range(offsets.shape[1]):
-                for lane in range(first, stop):
-                    lanes[_OFFSETS + _ROW * (3 * b + i) + LANES * c + lane] = offsets[b, i]
+            for lane in range(first, stop):
+                lanes[_OFFSETS + LANES * (3 * b + i) + lane] = offsets[b, i]
 
 
 @inlined
@@ -136,9 +131,9 @@ def place_roots(places, rows, lanes):
             at, to = _VIEW + 4 * LANES * i + k, _FRAMES + LANES * i + k
             a, b, c = lanes[at], lanes[at + LANES], lanes[at + 2 * LANES]
             lanes[to] = a * ux + b * uy + c * uz
-            lanes[to + _ROW] = a * vx + b * vy + c * vz
-            lanes[to + 2 * _ROW] = a * wx + b * wy + c * wz
-            lanes[to + 3 * _ROW] = a * x + b * y + c * z + lanes[at + 3 * LANES]
+            lanes[to + 3 * LANES] = a * vx + b * vy + c * vz
+            lanes[to + 2 * 3 * LANES] = a * wx + b * wy + c * wz
+            lanes[to + 3 * 3 * LANES] = a * x + b * y + c * z + lanes[at + 3 * LANES]
 
 
 @inlined
@@ -151,19 +146,21 @@ def place_bones(chain, lanes):
         xx, xy, xz = turns[b, 0, 0], turns[b, 0, 1], turns[b, 0, 2]
         yx, yy, yz = turns[b, 1, 0], turns[b, 1, 1], turns[b, 1, 2]
         zx, zy, zz = turns[b, 2, 0], turns[b, 2, 1], turns[b, 2, 2]
-        start, end = (_FRAMES + 4 * _ROW * parents[b]) & NATURAL, (_FRAMES + 4 * _ROW * (b + 1)) & NATURAL
-        sine, cosine = (_SINES + _ROW * a) & NATURAL, (_COSINES + _ROW * a) & NATURAL
-        offset = (_OFFSETS + 3 * _ROW * b) & NATURAL
-        for k in range(_ROW):
-            x, y, z = lanes[start + k], lanes[start + _ROW + k], lanes[start + 2 * _ROW + k]
-            u, v, w = x * xx + y * yx + z * zx, x * xy + y * yy + z * zy, x * xz + y * yz + z * zz
-            # Rz @ Ry @ Rx
-            u, v = rotated(u, v, lanes[sine + 2 * _ROW + k], lanes[cosine + 2 * _ROW + k])
-            w, u = rotated(w, u, lanes[sine + _ROW + k], lanes[cosine + _ROW + k])
-            v, w = rotated(v, w, lanes[sine + k], lanes[cosine + k])
-            x, y, z = lanes[offset + k], lanes[offset + _ROW + k], lanes[offset + 2 * _ROW + k]
-            lanes[end + k], lanes[end + _ROW + k], lanes[end + 2 * _ROW + k] = u, v, w
-            lanes[end + 3 * _ROW + k] = lanes[start + 3 * _ROW + k] + u * x + v * y + w * z
+        sine, cosine = (_SINE + LANES * a) & NATURAL, (_COSINE + LANES * a) & NATURAL
+        offset = (_OFFSETS + 3 * LANES * b) & NATURAL
+        for i in range(3):
+            start = (_FRAMES + LANES * (12 * parents[b] + i)) & NATURAL
+            end = (_FRAMES + LANES * (12 * b + 12 + i)) & NATURAL
+            for k in range(LANES):
+                x, y, z = lanes[start + k], lanes[start + 3 * LANES + k], lanes[start + 6 * LANES + k]
+                u, v, w = x * xx + y * yx + z * zx, x * xy + y * yy + z * zy, x * xz + y * yz + z * zz
+                # Rz @ Ry @ Rx
+                u, v = rotated(u, v, lanes[sine + 2 * LANES + k], lanes[cosine + 2 * LANES + k])
+                w, u = rotated(w, u, lanes[sine + LANES + k], lanes[cosine + LANES + k])
+                v, w = rotated(v, w, lanes[sine + k], lanes[cosine + k])
+                x, y, z = lanes[offset + k], lanes[offset + LANES + k], lanes[offset + 2 * LANES + k]
+                lanes[end + k], lanes[end + 3 * LANES + k], lanes[end + 6 * LANES + k] = u, v, w
+                lanes[end + 9 * LANES + k] = lanes[start + 9 * LANES + k] + u * x + v * y + w * z
 
 
 @jit
@@ -174,17 +171,14 @@ def place_lanes(chain, poses, places, rows, lanes):
             lanes[_ANGLE + LANES * a + lane] = poses[rows[lane], a]
     for k in range(LANES * _ANGLES):
         lanes[_SINE + k], lanes[_COSINE + k] = sine_cosine(lanes[_ANGLE + k])
-    for a in range(_ANGLES):
-        for i in range(3):
-            for lane in range(LANES):
-                lanes[_SINES + _ROW * a + LANES * i + lane] = lanes[_SINE + LANES * a + lane]
-                lanes[_COSINES + _ROW * a + LANES * i + lane] = lanes[_COSINE + LANES * a + lane]
     place_roots(places, rows, lanes)
     place_bones(chain, lanes)
     for j in range(_JOINTS):
         for i in range(3):
             for lane in range(LANES):
-                lanes[X + LANES * (_JOINTS * i + j) + lane] = lanes[_FRAMES + _ROW * (4 * j + 3) + LANES * i + lane]
+                lanes[X + LANES * (_JOINTS * i + j) + lane] = lanes[
+                    _FRAMES + 3 * LANES * (4 * j + 3) + LANES * i + lane
+                ]
 
 
 @inlined
@@ -212,7 +206,7 @@ def place_frames(chain, poses, places, sines, cosines, frames):
             for j in range(_JOINTS):
                 for k in range(4):
                     for i in range(3):
-                        frames[first + lane, j, k, i] = lanes[_FRAMES + _ROW * (4 * j + k) + LANES * i + lane]
+                        frames[first + lane, j, k, i] = lanes[_FRAMES + 3 * LANES * (4 * j + k) + LANES * i + lane]
 
 
 @inlined

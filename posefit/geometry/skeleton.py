@@ -150,6 +150,16 @@ class Skeleton:
             turns[joint] = axes @ rotation_from_joint_angles(poses[:, first : first + 3]) @ axes.T
         return turns
 
+    def frames(self, poses: Array, translations: Array) -> tuple[Array, Array, Array]:
+        """Return the frames (n, 27, 4, 3) of the joints of poses (n, 66) with their roots at translations (n, 3).
+
+        A frame is three axes and a place. With them come the sines and the cosines (n, 66) of the angles.
+        """
+        frames = np.empty((len(poses), len(JOINTS), 4, 3))
+        sines, cosines = np.empty((len(poses), ANGLES)), np.empty((len(poses), ANGLES))
+        kernels.place_frames(self.chain, writeable(poses), writeable(translations), sines, cosines, frames)
+        return frames, sines, cosines
+
     def joints(self, poses: Array, translations: Array | None = None) -> Array:
         """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).
 

@@ -17,7 +17,6 @@ from posefit.arrays import Array, inlined, jit
 from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, place_lanes, set_offsets, set_view
 from posefit.silhouette.spans import BLOCK, STRIP_PIXELS, set_spans
 
-LISTED = 16  # numbers of blocks that are written at a time
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
 NONE = np.uint64(0)
 _NOWHERE = 1 << 20  # a block or strip beyond every image
@@ -159,23 +158,24 @@ def window(step, k, bounds, lines, keys, strips, stride):
 
 
 @inlined
-def list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride):
-    """Write the blocks to fill of a pose, each one number of place, row and cone; return how many.
+def list_blocks(step, lane, bounds, lines, keys, steps, strips, stride):
+    """Write by how much the number of each block to fill of a pose is above that before it; return how many there are.
 
-    They are listed so many at a time, whether or not a cone has them: a mispredicted branch costs as much as a block.
+    `steps` are _NEXT all through: only where a cone begins is another one written. A loop over the blocks of each cone
+    would end for every cone at another number, and a mispredicted branch costs as much as a block.
     """
-    end = 0
+    end, after = 0, 0
     for b in range(CONES // LANES):
         k = (LANES * b + lane) & NATURAL
         if step == 0 or bounds[_FIRST + k] + 2 * step <= bounds[_LAST + k]:
             if step:
                 window(step, k, bounds, lines, keys, strips, stride)
             count = max(int(bounds[_STOP_BLOCK + k]) - int(bounds[_BLOCK + k]), 0)
-            first, at = keys[k], end & NATURAL
-            for i in range(0, count, LISTED):
-                for more in range(i, i + LISTED):
-                    blocks[at + more] = first + more * _NEXT
+            # that of a cone without blocks is written over by the next cone's
+            steps[end & NATURAL] = keys[k] - after + _NEXT
+            after = keys[k] + count * _NEXT if count > 0 else after
             end += count
+    steps[end & NATURAL] = _NEXT
     return end
 
 
@@ -200,10 +200,10 @@ def columns(spans, lines, j, row):
         x = xq + mq * y if (y >= qa) & (y <= qb) else _NAN
         low = min(low, x)
         high = max(high, x)
-        h = np.sqrt(s0 - (y - y0) * (y - y0))
+        h = math.sqrt(s0 - (y - y0) * (y - y0))
         low = min(low, x0 - h)
         high = max(high, x0 + h)
-        h = np.sqrt(s1 - (y - y1) * (y - y1))
+        h = math.sqrt(s1 - (y - y1) * (y - y1))
         low = min(low, x1 - h)
         high = max(high, x1 + h)
         spans[k] = np.int32(np.ceil(max(low - column, _ZERO)))
@@ -223,7 +223,7 @@ def scratch(strips, words):
         np.empty(5 * ROOM, np.int32),
         np.empty(2 * BLOCK, np.int32),
         np.empty(ROOM, np.int64),
-        np.empty((CONES // LANES) * (2 * words // BLOCK + 1) + LISTED, np.int64),
+        np.full((CONES // LANES) * (2 * words // BLOCK + 1) + 1, _NEXT),
         np.empty(4, np.int64),
     )
     return empty_lanes(), filling, image
@@ -264,11 +264,13 @@ def fill_pose(lane, work):
 
     The lane's outline is used up.
     """
-    _, (_, lines, bounds, spans, keys, blocks, box), image = work
+    _, (_, lines, bounds, spans, keys, steps, box), image = work
     strips, stride = image.shape[0], 2 * image.shape[1]
     for step in range(bounding_box(lane, bounds, box)):
-        for i in range(list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride)):
-            block = blocks[i]
+        block = -_NEXT
+        for i in range(list_blocks(step, lane, bounds, lines, keys, steps, strips, stride)):
+            block += steps[i]
+            steps[i] = _NEXT
             columns(spans, lines, block & (ROOM - 1), np.float32((block & 0xFFFFFFFF) // ROOM))
             set_spans(image, block >> 32, stride, spans)
     return image, box
