@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, Bits, jit
-from posefit.arrays.calling import call
 from posefit.fitting.kernels import move_to_borders, unpack_proposals
-from posefit.geometry.kernels import LANES, empty_lanes, read_joints, set_offsets
+from posefit.geometry.kernels import LANES, empty_lanes, place_lanes, read_joints, set_offsets, set_rows
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
 
@@ -43,16 +42,15 @@ def unpack_scenes(proposals, centres, halves, anchors, first, poses, translation
 
 
 @jit
-def align_scenes(kinematics, chain, scenes, joint_radii, borders, rows, poses, translations):
+def align_scenes(chain, scenes, joint_radii, borders, rows, poses, translations):
     """Move translations (n, k, 3) of some rows to where poses (n, k, 66) fill the borders (n, views, 4)."""
-    many, block, (slots, lanes) = poses.shape[1], np.empty(LANES, np.int64), empty_lanes()
+    many, block, lanes = poses.shape[1], np.empty(LANES, np.int64), empty_lanes()
     joints, origins = np.empty((many, joint_radii.shape[1], 3)), np.zeros((many, 3))
     for i in rows:
         set_offsets(lanes, 0, LANES, scenes.offsets[i])
         for first in range(0, many, LANES):
-            for lane in range(LANES):
-                block[lane] = min(first + lane, many - 1)
-            call(kinematics, (chain, poses[i], origins, block, slots, lanes))
+            set_rows(block, first, many)
+            place_lanes(chain, poses[i], origins, block, lanes)
             for lane in range(min(LANES, many - first)):
                 read_joints(lanes, lane, joints[first + lane])
         move_to_borders(
@@ -68,13 +66,14 @@ def align_scenes(kinematics, chain, scenes, joint_radii, borders, rows, poses, t
 
 
 @jit
-def draw_scenes(kinematics, chain, scenes, width, height, rows, poses, translations, areas, value, pictures):
+def draw_scenes(chain, scenes, rows, poses, translations, areas, value, pictures):
     """Write the areas (views, n, k, 3) R, B, Y of poses (n, k, 66) in some rows, each in its own scene.
 
     Where there are `pictures` (n, height, width, views), and k is 1, they become the backdrops with `value` in the
     pixels of each body; those of other rows stay as they are.
     """
     views, many, total = scenes.places.shape[1], poses.shape[1], rows.size * poses.shape[1]
+    height, width = scenes.backdrops.shape[1:3]
     flat, places = poses.reshape(-1, poses.shape[2]), translations.reshape(-1, 3)
     work = scratch(scenes.observed.shape[2], scenes.observed.shape[3])
     block, drawn = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
@@ -95,7 +94,7 @@ def draw_scenes(kinematics, chain, scenes, width, height, rows, poses, translati
                     view = View(rotation, place, scenes.focals[i, v], scenes.centres[i, v], width, height)
                     set_scene(work, lane, lane + 1, scenes.offsets[i], scenes.radii[i], view)
                     drawn[lane] = i
-            outline_poses(kinematics, chain, flat, places, block, width, height, work)
+            outline_poses(chain, flat, places, block, width, height, work)
             for lane in range(min(LANES, total - first)):
                 i, k = block[lane] // many, block[lane] % many
                 image, box = fill_pose(lane, work)

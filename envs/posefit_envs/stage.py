@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from posefit import PoseProblem, Silhouette
 from posefit.arrays import Array
-from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses
@@ -111,8 +110,8 @@ class Stage:
         """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), those of some rows aligned."""
         poses, translations = self._unpacked(proposals)
         if self._aligned:
-            at = kinematics(), self._chain, self._read_only()
-            align_scenes(*at, self._joint_radii, self._borders, rows, poses, translations)
+            scenes = self._read_only()
+            align_scenes(self._chain, scenes, self._joint_radii, self._borders, rows, poses, translations)
         return poses, translations
 
     def poses(self, proposals: Array) -> Array:
@@ -138,7 +137,7 @@ class Stage:
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        at = kinematics(), self._chain, self._read_only(), self._width, self._height
+        at = self._chain, self._read_only()
         values = poses, translations, areas, _BODY, pictures
         shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
         if shares == 1:

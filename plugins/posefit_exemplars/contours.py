@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES
 from posefit.tracking.smoothing.contours import Distances, MaskContours
 from posefit_exemplars.kernels import RIGID, Pull, step_poses
@@ -66,7 +65,7 @@ class FrameContours(NamedTuple):
         pull = Pull(writeable(means), places.copy(), precisions)
         moved, places = poses.copy(), places.copy()
         for reach in reaches:
-            step_poses(kinematics(), task.body.skeleton.chain, task.body.radii, self, pull, reach, moved, places)
+            step_poses(task.body.skeleton.chain, task.body.radii, self, pull, reach, moved, places)
         return np.where(free, moved, poses), places
 
 

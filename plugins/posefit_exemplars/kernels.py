@@ -138,16 +138,16 @@ def _solve(matrix, vector):
 
 
 @jit
-def step_poses(kinematics, chain, radii, contours, pull, reach, poses, places):
+def step_poses(chain, radii, contours, pull, reach, poses, places):
     """Move poses (n, 66) at `places` (n, 3) by a step to the contours; distances beyond `reach`, metres, count less."""
-    joints = chain.parents.size + 1
-    frames, sines, cosines = np.empty((joints, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
+    joints, count = chain.parents.size + 1, poses.shape[0]
+    frames, sines, cosines = np.empty((count, joints, 4, 3)), np.empty((count, ANGLES)), np.empty((count, ANGLES))
     curves, forces = np.empty((joints, 6, 6)), np.empty((joints, 6, 1))
     screws, matrix, slopes = np.empty((NUMBERS, 6)), np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, 1))
     grown = np.empty((0, joints, 3)), np.empty((0, joints - 1, 2)), np.zeros((1, 1))
     starts = contours.starts
-    for n in range(poses.shape[0]):
-        place_frames(kinematics, chain, poses[n : n + 1], places[n : n + 1], sines, cosines, frames)
+    place_frames(chain, poses, places, sines, cosines, frames)
+    for n in range(count):
         forces[:] = 0.0
         curves[:] = 0.0
         for v in range(len(contours.steps)):
@@ -155,8 +155,8 @@ def step_poses(kinematics, chain, radii, contours, pull, reach, poses, places):
                 camera = contours.rotations[v], contours.translations[v], contours.focals[v], contours.centres[v]
                 points = contours.points[starts[v] : starts[v + 1]]
                 contour = contours.fields[v], contours.corners[v], contours.sizes[v], points, contours.steps[v]
-                add_view(chain.parents, radii, camera, frames, contour, reach, grown, curves, forces)
-        write_screws(chain, frames, sines, cosines, screws)
+                add_view(chain.parents, radii, camera, frames[n], contour, reach, grown, (curves, forces))
+        write_screws(chain, frames[n], sines[n], cosines[n], screws)
         screws[pull.precisions >= RIGID] = 0.0
         add_bones(chain, screws, curves, forces, matrix, slopes)
         for a in range(NUMBERS):

@@ -150,6 +150,16 @@ class Skeleton:
             turns[joint] = axes @ rotation_from_joint_angles(poses[:, first : first + 3]) @ axes.T
         return turns
 
+    def frames(self, poses: Array, translations: Array) -> tuple[Array, Array, Array]:
+        """Return the frames (n, 27, 4, 3) of the joints of poses (n, 66) with their roots at translations (n, 3).
+
+        A frame is three axes and a place. With them come the sines and the cosines (n, 66) of the angles.
+        """
+        frames = np.empty((len(poses), len(JOINTS), 4, 3))
+        sines, cosines = np.empty((len(poses), ANGLES)), np.empty((len(poses), ANGLES))
+        kernels.place_frames(self.chain, writeable(poses), writeable(translations), sines, cosines, frames)
+        return frames, sines, cosines
+
     def joints(self, poses: Array, translations: Array | None = None) -> Array:
         """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).
 
@@ -164,5 +174,5 @@ class Skeleton:
         if where.shape != (*lead, 3):
             raise InputError(f"translations must have shape {(*lead, 3)}, got {where.shape}")
         flat = writeable(poses.reshape(-1, ANGLES))
-        positions = kernels.joint_positions(kernels.kinematics(), self.chain, flat, writeable(where.reshape(-1, 3)))
+        positions = kernels.joint_positions(self.chain, flat, writeable(where.reshape(-1, 3)))
         return np.asarray(positions).reshape(*lead, len(JOINTS), 3)

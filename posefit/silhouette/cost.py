@@ -10,7 +10,6 @@ from posefit.arrays import Array, Bits, writeable
 from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
@@ -32,8 +31,8 @@ def view_of(camera: Camera) -> View:
 
 def drawing_of(body: Body, camera: Camera, silhouette: Silhouette) -> tuple[Any, ...]:
     """Return what the kernel wants to know before the poses. Made once, it holds for any number of calls."""
-    scene = *body.skeleton.chain, body.radii, *view_of(camera)
-    return *scene, *silhouette.bits, silhouette.pixels, _NO_IMAGES
+    observed = kernels.Observed(*silhouette.bits, silhouette.pixels)
+    return body.skeleton.chain, body.radii, view_of(camera), observed, _NO_IMAGES
 
 
 def areas(
@@ -63,11 +62,11 @@ def areas(
     drawing = drawing_of(body, camera, silhouette)
     parts = parts_of(len(poses), threads)
     if len(parts) == 1:
-        kernels.count_areas(kinematics(), *drawing, poses, translations, out)  # SAPSO (3)
+        kernels.count_areas(*drawing, poses, translations, out)  # SAPSO (3)
         return out
 
     def count(_part: slice, *rows: NDArray[Any]) -> None:
-        kernels.count_areas(kinematics(), *drawing, *rows)
+        kernels.count_areas(*drawing, *rows)
 
     work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
@@ -121,7 +120,7 @@ def costs_in(
     """
     drawn.count_poses(len(poses), silhouette)
     counted = np.empty((len(poses), 3), dtype=np.int64)
-    kernels.count_areas(kinematics(), *drawing, poses, translations, counted)
+    kernels.count_areas(*drawing, poses, translations, counted)
     return mismatch(counted, beta)
 
 
@@ -145,7 +144,7 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     drawn.count_poses(1)
     nothing = np.zeros(strips_and_words(camera.width, camera.height), dtype=np.uint64)
     image = np.empty((1, *nothing.shape), dtype=np.uint64)
-    drawing = *body.skeleton.chain, body.radii, *view_of(camera), nothing, nothing, 0, image
+    drawing = body.skeleton.chain, body.radii, view_of(camera), kernels.Observed(nothing, nothing, 0), image
     uncounted = np.empty((1, 3), dtype=np.int64)
-    kernels.count_areas(kinematics(), *drawing, writeable(pose)[None], writeable(translation)[None], uncounted)
+    kernels.count_areas(*drawing, writeable(pose)[None], writeable(translation)[None], uncounted)
     return unpack(image[0], camera.width, camera.height)

@@ -3,20 +3,22 @@
 Bit images are as `rasteriser` makes them.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from posefit.arrays import inlined, jit
-from posefit.geometry.kernels import LANES, Chain
-from posefit.silhouette.rasteriser import (
-    NONE,
-    STRIP_PIXELS,
-    View,
-    fill_pose,
-    outline_poses,
-    popcount,
-    scratch,
-    set_scene,
-)
+from posefit.arrays import Bits, inlined, jit
+from posefit.geometry.kernels import LANES, set_rows
+from posefit.silhouette.rasteriser import NONE, fill_pose, outline_poses, scratch, set_scene
+from posefit.silhouette.spans import STRIP_PIXELS, popcount
+
+
+class Observed(NamedTuple):
+    """A silhouette as the kernel wants it."""
+
+    person: Bits  # the bit image of the person's pixels, all of them valid
+    valid: Bits  # that of the pixels that are known
+    pixels: int  # of the person
 
 
 @inlined
@@ -55,43 +57,18 @@ def paint_bits(image, box, value, pixels):
 
 
 @jit
-def count_areas(
-    kinematics,
-    parents,
-    angles,
-    turns,
-    turned,
-    offsets,
-    radii,
-    rotation,
-    translation,
-    focal,
-    centre,
-    width,
-    height,
-    observed,
-    valid,
-    pixels,
-    images,
-    poses,
-    translations,
-    areas,
-):
-    """Write the areas (n, 3) R, B, Y of poses (n, 66): `observed` and `valid` are bit images, observed within valid.
+def count_areas(chain, radii, view, observed, images, poses, translations, areas):
+    """Write the areas (n, 3) R, B, Y of poses (n, 66).
 
-    Of the observed silhouette's pixels there are so many. The bit images of the bodies are written to `images`
-    (n, strips, words), where it is not empty. First come the address of `place_lanes` and the fields of `Chain`, then
-    radii, then those of `View`: one by one, since to take a tuple apart costs a call twice as much as its arrays do.
+    The bit images of the bodies are written to `images` (n, strips, words), where it is not empty.
     """
-    chain = Chain(parents, angles, turns, turned, offsets)
-    view = View(rotation, translation, focal, centre, width, height)
-    n, silhouette = poses.shape[0], np.uint64(pixels)
-    rows, work = np.empty(LANES, np.int64), scratch(observed.shape[0], observed.shape[1])
-    set_scene(work, 0, LANES, offsets, radii, view)
+    n, silhouette = poses.shape[0], np.uint64(observed.pixels)
+    person, valid, rows = observed.person, observed.valid, np.empty(LANES, np.int64)
+    work = scratch(person.shape[0], person.shape[1])
+    set_scene(work, 0, LANES, chain.offsets, radii, view)
     for first in range(0, n, LANES):
-        for lane in range(LANES):
-            rows[lane] = min(first + lane, n - 1)
-        outline_poses(kinematics, chain, poses, translations, rows, width, height, work)
+        set_rows(rows, first, n)
+        outline_poses(chain, poses, translations, rows, view.width, view.height, work)
         for lane in range(min(LANES, n - first)):
             image, box = fill_pose(lane, work)
             i = first + lane
@@ -99,7 +76,7 @@ def count_areas(
                 for strip in range(image.shape[0]):
                     for k in range(image.shape[1]):
                         images[i, strip, k] = image[strip, k]
-            body, overlap = count(image, observed, valid, box)
+            body, overlap = count(image, person, valid, box)
             areas[i, 0] = silhouette - overlap
             areas[i, 1] = body - overlap
             areas[i, 2] = overlap

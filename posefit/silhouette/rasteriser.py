@@ -6,27 +6,17 @@ are one vector register of AVX2, whose lanes are as wide as those of the float32
 Strips are even in number, rows a multiple of eight. A cone is the hull of two discs. In one row of pixels it spans
 from the least to the greatest of at most six crossings: two with each disc, one with each of the two tangent
 segments. A pixel belongs to it when its centre lies within that span, borders included.
-
-What numba's loops cannot say, or would not say in vector registers, stands first: as plain Python, and below it as
-numba compiles it.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, overload
 
 from posefit.arrays import Array, inlined, jit
-from posefit.arrays.calling import call
-from posefit.arrays.instructions import in_all_lanes
-from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, set_offsets, set_view
+from posefit.geometry.kernels import LANES, NATURAL, X, Y, Z, empty_lanes, place_lanes, set_offsets, set_view
+from posefit.silhouette.spans import BLOCK, STRIP_PIXELS, set_spans
 
-STRIP_PIXELS = 32  # pixels: bits of a lane
-BLOCK = 8  # rows filled at a time
-LISTED = 16  # numbers of blocks that are written at a time
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
 NONE = np.uint64(0)
 _NOWHERE = 1 << 20  # a block or strip beyond every image
@@ -57,115 +47,6 @@ class View(NamedTuple):
     centre: Array  # (2,) pixels
     width: int
     height: int
-
-
-def popcount(bits: Any) -> int:
-    """Return how many bits of a word are set."""
-    return int(bits).bit_count()
-
-
-@intrinsic
-def _ctpop(typing_context: Any, bits: Any) -> Any:  # noqa: ARG001 - numba calls both functions by these names
-    return types.uint64(types.uint64), lambda context, builder, signature, arguments: builder.ctpop(arguments[0])  # noqa: ARG005
-
-
-@overload(popcount)
-def _popcount_compiled(bits):  # noqa: ARG001 - numba compares the two signatures
-    return lambda bits: _ctpop(bits)  # type: ignore[call-arg]
-
-
-def root(x: Any) -> Any:
-    """Return the square root of a float32, nan of a negative one."""
-    return np.float32(math.sqrt(x)) if x >= 0.0 else np.float32(np.nan)
-
-
-@overload(root)
-def _root_compiled(x):  # noqa: ARG001 - numba compares the two signatures
-    return lambda x: math.sqrt(x)
-
-
-def list_steps(blocks: Any, at: Any, first: Any, step: Any) -> None:
-    """Write LISTED whole numbers from place `at` on: `first`, and each next one a step larger."""
-    for k in range(LISTED):
-        blocks[at + k] = first + k * step
-
-
-@intrinsic
-def _list_steps(typing_context: Any, blocks: Any, at: Any, first: Any, step: Any) -> Any:  # noqa: ARG001
-    return types.void(blocks, types.int64, types.int64, types.int64), _build_steps
-
-
-@overload(list_steps, inline="always")
-def _list_steps_compiled(blocks, at, first, step):  # noqa: ARG001
-    return lambda blocks, at, first, step: _list_steps(blocks, at, first, step)  # type: ignore[call-arg]
-
-
-def _build_steps(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Write `list_steps` as instructions for all its numbers at once: so many registers as they fill."""
-    number = ir.IntType(64)
-    vector = ir.VectorType(number, LISTED)
-    blocks, at, first, step = arguments
-
-    steps = builder.mul(in_all_lanes(builder, step, LISTED), ir.Constant(vector, list(range(LISTED))))
-    data = context.make_array(signature.args[0])(context, builder, blocks).data
-    place = builder.bitcast(builder.gep(data, [at]), vector.as_pointer())
-    builder.store(builder.add(in_all_lanes(builder, first, LISTED), steps), place, align=8)
-    return context.get_dummy_value()
-
-
-def set_spans(image: Any, place: Any, stride: Any, spans: Any) -> None:
-    """Set the bits of eight spans in eight half words from `place` on, and in the eight ones `stride` farther on.
-
-    `spans` (16,) are eight first bits, from 0 on, and eight that come after a last one, 64 at most; a span that ends
-    before it begins is empty. Bits from 32 on are those of the farther words.
-    """
-    pixels = image.reshape(-1).view(np.uint32)
-    for k in range(BLOCK):
-        first, stop = int(spans[k]), max(int(spans[k]), int(spans[BLOCK + k]))
-        bits = ((1 << stop) - (1 << first)) & 0xFFFFFFFFFFFFFFFF if first < 2 * STRIP_PIXELS else 0
-        pixels[place + k] |= np.uint32(bits & 0xFFFFFFFF)
-        pixels[place + stride + k] |= np.uint32(bits >> STRIP_PIXELS)
-
-
-@intrinsic
-def _set_spans(typing_context: Any, image: Any, place: Any, stride: Any, spans: Any) -> Any:  # noqa: ARG001
-    return types.void(image, types.int64, types.int64, spans), _build_spans
-
-
-@overload(set_spans, inline="always")
-def _set_spans_compiled(image, place, stride, spans):  # noqa: ARG001
-    return lambda image, place, stride, spans: _set_spans(image, place, stride, spans)  # type: ignore[call-arg]
-
-
-def _build_spans(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Write `set_spans` as instructions for eight lanes of 32 bits."""
-    vector = ir.VectorType(ir.IntType(32), BLOCK)
-    image, place, stride, spans = arguments
-
-    def splat(value: int) -> Any:
-        return ir.Constant(vector, [value] * BLOCK)
-
-    def lanes_at(kind: Any, array: Any, index: Any) -> Any:
-        data = context.make_array(kind)(context, builder, array).data
-        pixels = builder.bitcast(data, ir.IntType(32).as_pointer())
-        return builder.bitcast(builder.gep(pixels, [index]), vector.as_pointer())
-
-    def shifted(shift: Any, by: Any) -> Any:
-        # a shift by 32 and more leaves nothing: one instruction on x86 with AVX2, without the choice
-        return builder.select(builder.icmp_unsigned("<", by, splat(STRIP_PIXELS)), shift(splat(-1), by), splat(0))
-
-    def add_bits(at: Any, bits: Any) -> None:
-        words = lanes_at(signature.args[0], image, at)
-        builder.store(builder.or_(builder.load(words, align=4), bits), words, align=4)
-
-    first, stop = (
-        builder.load(lanes_at(signature.args[3], spans, ir.Constant(ir.IntType(64), at)), align=4) for at in (0, BLOCK)
-    )
-    stop = builder.select(builder.icmp_signed(">", stop, first), stop, first)
-    add_bits(place, builder.xor(shifted(builder.shl, first), shifted(builder.shl, stop)))  # bits from k on
-    first, stop = (builder.sub(splat(2 * STRIP_PIXELS), k) for k in (first, stop))
-    add_bits(builder.add(place, stride), builder.xor(shifted(builder.lshr, first), shifted(builder.lshr, stop)))
-    return context.get_dummy_value()
 
 
 def strips_and_words(width: int, height: int) -> tuple[int, int]:
@@ -277,21 +158,24 @@ def window(step, k, bounds, lines, keys, strips, stride):
 
 
 @inlined
-def list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride):
-    """Write the blocks to fill of a pose, each one number of place, row and cone; return how many.
+def list_blocks(step, lane, bounds, lines, keys, steps, strips, stride):
+    """Write by how much the number of each block to fill of a pose is above that before it; return how many there are.
 
-    They are listed so many at a time, whether or not a cone has them: a mispredicted branch costs as much as a block.
+    `steps` are _NEXT all through: only where a cone begins is another one written. A loop over the blocks of each cone
+    would end for every cone at another number, and a mispredicted branch costs as much as a block.
     """
-    end = 0
+    end, after = 0, 0
     for b in range(CONES // LANES):
         k = (LANES * b + lane) & NATURAL
         if step == 0 or bounds[_FIRST + k] + 2 * step <= bounds[_LAST + k]:
             if step:
                 window(step, k, bounds, lines, keys, strips, stride)
             count = max(int(bounds[_STOP_BLOCK + k]) - int(bounds[_BLOCK + k]), 0)
-            for i in range(0, count, LISTED):
-                list_steps(blocks, end + i, keys[k] + i * _NEXT, _NEXT)
+            # that of a cone without blocks is written over by the next cone's
+            steps[end & NATURAL] = keys[k] - after + _NEXT
+            after = keys[k] + count * _NEXT if count > 0 else after
             end += count
+    steps[end & NATURAL] = _NEXT
     return end
 
 
@@ -316,10 +200,10 @@ def columns(spans, lines, j, row):
         x = xq + mq * y if (y >= qa) & (y <= qb) else _NAN
         low = min(low, x)
         high = max(high, x)
-        h = root(s0 - (y - y0) * (y - y0))
+        h = math.sqrt(s0 - (y - y0) * (y - y0))
         low = min(low, x0 - h)
         high = max(high, x0 + h)
-        h = root(s1 - (y - y1) * (y - y1))
+        h = math.sqrt(s1 - (y - y1) * (y - y1))
         low = min(low, x1 - h)
         high = max(high, x1 + h)
         spans[k] = np.int32(np.ceil(max(low - column, _ZERO)))
@@ -339,7 +223,7 @@ def scratch(strips, words):
         np.empty(5 * ROOM, np.int32),
         np.empty(2 * BLOCK, np.int32),
         np.empty(ROOM, np.int64),
-        np.empty((CONES // LANES) * (2 * words // BLOCK + 1) + LISTED, np.int64),
+        np.full((CONES // LANES) * (2 * words // BLOCK + 1) + 1, _NEXT),
         np.empty(4, np.int64),
     )
     return empty_lanes(), filling, image
@@ -348,7 +232,7 @@ def scratch(strips, words):
 @inlined
 def set_scene(work, first, stop, offsets, radii, view):
     """Give some lanes a body, of bones (26, 3) and radii (26, 2), and a camera."""
-    (_, lanes), (ends, _, _, _, _, _, _), _ = work
+    lanes, (ends, _, _, _, _, _, _), _ = work
     set_offsets(lanes, first, stop, offsets)
     centre = view.centre[0] - 0.5, view.centre[1] - 0.5
     set_view(lanes, first, stop, view.rotation, view.translation, view.focal, centre)
@@ -360,13 +244,13 @@ def set_scene(work, first, stop, offsets, radii, view):
 
 
 @jit
-def outline_poses(kinematics, chain, poses, places, rows, width, height, work):
+def outline_poses(chain, poses, places, rows, width, height, work):
     """Outline the poses (n, 66) at places (n, 3) that are in these rows (LANES,), each in the scene of its lane.
 
-    `kinematics` is the address of `place_lanes`; `work` is what `scratch` makes and `set_scene` fills.
+    `work` is what `scratch` makes and `set_scene` fills.
     """
-    (slots, lanes), (ends, lines, bounds, _, keys, _, _), image = work
-    call(kinematics, (chain, poses, places, rows, slots, lanes))
+    lanes, (ends, lines, bounds, _, keys, _, _), image = work
+    place_lanes(chain, poses, places, rows, lanes)
     project(chain.parents, lanes, ends)
     strips, stride = image.shape[0], 2 * image.shape[1]
     outline(ends, lines, bounds, strips, float(width), float(height))
@@ -380,11 +264,13 @@ def fill_pose(lane, work):
 
     The lane's outline is used up.
     """
-    _, (_, lines, bounds, spans, keys, blocks, box), image = work
+    _, (_, lines, bounds, spans, keys, steps, box), image = work
     strips, stride = image.shape[0], 2 * image.shape[1]
     for step in range(bounding_box(lane, bounds, box)):
-        for i in range(list_blocks(step, lane, bounds, lines, keys, blocks, strips, stride)):
-            block = blocks[i]
+        block = -_NEXT
+        for i in range(list_blocks(step, lane, bounds, lines, keys, steps, strips, stride)):
+            block += steps[i]
+            steps[i] = _NEXT
             columns(spans, lines, block & (ROOM - 1), np.float32((block & 0xFFFFFFFF) // ROOM))
             set_spans(image, block >> 32, stride, spans)
     return image, box

@@ -11,7 +11,6 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
@@ -111,6 +110,7 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     poses = estimate_of(motion).poses
     moving = replace(motion, poses=poses)
     changes = growth(body, body.stature, moving)
+    frames, sines, cosines = skeleton.frames(poses, motion.translations)
     by_factors = np.zeros((1 + len(NAMES), 1 + len(NAMES)))
     bones = np.zeros((3, 27, 6, 6)), np.zeros((3, 27, 6, 1 + len(NAMES)))
     views = [
@@ -119,10 +119,10 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     for view in views:
         camera = tuple(np.array(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
         borders = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        moved = body.radii, camera, poses, motion.translations.copy()
-        kernels.add_frames(kinematics(), *skeleton.chain, *moved, borders, 0.09, (*changes, by_factors), bones)
+        drawn = skeleton.chain.parents, body.radii, camera, frames
+        kernels.add_frames(*drawn, borders, 0.09, (*changes, by_factors), bones)
     matrices, slopes = np.empty((3, 69, 69)), np.empty((3, 69, 1 + len(NAMES)))
-    kernels.add_all_bones(kinematics(), *skeleton.chain, poses, motion.translations.copy(), *bones, matrices, slopes)
+    kernels.add_all_bones(skeleton.chain, frames, sines, cosines, *bones, matrices, slopes)
     expected = np.zeros((3, 69 + len(NAMES), 69 + len(NAMES))), np.zeros((3, 69 + len(NAMES)))
     grown = [shaped(body, np.exp(STEP * row), body.stature) for row in np.eye(len(NAMES))]
     for k in range(3):
@@ -194,8 +194,8 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
 
     def pulled(joints: np.ndarray, parents: list[int], radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, forces = np.zeros((len(parents), 6, 6)), np.zeros((len(parents), 6))
-        mask = field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25, scale
-        kernels.pull(np.array(parents), joints, radii, *mask, blocks, forces)
+        mask = field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
+        kernels.pull(np.array(parents), joints, radii, mask, scale, blocks, forces)
         return blocks[0], forces[0]
 
     for mine, expected in zip(pulled(joints, [0], radii), (curves, slopes), strict=True):

@@ -18,7 +18,6 @@ from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.motion.motion import Motion
@@ -203,15 +202,16 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     grown = np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2))
     if factors:
         grown = growth(part.body, part.height, part.fitted)
+    frames, sines, cosines = skeleton.frames(poses, places)
     by_factors = np.zeros((1 + factors, 1 + factors))
     bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
     for view in borders:
         camera = tuple(writeable(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
         contours = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        moved = part.body.radii, camera, writeable(poses), writeable(places)
-        kernels.add_frames(kinematics(), *skeleton.chain, *moved, contours, scale, (*grown, by_factors), bones)
+        drawn = skeleton.chain.parents, part.body.radii, camera, frames
+        kernels.add_frames(*drawn, contours, scale, (*grown, by_factors), bones)
     sums = np.empty((count, kernels.NUMBERS, kernels.NUMBERS)), np.empty((count, kernels.NUMBERS, 1 + factors))
-    kernels.add_all_bones(kinematics(), *skeleton.chain, writeable(poses), writeable(places), *bones, *sums)
+    kernels.add_all_bones(skeleton.chain, frames, sines, cosines, *bones, *sums)
     slope, curve = by_factors[1:, 0], by_factors[1:, 1:]
     free = [0, 1, 2, *(3 + angle for angle in angles)]
     curves, slopes, mixed = sums[0][:, free][:, :, free], sums[1][:, free, 0], sums[1][:, free, 1:]

@@ -10,7 +10,6 @@ import math
 import numpy as np
 
 from posefit.arrays import inlined, jit
-from posefit.geometry.kernels import Chain, place_frames
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
@@ -124,12 +123,13 @@ def _covered(x, y, beside, cones, discs):
 
 
 @jit
-def pull(parents, centres, radii, field, corner, size, points, step, scale, blocks, slopes):
+def pull(parents, centres, radii, contour, scale, blocks, slopes):
     """Add the squares of what points (n, 2) of the mask's border are off the body's, and the body's off the mask's.
 
-    Each point of the mask's stands for `step` pixels. Those of a bone go to its own 6 x 6 half of a second derivative,
-    and half of a gradient: of where its two joints are, column and row, and of both radii.
+    `contour` is as in `add_view`. Those of a bone go to its own 6 x 6 half of a second derivative, and half of a
+    gradient: of where its two joints are, column and row, and of both radii.
     """
+    field, corner, size, points, step = contour
     cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
     _write_cones(parents, centres, radii, cones, discs)
     bone, beside = 0, np.empty(parents.size, np.int64)
@@ -190,17 +190,17 @@ def pull(parents, centres, radii, field, corner, size, points, step, scale, bloc
 
 
 @jit
-def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forces):
+def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     """Add the squares of one view to those of the bones: curves (27, 6, 6) and forces (27, 6, 1 + F), over twists.
 
-    The first force is half the gradient, the others are half the second derivatives by a twist and F factors of the
+    `sums` are both. The first force is half the gradient, the others are half the second derivatives by a twist and F factors of the
     build. `frames` (27, 4, 3) are of the joints. `contour` is the field, its corner and size, the points (n, 2) and how
     many pixels each stands for; a distance counts less beyond `reach` metres. `grown` is how joints (F, 27, 3) and
     radii (F, 26, 2) change with factors, and a matrix (1 + F, 1 + F) to whose first column the gradient by these is
     added, and to the rest the second derivatives.
     """
     rotation, translation, focal, centre = camera
-    field, corner, size, points, step = contour
+    curves, forces = sums
     bones = parents.size
     centres, depth, wide = np.empty((bones + 1, 2)), np.empty(bones + 1), np.empty((bones, 2))
     moves = np.empty((bones + 1, 3, 3))  # of each joint: how its pixel and its size change with its place
@@ -219,9 +219,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forc
     for b in range(bones):
         wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
     blocks, slopes = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
-    pull(
-        parents, centres, wide, field, corner, size, points, step, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes
-    )
+    pull(parents, centres, wide, contour, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes)
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
     rows, turned = np.empty((6, 6)), np.empty((6, 6))
@@ -253,12 +251,13 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, curves, forc
                     total += rows[k, i] * turned[k, j]
                 curves[b + 1, i, j] += worth * total
         if len(grown[0]):
-            _add_growth(b, p, rows, depth, blocks[b], slopes[b], worth, grown, forces[b + 1])
+            _add_growth(b, p, rows, depth, (blocks[b], slopes[b]), worth, grown, forces[b + 1])
 
 
 @jit
-def _add_growth(b, p, rows, depth, block, slope, worth, grown, forces):
+def _add_growth(b, p, rows, depth, square, worth, grown, forces):
     """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
+    block, slope = square
     wider, larger, growth = grown
     factors = len(wider)
     changes, changed = np.zeros((6, 1 + factors)), np.zeros((6, 1 + factors))
@@ -369,39 +368,29 @@ def _numbers(chain, joint):
 
 
 @jit
-def add_frames(
-    kinematics, parents, angles, turns, turned, offsets, radii, camera, poses, places, contours, reach, grown, out
-):
-    """Add the squares of one view of T frames to those of the bones, see `add_view`.
+def add_frames(parents, radii, camera, frames, contours, reach, grown, out):
+    """Add the squares of one view of T frames, with joints (T, 27, 4, 3), to those of the bones, see `add_view`.
 
-    The address of `place_lanes` and the fields of `Chain` come first. `contours` are the fields (T, h, w), corners and
-    sizes (T, 2), points and starts (T + 1,) of `MaskContours`, and the pixels that a point stands for; `grown` is as in
-    `add_view`, its joints (T, F, 27, 3). `out` is curves (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
+    `contours` are the fields (T, h, w), corners and sizes (T, 2), points and starts (T + 1,) of `MaskContours`, and the
+    pixels that a point stands for; `grown` is as in `add_view`, its joints (T, F, 27, 3). `out` is curves
+    (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
     """
-    chain = Chain(parents, angles, turns, turned, offsets)
     fields, corners, sizes, points, starts, step = contours
     wider, larger, growth = grown
     curves, forces = out
-    frames, sines, cosines = np.empty((parents.size + 1, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
-    for k in range(len(poses)):
+    for k in range(len(frames)):
         if starts[k] < starts[k + 1]:
-            place_frames(kinematics, chain, poses[k : k + 1], places[k : k + 1], sines, cosines, frames)
             contour = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step
-            add_view(parents, radii, camera, frames, contour, reach, (wider[k], larger, growth), curves[k], forces[k])
+            grows, sums = (wider[k], larger, growth), (curves[k], forces[k])
+            add_view(parents, radii, camera, frames[k], contour, reach, grows, sums)
 
 
 @jit
-def add_all_bones(kinematics, parents, angles, turns, turned, offsets, poses, places, curves, forces, matrices, slopes):
-    """Write `add_bones` of T frames, after the address and the fields as in `add_frames`.
-
-    They go to matrices (T, 69, 69) and slopes (T, 69, 1 + F).
-    """
-    chain = Chain(parents, angles, turns, turned, offsets)
-    frames, sines, cosines = np.empty((parents.size + 1, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
+def add_all_bones(chain, frames, sines, cosines, curves, forces, matrices, slopes):
+    """Write `add_bones` of T frames, as `place_frames` writes them, to matrices (T, 69, 69) and slopes (T, 69, 1 + F)."""
     screws = np.empty((NUMBERS, 6))
-    for k in range(len(poses)):
-        place_frames(kinematics, chain, poses[k : k + 1], places[k : k + 1], sines, cosines, frames)
-        write_screws(chain, frames, sines, cosines, screws)
+    for k in range(len(frames)):
+        write_screws(chain, frames[k], sines[k], cosines[k], screws)
         add_bones(chain, screws, curves[k], forces[k], matrices[k], slopes[k])
         for a in range(NUMBERS):
             for c in range(a):
