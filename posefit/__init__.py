@@ -11,30 +11,11 @@ search; `PoseProblem` the cost; `minimise` the loop; `SynthesisTracker` follows 
 imports is in `posefit.plugin`. Each name is imported when it is first used.
 """
 
-import re
-from importlib import import_module
-from pathlib import Path
-from typing import Any
-
 from pluggy import HookimplMarker
 
+from posefit.lazy import names_of_stub
 from posefit.version import __version__ as __version__
 
 hookimpl = HookimplMarker("posefit")
-
-# the stub declares them once, for type checkers and for here: SPEC 1 of Scientific Python, lazy loading
-_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-_HOME = {name: home for home, name in re.findall(r"^from (posefit\.\S+) import (\w+)", _STUB, re.MULTILINE)}
-__all__ = ["hookimpl", *_HOME]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'posefit' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, _names = names_of_stub(__name__, __file__)
+__all__ = ["hookimpl", *_names]

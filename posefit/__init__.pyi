@@ -2,7 +2,6 @@
 
 from pluggy import HookimplMarker
 
-from posefit.ambiguity.estimate import ambiguity_of as ambiguity_of
 from posefit.fitting.box import Space as Space
 from posefit.fitting.box import Start as Start
 from posefit.fitting.optimiser import Filter as Filter
@@ -32,9 +31,6 @@ from posefit.measuring.angles import clinical_angles as clinical_angles
 from posefit.measuring.centres import joint_centres as joint_centres
 from posefit.measuring.gait import gait_of as gait_of
 from posefit.motion.motion import Motion as Motion
-from posefit.niching import best_apart as best_apart
-from posefit.niching import niche_instance as niche_instance
-from posefit.niching import scored as scored
 from posefit.registry import optimiser as optimiser
 from posefit.registry import prior as prior
 from posefit.report.comparison import Comparison as Comparison
@@ -47,23 +43,21 @@ from posefit.silhouette.cuda.device import moved_to as moved_to
 from posefit.silhouette.mask import Silhouette as Silhouette
 from posefit.statistics.intervals import iqm_intervals as iqm_intervals
 from posefit.statistics.ranks import friedman as friedman
-from posefit.suites.bundles import write_bundle as write_bundle
 from posefit.suites.problem import Problem as Problem
 from posefit.suites.problem import Suite as Suite
 from posefit.suites.problem import suite as suite
 from posefit.suites.running import run_of as run_of
+from posefit.suites.running import suite_scores as suite_scores
 from posefit.sweep.ledger import Ledger as Ledger
 from posefit.tracking.evaluation import unseen as unseen
 from posefit.tracking.front import fit as fit
 from posefit.tracking.front import track as track
 from posefit.tracking.live import track_live as track_live
-from posefit.tracking.modes import modes as modes
 from posefit.tracking.result import Fit as Fit
 from posefit.tracking.result import Track as Track
 from posefit.uncertainty.intervals import angle_intervals as angle_intervals
 from posefit.uncertainty.intervals import joint_intervals as joint_intervals
 from posefit.uncertainty.modes import modes_of as modes_of
 from posefit.version import __version__ as __version__
-from posefit.version import source_digest as source_digest
 
 hookimpl: HookimplMarker

@@ -117,28 +117,6 @@ def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mappi
         return {name: np.asarray(one) for name, one in arrays.items()}
 
 
-def unpacked(path: Path, what: str, most: int) -> dict[str, bytes]:
-    """Return the content of every file of an archive, `most` bytes together. Raises InputError as `archived` does."""
-    check_size(path, most)
-    with _as_input_error(f"{path}: expected {what}"), _ArchiveFile(path) as file, zipfile.ZipFile(file) as archive:
-        file.longest = most
-        listed = archive.infolist()
-        if len({info.filename for info in listed}) < len(listed):
-            raise _RefusedError("two files of one name")
-        if (size := sum(info.file_size for info in listed)) > most:
-            raise _RefusedError(f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most")
-        if any(info.compress_type not in _PACKED for info in listed):
-            raise _RefusedError("files packed in a way that NumPy does not write")
-        return {info.filename: archive.read(info) for info in listed}
-
-
-def array_of(name: str, content: bytes) -> NDArray[Any]:
-    """Return the array of an .npy file's content. Raises InputError where it is none."""
-    with _as_input_error(f"{name} must be an .npy file with an array"):
-        shape, fortran, dtype, start = _header(io.BytesIO(content), "one", len(content))
-        return np.frombuffer(content, dtype, offset=start).reshape(shape, order="F" if fortran else "C")
-
-
 class _ArchiveFile(io.FileIO):
     """A file of which zipfile reads no more than `longest` bytes at once: its directory, which it reads whole."""
 

@@ -6,18 +6,14 @@
     def posefit_register_optimisers(register):
         register("spiral", Spiral)
 
-Two kinds of modules are imported apart from the others, and an entry point's name says which: every command line
-imports the modules whose entry point ends in `-commands`, even for `posefit --help`, and a report those whose entry
-point ends in `-claims`. All others are imported when a method is needed.
+posefit imports the module of every plugin for its commands, even for `posefit --help`, and calls the other hooks when a
+method is needed. So heavy imports belong inside the hooks and what they register.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 from pluggy import HookspecMarker
-
-from posefit.errors import InputError
 
 if TYPE_CHECKING:
     import click
@@ -33,27 +29,6 @@ Factory = TypeVar("Factory", contravariant=True)
 
 # The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").
 Needs = tuple[str, str]
-
-
-@dataclass(frozen=True)
-class ClaimedOrder:
-    """What a publication claims of methods: each of them is beaten by the next.
-
-    Raises ValueError for fewer than two methods, or one that is there twice.
-    """
-
-    source: str  # how a report calls the publication: "the SAPSO paper"
-    statement: str  # the claim, as the second half of a sentence
-    methods: tuple[str, ...]  # worst first, by the names that plans have for them
-
-    def __post_init__(self) -> None:
-        if len(set(self.methods)) != len(self.methods) or len(self.methods) < 2:
-            raise InputError(f"methods must be at least two that differ, got {', '.join(self.methods) or 'none'}")
-
-    @property
-    def name(self) -> str:
-        """How lists and errors name the claim."""
-        return f"{self.source!r} of {', '.join(self.methods)}"
 
 
 class RegisterOptimiser(Protocol):
@@ -76,7 +51,6 @@ RegisterPrior: TypeAlias = Register["PriorFactory"]
 RegisterTracker: TypeAlias = Register["TrackerFactory"]
 RegisterSegmenter: TypeAlias = Register["SegmenterFactory"]
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
-RegisterClaim: TypeAlias = Callable[[ClaimedOrder], None]
 
 
 @hookspec
@@ -105,8 +79,3 @@ def posefit_register_commands(register: RegisterCommand) -> Any:
 
     A ValueError, an ImportError or a missing file becomes one line for the user, with exit status 2.
     """
-
-
-@hookspec
-def posefit_register_claims(register: RegisterClaim) -> Any:
-    """Call `register(ClaimedOrder(...))` for each order of methods that a publication claims."""

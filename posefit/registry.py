@@ -9,38 +9,37 @@ into an error.
 
 import os
 import re
-import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
 
 import pluggy
 
 from posefit import hooks
 from posefit.errors import InputError
-from posefit.hooks import PROJECT, ClaimedOrder
-from posefit.reading import cut, quoted, suggestion
+from posefit.hooks import PROJECT
+from posefit.reading import quoted, suggestion
 from posefit.settings import Setting, settings_of
 from posefit.version import posefit_build, source_digest
 
 if TYPE_CHECKING:
+    import click
+
     from posefit.fitting.optimiser import NextFrame, OptimiserFactory
     from posefit.fitting.prior import PriorFactory
 
 LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
 
-T = TypeVar("T")
-
 Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-Registered = Literal["methods", "commands", "claims"]
-APART: tuple[Registered, ...] = ("commands", "claims")  # registered by modules of their own, see `posefit.hooks`
+COMMAND: Literal["command"] = "command"  # what a plugin may register besides
+Registrable: TypeAlias = Kind | Literal["command"]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 
 
@@ -65,9 +64,12 @@ class Offer:
     def origin(self) -> str:
         """What its results depend on: its distribution with its version, a digest of its package's source, its library.
 
-        The packages of posefit's own plugins, which have one version, are distinguished by name.
+        The packages of posefit's own plugins, which have one version, are distinguished by name. What such a plugin
+        offers from posefit itself depends on posefit's build.
         """
         module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
+        if self.distribution == PROJECT and module.partition(".")[0] == PROJECT:
+            return posefit_build()
         name = module.partition(".")[0] if self.distribution == PROJECT else f"{self.distribution} {self.version}"
         library = ""
         if self.needs is not None:
@@ -91,15 +93,16 @@ class Offer:
         return None if self.needs is None or find_spec(self.needs[0]) is not None else self.needs[1]
 
 
-class Plugin(NamedTuple, Generic[T]):
-    """One entry point, whether it was loaded, and what it offers."""
+class Plugin(NamedTuple):
+    """One entry point, whether it was loaded, and what it offers of the kinds that it was asked for."""
 
     name: str
     distribution: str
     version: str
     state: Literal["loaded", "broken", "left out"]
     cause: str = ""
-    offers: tuple[T, ...] = ()
+    offers: tuple[Offer, ...] = ()
+    commands: "tuple[click.Command, ...]" = ()
     traceback: str = ""  # of what broke it
 
 
@@ -107,9 +110,9 @@ class Plugin(NamedTuple, Generic[T]):
 class Registry:
     """The methods that plugins registered, by kind and name."""
 
-    plugins: tuple[Plugin[Offer], ...]
+    plugins: tuple[Plugin, ...]
 
-    def rivals(self, offer: Offer) -> list[Plugin[Offer]]:
+    def rivals(self, offer: Offer) -> list[Plugin]:
         """Return the plugins that are left out because they register the name of an offer, too."""
         return [plugin for plugin in self.plugins if _taken(f"{offer.kind} {offer.name!r}") in plugin.cause]
 
@@ -135,8 +138,8 @@ class Registry:
         known = self.offers[kind]
         family, colon, variant = name.partition(":")
         if family not in known:
-            came = f"{quoted(name)}{suggestion(family, known)}"
-            raise InputError(f"{kind} must be one of {', '.join(sorted(known)) or 'none'}, got {came}")
+            listed = ", ".join(sorted(known)) or "none"
+            raise InputError(f"{kind} must be one of {listed}, got {quoted(name)}{self._hint(family, known)}")
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
@@ -151,29 +154,33 @@ class Registry:
         factory.__doc__ = offer.factory.__doc__
         return replace(offer, name=name, factory=factory)
 
+    def _hint(self, name: str, known: Iterable[str]) -> str:
+        """Return the end of a message about a name that is not known: its kind, the nearest name, or where to ask."""
+        kinds = [kind for kind, offers in self.offers.items() if name in offers]
+        if kinds:
+            return f"; its kind is {kinds[0]}"
+        return suggestion(name, known) or "; posefit plugins doctor says whether a plugin failed to load"
+
 
 @lru_cache(maxsize=1)
 def registry() -> Registry:
     """Return the methods of all installed plugins; they are loaded once a process."""
-    import numpy  # noqa: F401  # before a plugin that may change it
-
-    return Registry(plugins_of("methods"))
+    return Registry(plugins_of(KINDS))
 
 
 @lru_cache
-def plugins_of(what: Registered, taken: tuple[str, ...] = ()) -> tuple[Plugin[Any], ...]:
-    """Return all installed plugins that register `what`; `taken` are the names of posefit's own commands.
+def plugins_of(kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()) -> tuple[Plugin, ...]:
+    """Return all installed plugins with what they offer of some kinds; see `load`.
 
-    An entry point whose name ends in nothing else is of methods.
+    One whose group only begins with posefit's name is among them, and broken.
     """
-    points = entry_points(group=PROJECT)
-    mine = [p for p in points if what == next((one for one in APART if p.name.endswith(f"-{one}")), "methods")]
-    return load(what, mine, taken=taken)
+    groups = [group for group in entry_points().groups if group.startswith(PROJECT)]
+    return load([point for group in groups for point in entry_points(group=group)], kinds, taken=taken)
 
 
 def version_of(origins: Iterable[str]) -> str:
     """Return the version of posefit, and of a method whose plugins have these origins: see `Offer.origin`."""
-    return ", ".join([posefit_build(), *sorted(set(origins))])
+    return ", ".join([posefit_build(), *sorted(set(origins) - {posefit_build()})])
 
 
 def optimiser(name: str) -> "OptimiserFactory":
@@ -187,23 +194,28 @@ def prior(name: str) -> "PriorFactory":
 
 
 def load(
-    what: Registered, points: Iterable[EntryPoint], variables: Mapping[str, str] = os.environ, taken: Iterable[str] = ()
-) -> tuple[Plugin[Any], ...]:
-    """Return the plugins behind entry points that register `what`, posefit's own first: loaded, broken or left out.
+    points: Iterable[EntryPoint],
+    kinds: Iterable[Registrable] = KINDS,
+    variables: Mapping[str, str] = os.environ,
+    taken: Iterable[str] = (),
+) -> tuple[Plugin, ...]:
+    """Return the plugins behind entry points, posefit's own first: loaded, broken or left out.
 
-    No two offers of one name are loaded; `taken` are the names of posefit's own commands. Raises ValueError where a
-    plugin is broken and POSEFIT_STRICT_PLUGINS is set.
+    Only the hooks of `kinds` are called: some of KINDS, or COMMAND. No two offers of one name are loaded; `taken` are
+    the names of posefit's own commands. Raises ValueError where a plugin is broken and POSEFIT_STRICT_PLUGINS is set.
     """
     owners = {f"command {name!r}": PROJECT for name in taken}
-    plugins: list[Plugin[Any]] = []
+    plugins: list[Plugin] = []
     owned = [(*((point.dist.name, point.dist.version) if point.dist else ("unknown", "")), point) for point in points]
     for owner, release, point in sorted(owned, key=lambda one: (one[0] != PROJECT, one[2].name)):
-        plugin: Plugin[Any] = Plugin(point.name, owner, release, "left out", _left_out(point.name, owner, variables))
+        plugin = Plugin(point.name, owner, release, "left out", _left_out(point.name, owner, variables))
         if not plugin.cause:
             try:
-                offers = _offers(what, point, owner, release, owners)
+                offers = _offers(point, kinds, owner, release, owners)
                 owners |= dict.fromkeys(offers, owner)
-                plugin = plugin._replace(state="loaded", offers=tuple(offers.values()))
+                methods = tuple(offer for offer in offers.values() if isinstance(offer, Offer))
+                commands = tuple(offer for offer in offers.values() if not isinstance(offer, Offer))
+                plugin = plugin._replace(state="loaded", offers=methods, commands=commands)
             except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
                 trace = "".join(traceback.format_exception(error))
                 plugin = plugin._replace(state="broken", cause=f"{type(error).__name__}: {error}", traceback=trace)
@@ -216,23 +228,25 @@ def load(
     return tuple(plugins)
 
 
-def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owners: Mapping[str, str]) -> dict[str, Any]:
+def _offers(
+    point: EntryPoint, kinds: Iterable[Registrable], owner: str, release: str, owners: Mapping[str, str]
+) -> "dict[str, Offer | click.Command]":
     """Return what a plugin offers, by how an error names it. Raises whatever goes wrong."""
+    if point.group != PROJECT:
+        raise InputError(f"its entry point must be in the group {PROJECT!r}, got {point.group!r}")
     manager = pluggy.PluginManager(PROJECT)
     manager.add_hookspecs(hooks)
-    with _unpatched():
-        module = point.load()
+    module = point.load()
     manager.register(module, point.name)
-    manager.check_pending()
-    for hook in manager.get_hookcallers(module) or ():
-        kind = hook.name.removeprefix("posefit_register_")
-        if kind in APART and what != kind:
-            raise InputError(f"the entry point of {hook.name} must end in -{kind}, got {point.name!r}")
-        if kind not in APART and what != "methods":
-            raise InputError(f"{point.name!r} must register {what} alone, got {hook.name}")
-    offers: dict[str, Any] = {}
+    try:
+        manager.check_pending()
+    except pluggy.PluginValidationError as error:
+        known = [name for name in vars(hooks) if name.startswith("posefit_register_")]
+        unknown = [name for name in vars(module) if name.startswith("posefit_") and name not in known]
+        raise InputError(f"{error}{suggestion(unknown[0], known) if unknown else ''}") from None
+    offers: dict[str, Offer | click.Command] = {}
 
-    def add(name: str, offer: Any) -> None:
+    def add(name: str, offer: "Offer | click.Command") -> None:
         if name in owners or name in offers:
             raise ValueError(f"{_taken(name)} {owners.get(name, owner)}")
         offers[name] = offer
@@ -243,11 +257,6 @@ def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owner
         if not isinstance(offer, click.Command) or not offer.name:
             raise TypeError(f"a command must be a click.Command with a name, got {offer!r}")
         add(f"command {offer.name!r}", offer)
-
-    def claim(offer: Any) -> None:
-        if not isinstance(offer, ClaimedOrder):
-            raise TypeError(f"a claim must be a ClaimedOrder, got {offer!r}")
-        add(f"claim {offer.name}", offer)
 
     def method(kind: Kind, name: str, factory: Callable[..., Any], **more: Any) -> None:
         from posefit.fitting.optimiser import NextFrame
@@ -260,37 +269,14 @@ def _offers(what: Registered, point: EntryPoint, owner: str, release: str, owner
             raise InputError(f"next_frame must be one of {', '.join(get_args(NextFrame))}, got {more['next_frame']!r}")
         add(f"{kind} {name!r}", Offer(kind, name, factory, owner, release, **more))
 
-    registers = {"commands": command, "claims": claim, **{f"{kind}s": partial(method, kind) for kind in KINDS}}
-    for kind in (what,) if what != "methods" else [f"{kind}s" for kind in KINDS]:
-        getattr(manager.hook, f"posefit_register_{kind}")(register=registers[kind])
+    for kind in kinds:
+        register = command if kind == COMMAND else partial(method, kind)
+        getattr(manager.hook, f"posefit_register_{kind}s")(register=register)
     return offers
 
 
 def _taken(name: str) -> str:
     return f"{name} is already registered by"
-
-
-@contextmanager
-def _unpatched() -> Iterator[None]:
-    """Undo what the body changes for every other plugin, Python's recursion limit and NumPy's functions, and raise."""
-    names = ("numpy", "numpy.linalg", "numpy.random")
-    modules = [sys.modules[name] for name in names if name in sys.modules]
-    before, limit = [dict(vars(module)) for module in modules], sys.getrecursionlimit()
-    try:
-        yield
-    finally:
-        changed = [
-            f"another {module.__name__}.{name}"
-            for module, values in zip(modules, before, strict=True)
-            for name, value in values.items()
-            if vars(module).get(name) is not value
-        ]
-        changed += ["another recursion limit"] * (sys.getrecursionlimit() != limit)
-        for module, values in zip(modules, before, strict=True):
-            vars(module).update(values)
-        sys.setrecursionlimit(limit)
-    if changed:
-        raise InputError(f"to load it must leave NumPy and Python as they are, got {cut(', '.join(changed))}")
 
 
 def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:

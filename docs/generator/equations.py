@@ -17,18 +17,13 @@ SOURCES = {
     "AUGER2005": "Auger and Hansen, A restart CMA evolution strategy with increasing population size, 2005",
     "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
     "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
-    "URSEM1999": "Ursem, Multinational evolutionary algorithms, 1999",
-    "MAREE2018": "Maree et al., Real-valued multi-modal optimization driven by hill-valley clustering, 2018",
-    "DAU2022": "Dau and Chopin, Waste-free sequential Monte Carlo, 2022",
     "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
-    "BRIER1950": "Brier, Verification of forecasts expressed in terms of probability, 1950",
     "GROOD1983": "Grood and Suntay, A joint coordinate system for the clinical description of motions: the knee, 1983",
     "WU2002": "Wu et al., ISB recommendation on definitions of joint coordinate systems: ankle, hip and spine, 2002",
     "WU2005": "Wu et al., ISB recommendation on definitions of joint coordinate systems: upper limb, 2005",
     "ZENI2008": "Zeni, Richards and Higginson, Two simple methods for determining gait events, 2008",
     "WHITTLE2007": "Whittle, Gait analysis: an introduction, 2007",
     "ALEXANDER1989": "Alexander, Optimization and gaits in the locomotion of vertebrates, 1989",
-    "CEC2013": "Li, Engelbrecht and Epitropakis, Benchmark functions for CEC'2013 on niching methods, 2013",
 }
 _TAG = re.compile(r"# (?P<source>SAPSO|VSMM|[A-Z]+\d{4}) (?P<step>.+?)(?:, Interpretation S\d+)?$")
 _WORDS = re.compile(r"[^a-z0-9]+")

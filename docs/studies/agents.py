@@ -1,14 +1,12 @@
-"""Baseline agents of the environments on held-out instances.
+"""Baseline agents of FitState-v0 on held-out instances.
 
-Chance, constants, schedules, a bandit, CMA-ES over settings, and PPO and SAC of Stable-Baselines3 with their defaults.
+Chance, constants, a bandit, CMA-ES over settings, and PPO and SAC of Stable-Baselines3 with their defaults.
 """
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
-from itertools import product
 from typing import Any, NamedTuple
 
 import click
@@ -19,22 +17,18 @@ from posefit import minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.evolution.strategy import Strategy, default_population_size
+from posefit.fitting.cma import Strategy, default_population_size
 from posefit.registry import registry
 from posefit.settings import planned
-from posefit_envs.configure import EVERY, ITERATIONS, POPULATION_SIZE
 from posefit_envs.fit import MAX_EVALUATIONS
 from posefit_envs.instance import first_episode, world_of
 from posefit_envs.policies import (
     Policy,
-    constant_policy,
     gaussian_policy,
     random_search_policy,
     rollout,
-    sapso_policy,
     uniform_policy,
 )
-from posefit_envs.population import ACTION_NUMBERS, ControlAction, action_of
 from posefit_reproduce.jobs import each
 from table import WORKERS, earlier, kept, markdown
 
@@ -47,36 +41,15 @@ STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method and budget of th
 UNTRAINED = 0  # steps of training of a reference
 
 
-@dataclass(frozen=True)
-class Contested:
-    """An environment, the budget of its episodes in evaluations and in steps, and its agents."""
-
-    name: str
-    evaluations: int
-    length: int  # steps of an episode
-    references: tuple[str, ...]  # not trained
-
-
-CONFIGURE = Contested(
-    "posefit/Configure-v0",
-    POPULATION_SIZE * (ITERATIONS + 1),
-    ITERATIONS // EVERY,
-    ("random search", "random actions", "middle", "sapso"),
-)
-FIT = Contested(
-    "posefit/FitState-v0",
-    MAX_EVALUATIONS,
-    MAX_EVALUATIONS - 1,
-    ("random search", "random actions", "gaussian", "sapso", "cma"),
-)
-TASKS = {"configure": CONFIGURE, "fit": FIT}
+NAME = "posefit/FitState-v0"
+LENGTH = MAX_EVALUATIONS - 1  # steps of an episode, whose first proposal is the middle of the box
+REFERENCES = ("random search", "random actions", "gaussian", "sapso", "cma")  # not trained
 LEARNERS = ("bandit", "cma over constants", "ppo", "sac")
 
 
 class Training(NamedTuple):
-    """One row: an agent in an environment, a seed of its training and evaluation, and its steps."""
+    """One row: an agent, a seed of its training and evaluation, and its steps."""
 
-    task: str
     agent: str
     seed: int
     steps: int
@@ -85,55 +58,45 @@ class Training(NamedTuple):
 
 WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
 EPISODES = 4  # that a setting of CMA-ES is tried in, the same instances for a whole generation
-SIZES = {"configure": ACTION_NUMBERS, "fit": 2}  # numbers of a setting
+SETTING_NUMBERS = 2  # the last number of the first action and of the last, with those between on a line
 CURIOSITY = 0.5  # of the bandit: how many deviations of rewards an arm that was never tried is worth
 
 Look = Callable[[int, Policy], None]
 
 
-def arms(task: str) -> list[Array]:
+def arms() -> list[Array]:
     """Return the settings that the bandit may choose from."""
-    if task == "fit":
-        return [np.full(2, power) for power in np.linspace(-1.0, 1.0, 9)]
-    kinds = [tuple(float(k == kind) for k in range(3)) for kind in range(3)]
-    return [
-        action_of(ControlAction((one, two, three), population, stride, 0.01))
-        for one, two, three in kinds
-        for population in (1.0, 0.5)
-        for stride in (0.3, 0.6, 0.9)
-    ]
+    return [np.full(SETTING_NUMBERS, power) for power in np.linspace(-1.0, 1.0, 9)]
 
 
-def setting_policy(task: str, setting: Array, rng: np.random.Generator, dimensions: int, length: int) -> Policy:
-    """Return what a setting does in episodes of so many steps."""
-    if task == "configure":
-        return constant_policy(setting)
+def setting_policy(setting: Array, rng: np.random.Generator, dimensions: int) -> Policy:
+    """Return the policy of a setting: random targets, and the part of the way to them that it says."""
 
     def propose(_: Any, step: int) -> Array:
-        power = setting[0] + (setting[1] - setting[0]) * step / length
+        power = setting[0] + (setting[1] - setting[0]) * step / LENGTH
         return np.append(rng.uniform(-1.0, 1.0, dimensions - 1), power)
 
     return propose
 
 
-def bandit(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
+def bandit(env: Any, steps: int, seed: int, look: Look) -> Policy:
     """Return the best arm by UCB1 over the whole episodes that `steps` steps of a training environment are.
 
-    `length` is how many an episode has; `look` is called with the steps so far and the policy of then.
+    `look` is called with the steps so far and the policy of then.
     """
-    rng, choices = np.random.default_rng(seed), arms(task)
+    rng, choices = np.random.default_rng(seed), arms()
     d = env.action_space.shape[0]
-    policies = [setting_policy(task, arm, rng, d, length) for arm in choices]
-    shown = [setting_policy(task, arm, _apart(seed), d, length) for arm in choices]
+    policies = [setting_policy(arm, rng, d) for arm in choices]
+    shown = [setting_policy(arm, _apart(seed), d) for arm in choices]
     sums, squares, counts = np.zeros(len(choices)), np.zeros(len(choices)), np.zeros(len(choices))
-    for episode in range(steps // length):
+    for episode in range(steps // LENGTH):
         tried = np.maximum(counts, 1.0)
         deviation = np.sqrt(max(squares.sum() / max(episode, 1) - (sums.sum() / max(episode, 1)) ** 2, 0.0))
         bonus = CURIOSITY * deviation * np.sqrt(2.0 * np.log(episode + 1.0) / tried)
         arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
         gain = rollout(env, policies[arm], int(rng.integers(HELD_OUT)), int(rng.integers(2**31)))["gain"]
         sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
-        look((episode + 1) * length, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
+        look((episode + 1) * LENGTH, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
     return shown[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
 
 
@@ -142,35 +105,33 @@ def _apart(seed: int) -> np.random.Generator:
     return np.random.default_rng([seed, 2])
 
 
-def generation(task: str, length: int) -> int:
-    """Return how many steps a generation of CMA-ES over settings takes, where an episode has `length`."""
-    return default_population_size(SIZES[task]) * EPISODES * length
+GENERATION = default_population_size(SETTING_NUMBERS) * EPISODES * LENGTH  # steps of one of CMA-ES over settings
 
 
-def evolved(task: str, env: Any, length: int, steps: int, seed: int, look: Look) -> Policy:
+def evolved(env: Any, steps: int, seed: int, look: Look) -> Policy:
     """Return the setting at the mean of CMA-ES after the whole generations that `steps` steps of an environment are.
 
     Without one it is the middle.
     """
     rng, other = np.random.default_rng(seed), _apart(seed)
-    d, size, whole = env.action_space.shape[0], SIZES[task], generation(task, length)
+    d, size = env.action_space.shape[0], SETTING_NUMBERS
     population = default_population_size(size)
     strategy = Strategy(np.zeros(size), np.full(size, WIDE), population)
-    for number in range(1, steps // whole + 1):
+    for number in range(1, steps // GENERATION + 1):
         settings = np.clip(strategy.sample(rng, population), -1.0, 1.0)
         numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
         costs = [
             -np.mean(
                 [
-                    rollout(env, setting_policy(task, setting, rng, d, length), int(number), int(one))["gain"]
+                    rollout(env, setting_policy(setting, rng, d), int(number), int(one))["gain"]
                     for number, one in zip(numbers, seeds, strict=True)
                 ]
             )
             for setting in settings
         ]
         strategy.learn(settings, np.array(costs))
-        look(number * whole, setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length))
-    return setting_policy(task, np.clip(strategy.mean, -1.0, 1.0), other, d, length)
+        look(number * GENERATION, setting_policy(np.clip(strategy.mean, -1.0, 1.0), other, d))
+    return setting_policy(np.clip(strategy.mean, -1.0, 1.0), other, d)
 
 
 DISCOUNT = 0.99  # their default, stated
@@ -183,13 +144,10 @@ def check_learners() -> None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
-def trained(
-    agent: str, env: Any, steps: int, seed: int, deterministic: bool, look: Callable[[int, Policy], None]
-) -> Policy:
+def trained(agent: str, env: Any, steps: int, seed: int, look: Look) -> Policy:
     """Return the policy of "ppo" or "sac" after so many steps in an environment, of "ppo" in whole rollouts.
 
-    `deterministic` takes the middle of its distribution in place of a draw. `look` is called with the steps so far and
-    the policy of then.
+    Its actions are drawn, as its noise is what searches. `look` is called with the steps so far and the policy of then.
     """
     import torch
     from stable_baselines3 import PPO, SAC
@@ -200,7 +158,7 @@ def trained(
     model = PPO(**common, n_steps=ROLLOUT) if agent == "ppo" else SAC(**common)
 
     def act(observation: Any, _: int) -> Array:
-        chosen: Array = model.predict(observation, deterministic=deterministic)[0]
+        chosen: Array = model.predict(observation, deterministic=False)[0]
         return chosen
 
     class Looking(BaseCallback):  # type: ignore[misc]
@@ -214,17 +172,16 @@ def trained(
 
 
 BEST = "best known"
-SAMPLED = ("fit",)  # tasks in which a learner's actions are drawn, as its noise is what searches
 
 
 def agents(instances: int, quick: bool, rows: str | None, workers: int | None) -> list[dict[str, Any]]:
     """Return the rows of all agents; those in the file `rows` are not measured again, and others are added to it."""
     check_learners()
     seeds, steps, instances = (QUICK_SEEDS, QUICK_STEPS, QUICK_INSTANCES) if quick else (SEEDS, STEPS, instances)
-    turns = [Training(name, BEST, 0, UNTRAINED, instances) for name in TASKS]
-    for name, seed in product(TASKS, range(seeds)):
-        turns += [Training(name, agent, seed, UNTRAINED, instances) for agent in TASKS[name].references]
-        turns += [Training(name, agent, seed, steps, instances) for agent in LEARNERS]
+    turns = [Training(BEST, 0, UNTRAINED, instances)]
+    for seed in range(seeds):
+        turns += [Training(agent, seed, UNTRAINED, instances) for agent in REFERENCES]
+        turns += [Training(agent, seed, steps, instances) for agent in LEARNERS]
     done = earlier(rows, turn_of)
     jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
     done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
@@ -236,11 +193,10 @@ def agent_row(turn: Training) -> dict[str, Any]:
     start = time.perf_counter()
     numbers = range(HELD_OUT, HELD_OUT + turn.instances)
     row: dict[str, Any] = turn._asdict() | {"curve": []}
-    evaluations = TASKS[turn.task].evaluations
     if turn.agent == BEST:
         row["costs"] = _searched(STRONGEST, BEST_KNOWN_EVALUATIONS, numbers, turn.seed)
-    elif turn.agent in ("random search", "sapso", "cma") and not _is_policy(turn):
-        row["costs"] = _searched(turn.agent.split()[0], evaluations, numbers, turn.seed)
+    elif turn.agent in ("sapso", "cma"):
+        row["costs"] = _searched(turn.agent, MAX_EVALUATIONS, numbers, turn.seed)
     else:
         row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
         if row["curve"]:
@@ -249,17 +205,11 @@ def agent_row(turn: Training) -> dict[str, Any]:
     return row | {"minutes": round((time.perf_counter() - start) / 60.0, 2)}
 
 
-def _is_policy(turn: Training) -> bool:
-    return (turn.task, turn.agent) in {("fit", "random search"), ("configure", "sapso")}
-
-
 def _policy(turn: Training, curve: list[Any]) -> Policy:
-    env, rng = _made(turn.task), np.random.default_rng([turn.seed, 1])
+    env, rng = _made(), np.random.default_rng([turn.seed, 1])
     plain: dict[str, Callable[[], Policy]] = {
         "random search": lambda: random_search_policy(env, rng),
         "random actions": lambda: uniform_policy(env, rng),
-        "middle": lambda: constant_policy(np.zeros(env.action_space.shape or ())),
-        "sapso": sapso_policy,
         "gaussian": lambda: gaussian_policy(env, rng),
     }
     if turn.agent in plain:
@@ -273,30 +223,27 @@ def _policy(turn: Training, curve: list[Any]) -> Policy:
 
     if turn.agent in ("bandit", "cma over constants"):
         learn = bandit if turn.agent == "bandit" else evolved
-        return learn(turn.task, env, TASKS[turn.task].length, steps_taken(turn), turn.seed, look)
-    return trained(turn.agent, env, turn.steps, turn.seed, turn.task not in SAMPLED, look)
+        return learn(env, steps_taken(turn), turn.seed, look)
+    return trained(turn.agent, env, turn.steps, turn.seed, look)
 
 
 def steps_taken(turn: Training) -> int:
     """Return how many steps of training an agent takes of those asked for: whole episodes, generations or rollouts."""
-    length = TASKS[turn.task].length
     if turn.agent == "bandit":
-        return max(1, turn.steps // length) * length
+        return max(1, turn.steps // LENGTH) * LENGTH
     if turn.agent == "cma over constants":
-        whole = generation(turn.task, length)
-        return turn.steps // whole * whole
+        return turn.steps // GENERATION * GENERATION
     if turn.agent == "ppo":
         return -(-turn.steps // ROLLOUT) * ROLLOUT
     return turn.steps
 
 
-def _made(task: str) -> gym.Env[Any, Any]:
-    more: dict[str, Any] = {"max_evaluations": TASKS[task].evaluations} if task == "fit" else {}
-    return gym.make(TASKS[task].name, errors=False, **more)
+def _made() -> gym.Env[Any, Any]:
+    return gym.make(NAME, errors=False)
 
 
 def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
-    env = _made(turn.task)
+    env = _made()
     return [rollout(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
 
 
@@ -390,28 +337,26 @@ def _curve(curves: Sequence[Any], chance: Array, best: Array) -> list[dict[str, 
 
 
 def agents_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the printed tables."""
-    for name, task in TASKS.items():
-        table = agent_table([row for row in rows if row["task"] == name])
-        yield f"{task.name}, {task.evaluations} evaluations, {rows[0]['instances']} held-out instances"
-        yield ""
-        lines = []
-        for row in table:
-            interval = f"{row['low']:.3f} to {row['high']:.3f}"
-            cells = [row["agent"], str(row["steps"]), str(row["seeds"]), f"{row['score']:.3f}", interval]
-            cells += [f"{row['cost']:.2f}", f"{row['median_cost']:.2f}", f"{row['minutes']:.1f}"]
-            lines.append(cells)
-        heads = ["agent", "trained steps", "seeds", "score", "95 % interval", "mean cost", "median cost", "minutes"]
-        yield from markdown(heads, lines)
-        yield ""
-        for row in table:
-            if row["curve"]:
-                looks = ", ".join(
-                    f"{look['steps']:.0f}: {look['score']:.2f} ({look['low']:.2f} to {look['high']:.2f})"
-                    for look in row["curve"]
-                )
-                yield f"{row['agent']} learns: {looks}"
-        yield ""
+    """Yield the printed table, and what each agent learns."""
+    table = agent_table(rows)
+    yield f"{NAME}, {MAX_EVALUATIONS} evaluations, {rows[0]['instances']} held-out instances"
+    yield ""
+    lines = []
+    for row in table:
+        interval = f"{row['low']:.3f} to {row['high']:.3f}"
+        cells = [row["agent"], str(row["steps"]), str(row["seeds"]), f"{row['score']:.3f}", interval]
+        cells += [f"{row['cost']:.2f}", f"{row['median_cost']:.2f}", f"{row['minutes']:.1f}"]
+        lines.append(cells)
+    heads = ["agent", "trained steps", "seeds", "score", "95 % interval", "mean cost", "median cost", "minutes"]
+    yield from markdown(heads, lines)
+    yield ""
+    for row in table:
+        if row["curve"]:
+            looks = ", ".join(
+                f"{look['steps']:.0f}: {look['score']:.2f} ({look['low']:.2f} to {look['high']:.2f})"
+                for look in row["curve"]
+            )
+            yield f"{row['agent']} learns: {looks}"
 
 
 @click.command(cls=Command, help=__doc__)

@@ -20,11 +20,11 @@ from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
 from posefit_exemplars.contours import precisions
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import KNOWN_SHIFT, REACHES, TURN
+from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 
 CLIP = "14_13"  # twenty-seven seconds, which are gone through forwards and backwards as often as it takes
 POSES = 40  # of a call, by which the effort of a step is measured
-SETTLED = 100  # frames after which memory should grow no more
+STABLE = 100  # frames after which memory should grow no more
 
 
 def follow_figures(frames: int) -> dict[str, float]:
@@ -50,21 +50,21 @@ def follow_figures(frames: int) -> dict[str, float]:
         for k in range(count):
             yield scene.observations[last - abs(k % (2 * last) - last)]
 
-    spent, settled = [], 0.0
+    cpu_seconds, stable_mb = [], 0.0
     with threadpool_limits(1):
         list(tracker.track(observations(2), np.random.default_rng(0)))  # loads what is compiled
         for frame in tracker.track(observations(frames), np.random.default_rng(0)):
-            spent.append(frame.cpu_seconds)
-            if len(spent) <= SETTLED:
-                settled = _peak_mb()
-    milliseconds = 1e3 * np.array(spent)
+            cpu_seconds.append(frame.cpu_seconds)
+            if len(cpu_seconds) <= STABLE:
+                stable_mb = _peak_mb()
+    milliseconds = 1e3 * np.array(cpu_seconds)
     return {
         "frames": frames,
         "library_s": library,
         "states_s": states,
         "ms": float(milliseconds.mean()),
         "slowest_ms": float(milliseconds.max()),
-        "mb": settled,
+        "mb": stable_mb,
         "mb_end": _peak_mb(),
         "step_poses": _step_poses(task, scene),
     }
@@ -75,11 +75,14 @@ def _step_poses(task: Task, scene: Scene) -> float:
     assert truth is not None
     poses, places = (np.repeat(array[:1], POSES, axis=0) for array in (truth.poses, truth.translations))
     poses += np.random.default_rng(0).normal(0.0, 0.1, poses.shape) * truth.skeleton.free
-    look = FrameCosts(task, scene.observations[0])
-    contours, weights = look.contours(places[0]), precisions(TURN, KNOWN_SHIFT)
-    jobs = (lambda: contours.fitted(task, poses, places, poses, weights, REACHES), lambda: look.full(poses, places))
+    frame_costs = FrameCosts(task, scene.observations[0])
+    contours, weights = frame_costs.contours(places[0]), precisions(START_TURN, KNOWN_SHIFT)
+    jobs = (
+        lambda: contours.fitted(task, poses, places, poses, weights, CONTINUED_REACHES),
+        lambda: frame_costs.full(poses, places),
+    )
     fit, cost = (min(repeat(job, number=1, repeat=20)) for job in jobs)
-    return fit / len(REACHES) / cost
+    return fit / len(CONTINUED_REACHES) / cost
 
 
 def _peak_mb() -> float:

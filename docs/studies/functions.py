@@ -18,9 +18,9 @@ import numpy as np
 from scipy.stats import rankdata
 
 from posefit.arrays import Array
-from posefit.evolution.strategy import Strategy, default_population_size
 from posefit.files import check_new
 from posefit.fitting.box import draw_population
+from posefit.fitting.cma import Strategy, default_population_size
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, suite_function
 from posefit.suites.problem import suite
 from posefit.suites.running import run_on
@@ -261,26 +261,14 @@ def feature_lines(rows: Mapping[Key, Mapping[str, float]]) -> Iterator[str]:
     yield from markdown(["function", *(head for head, _ in HEADS.values()), "nearest of bbob"], cells)
 
 
-def share_lines(shares: Mapping[int, Sequence[Shares]]) -> Iterator[str]:
-    """Yield the tables of targets reached, and of how similarly two functions order methods.
-
-    `shares` are by function those of all its instances, and of two halves of them. A half of one function is compared
-    with the other half of the same, or of another one.
-    """
+def share_lines(shares: Mapping[int, Shares]) -> Iterator[str]:
+    """Yield the table of targets reached, of each function in percent by method after each budget."""
     cells = []
-    for number, (table, *_) in shares.items():
+    for number, table in shares.items():
         wins = [max(METHODS, key=lambda name: table[name][k]) for k in range(len(BUDGETS))]
         texts = [" ".join(f"{100.0 * share:.0f}" for share in table[name]) for name in (*METHODS, "best of all")]
         cells.append([f"{number} {suite_function(number).name}", ", ".join(dict.fromkeys(wins)), *texts])
     yield from markdown(["function", "leads", *METHODS, "best of all"], cells, 2)
-    yield ""
-    ranks = {n: [rankdata([one[name] for name in METHODS], axis=0).ravel() for one in shares[n][1:]] for n in shares}
-    cells = []
-    for n, (first, second) in ranks.items():
-        pairs = [((first, other[1]), (second, other[0])) for other in ranks.values()]
-        texts = [f"{np.mean([np.corrcoef(*pair)[0, 1] for pair in both]):.2f}" for both in pairs]
-        cells.append([f"{n} {suite_function(n).name}", *texts])
-    yield from markdown(["methods' order", *map(str, shares)], cells)
 
 
 @click.command(help=__doc__)
@@ -316,8 +304,7 @@ def main(
     shares = {}
     for number in sizes:
         mine = [results[key] for key in problems if key[1] == number]
-        parts = [mine, mine[::2], mine[1::2] or mine]
-        shares[number] = [shares_of(np.array([one[1] for one in part]), [one[2] for one in part]) for part in parts]
+        shares[number] = shares_of(np.array([one[1] for one in mine]), [one[2] for one in mine])
     click.echo("\n".join(share_lines(shares)))
     if picture is not None:
         tiles = [results[SUITE, number, d, HELD_OUT[0]][-1] for number, d in sizes.items()]

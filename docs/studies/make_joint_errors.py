@@ -19,9 +19,10 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_vsmm import joints
-from posefit_vsmm.joints import BODY, detected, lines_of
-from posefit_vsmm.measurement import NARROWEST, head_radius
+from posefit_vsmm.joints import BODY, detect
+from posefit_vsmm.measurement import MIN_GATE, head_radius
 from posefit_vsmm.motion import leg_of
+from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.state import ENDS, POINTS
 
 MOTIONS = ("walk-a", "walk-c", "march-a", "jacks-a", "squat-a", "jump-a", "run-a")
@@ -47,8 +48,8 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
             true, _ = camera.project(motion.skeleton.joints(pose, place)[ENDS].mean(axis=1))
             expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
             assert lines is not None
-            gates = np.full(len(POINTS), NARROWEST * leg * scale)
-            points, confidence, _ = detected(
+            gates = np.full(len(POINTS), MIN_GATE * leg * scale)
+            points, confidence, _ = detect(
                 lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2))
             )
             for k, point in enumerate(POINTS):

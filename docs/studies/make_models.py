@@ -27,9 +27,8 @@ from posefit.motion.amc import FPS as AMC_FPS
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit_vsmm import motion as models
-from posefit_vsmm.kernels import minus
-from posefit_vsmm.motion import FPS, LAMBDA, MotionModel, leg_of, ridge, without_heading
-from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode
+from posefit_vsmm.motion import FPS, LAMBDA, MotionModels, leg_of, ridge, without_heading
+from posefit_vsmm.state import BONES, ERROR, HELD, OTHER_ANGLES, STATE, encode, minus
 
 ORIGIN = (
     "Fitted to motions of mocap.cs.cmu.edu. The data used in this project was obtained from mocap.cs.cmu.edu. "
@@ -108,8 +107,9 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
     step = round(clip.fps / FPS)  # Interpretation V6: all pairs of a recording so far apart
     before, after = [], []
     for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
-        (w, y), here = without_heading(first)
-        turn = Rotation.from_quat([w, 0.0, y, 0.0], scalar_first=True).inv()
+        heading, here = without_heading(first)
+        here *= np.where(here[:, :1] < 0.0, -1.0, 1.0)
+        turn = Rotation.from_quat(heading, scalar_first=True).inv()
         there = second[3:].reshape(-1, 4).copy()
         there[0] = (turn * Rotation.from_quat(there[0], scalar_first=True)).as_quat(scalar_first=True)
         there *= np.where(np.einsum("ij,ij->i", here, there)[:, None] < 0.0, -1.0, 1.0)  # Interpretation V4
@@ -118,9 +118,9 @@ def pairs(clip: Recorded) -> tuple[Array, Array]:
     return np.array(before), np.array(after)
 
 
-def noise(model: MotionModel, before: Array, after: Array) -> Array:
+def noise(model: MotionModels, before: Array, after: Array) -> Array:
     """Return the covariance (33, 33) of what the model leaves, shrunk as Ledoit and Wolf propose. Interpretation V7."""
-    left = np.array([minus(b, model.step(a)[0]) for a, b in zip(before, after, strict=True)])
+    left = minus(after, model.step(before[None])[0])
     least = np.repeat(LEAST, [3, ERROR - 3])
     scale = np.maximum(np.sqrt((left**2).mean(axis=0)), least)
     found = LedoitWolf(assume_centered=True).fit(left / scale).covariance_
@@ -134,25 +134,22 @@ def typical(before: Array) -> Array:
     return np.asarray((middles / np.linalg.norm(middles, axis=2, keepdims=True)).reshape(POSES, -1))
 
 
-def ahead(model: MotionModel, clip: Recorded, frames: int) -> tuple[float, float]:
+def ahead(model: MotionModels, clip: Recorded, frames: int) -> tuple[float, float]:
     """Return the mean error in degrees over the quaternions of a model so many frames ahead, and of standing still."""
     step = round(clip.fps / FPS) * frames
-    errors, still = [], []
-    for first, second in zip(clip.states[:-step], clip.states[step:], strict=True):
-        state = first
-        for _ in range(frames):
-            state = model.step(state)[0]
-        errors.append(minus(second, state))
-        still.append(minus(second, first))
-    return _mean_degrees(errors), _mean_degrees(still)
+    first, second = clip.states[:-step], clip.states[step:]
+    states = first[None]
+    for _ in range(frames):
+        states = model.step(states)
+    return _mean_degrees(minus(second, states[0])), _mean_degrees(minus(second, first))
 
 
-def _mean_degrees(errors: list[Array]) -> float:
-    turns = np.array(errors)[:, 3:].reshape(-1, 3)
+def _mean_degrees(errors: Array) -> float:
+    turns = errors[:, 3:].reshape(-1, 3)
     return float(np.degrees(np.linalg.norm(turns, axis=1).mean()))
 
 
-def relied(clips: list[Recorded]) -> dict[str, Any]:
+def dependent(clips: list[Recorded]) -> dict[str, Any]:
     """Return how the angles of the other joints follow the nine rotations: ridge regression over all clips."""
     inputs, wanted = [], []
     for clip in clips:
@@ -228,7 +225,9 @@ def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
         literal = ridge(before[:, 3:], after, ridge_lambda) - identity, np.zeros(STATE)
         ours = normalised_ridge(before, after, -FADING * identity, ridge_lambda)
         for shrink, (matrix, offset) in (("identity", ours), ("zero", literal)):
-            model = MotionModel(name, matrix, offset, np.eye(ERROR), typicals, captured)
+            model = MotionModels(
+                (name,), matrix[None], offset[None], np.eye(ERROR)[None], typicals[None], captured[None]
+            )
             covariance = noise(model, before, after)
             found[shrink] = {"matrix": rounded(matrix), "offset": rounded(offset), "noise": rounded(covariance)}
             for frames in (1, AHEAD):
@@ -237,7 +236,7 @@ def main(root: Path, ridge_lambda: float, out: Path | None) -> None:
         print(name, len(before), report)
         stored[name] = {**found, "poses": rounded(typicals), "captured": captured.round(3).tolist(), "report": report}
     target_file = out or Path(models.__file__).with_name("models.json")
-    text = json.dumps({"origin": ORIGIN, "models": stored, "reliance": relied(every)}, separators=(",", ":"))
+    text = json.dumps({"origin": ORIGIN, "models": stored, "dependent_joints": dependent(every)}, separators=(",", ":"))
     target_file.write_text(text + "\n", encoding="utf-8")
     print(f"{target_file.name}: {len(text)} bytes")
 

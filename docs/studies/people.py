@@ -62,7 +62,6 @@ CHANGES: dict[str, Mapping[str, Any]] = {
 # the same without one of the tracker's steps
 STEPS: dict[str, Mapping[str, Any]] = {
     "the path alone": {"settings": {"exemplars.fitted": False}},
-    "sapso@pca in place of the beam": {"settings": {"exemplars.path": "sapso@pca"}},
     "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")

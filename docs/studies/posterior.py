@@ -22,13 +22,11 @@ from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
 from posefit.files import new_file
-from posefit.fitting.metrics import LOST_MM
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton, joint_distances
 from posefit.motion import recorded
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
-from posefit.tracking.modes import MIN_COST
 from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of, nearer_mirrored, poses_apart, second_side
@@ -39,10 +37,6 @@ from table import WORKERS, bar, markdown
 
 FRAMES = 50
 TEMPERATURE = 8.0  # of the posterior
-OTHERS: Mapping[str, Mapping[str, Any]] = {
-    "annealed@pca": {"tracker.modes": 1},  # its own particles
-    "sapso@pca": {"tracker.modes": 4, "tracker.modes_share": 2.0},  # searches of a frame
-}
 DANCES, EVERYDAY = "dances", "everyday"
 # clips that other measurements do not use, by group
 MORE = {
@@ -65,25 +59,21 @@ HARD = {name: value for name, value in CHANGES["all of these"].items() if name !
 
 
 class Case(NamedTuple):
-    """One track: its clip, views and method."""
+    """One track: its clip and views."""
 
     group: str
     clip: Clip
     views: Views
     translation: str
-    frames: int
-    method: str = METHOD
-    temperature: float = TEMPERATURE
     hard: bool = False
 
     @property
     def spec(self) -> dict[str, Any]:
         """The fields of the cell."""
-        own = {"exemplars.posterior_temperature": self.temperature}
-        settings = own if self.method == METHOD else dict(OTHERS[self.method])
-        fields = {"method": self.method, "translation": self.translation, "settings": settings}
+        settings = {"exemplars.posterior_temperature": TEMPERATURE}
+        fields = {"method": METHOD, "translation": self.translation, "settings": settings}
         fields |= HARD if self.hard else {}
-        return cell_fields(self.clip, self.views, self.frames, **fields)
+        return cell_fields(self.clip, self.views, FRAMES, **fields)
 
 
 def pieces() -> list[tuple[str, Clip]]:
@@ -99,19 +89,16 @@ def pieces() -> list[tuple[str, Clip]]:
     return sorted(chosen, key=lambda pair: pair[1].subject)  # a person's library is made once
 
 
-def planned_tracks() -> tuple[list[Case], list[Case]]:
-    """Return the tracks of the method, and those of methods that only search."""
-    base: list[Case] = []
-    others: list[Case] = []
+def planned_tracks() -> list[Case]:
+    """Return the tracks of all clips."""
+    planned: list[Case] = []
     for k, (group, clip) in enumerate(pieces()):
         sides = [SIDES[(2 * k + turn) % len(SIDES)] for turn in (0, 1, 3)]
-        tracks = [Case(group, clip, side, "known", FRAMES) for side in sides]
+        planned += [Case(group, clip, side, "known") for side in sides]
         last = (PAIRS[k // 2 % len(PAIRS)], "known") if k % 2 else (sides[0], "aligned")
-        tracks.append(Case(group, clip, *last, FRAMES))
-        tracks.append(Case(group, clip, PAIRS[k // 2 % 2] if k % 2 else sides[1], "aligned", FRAMES, hard=True))
-        base += tracks
-        others += [tracks[0]._replace(method=method, frames=20, temperature=0.0) for method in OTHERS]
-    return base, others
+        planned.append(Case(group, clip, *last))
+        planned.append(Case(group, clip, PAIRS[k // 2 % 2] if k % 2 else sides[1], "aligned", hard=True))
+    return planned
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,13 +386,11 @@ def posterior(
         if again is not None:
             tracks = load_tracks(again)
         else:
-            base, more = planned_tracks()
-            arrays = each({case: partial(sampled, case) for case in (*base, *more)}, workers, progress)
+            arrays = each({case: partial(sampled, case) for case in planned_tracks()}, workers, progress)
             tracks = [Samples(case, **some) for case, some in arrays.items()]
             if file is not None:
                 save_tracks(tracks, file)
-        every = [TrackFeatures.of(track) for track in tracks]
-        sampling = [features for features in every if features.track.case.method == METHOD]
+        sampling = [TrackFeatures.of(track) for track in tracks]
         people = list(dict.fromkeys(map(_person, sampling)))
         if len(people) < MIN_PEOPLE:
             raise InputError(f"tracks must be of {MIN_PEOPLE} people or more, got {len(people)}")
@@ -416,20 +401,15 @@ def posterior(
         if table is not None:
             fitted = {"temperature": TEMPERATURE, **_rounded(vars(calibration_of(sampling)))}
             table.write_text(json.dumps(fitted) + "\n", encoding="utf-8")
-    others = [features for features in every if features.track.case.method in OTHERS]
     left_out = [evaluation.features for evaluation in evaluations]
     return {
         "coverage": coverages(evaluations),
         "modes": {"recalibrated": best_modes(left_out, evaluations), "as drawn": best_modes(sampling)},
-        "searches": searches_lost(others) if others else {},
     }
 
 
 def _person(features: TrackFeatures) -> str:
     return features.track.case.clip.subject
-
-
-LOST_METRES = 1e-3 * LOST_MM
 
 
 @dataclass(frozen=True, eq=False)
@@ -520,35 +500,6 @@ def best_modes(tracks: Sequence[TrackFeatures], evaluations: Sequence[Evaluation
     }
 
 
-def searches_lost(others: Sequence[TrackFeatures]) -> dict[str, float]:
-    """Return the model of lost frames by the cost of searches, fitted to all of them.
-
-    And its scores on people who were left out of the fit.
-    """
-    probabilities, truth = [], []
-    for person in dict.fromkeys(map(_person, others)):
-        own, rest = ([track for track in others if (_person(track) == person) == of] for of in (True, False))
-        if rest:
-            design, off = _costs(own)
-            probabilities.append(1.0 / (1.0 + np.exp(-design @ logistic(*_costs(rest), frame_weights(rest)))))
-            truth.append(off)
-    bias, slope = logistic(*_costs(others), frame_weights(others))
-    model = {"even": float(np.exp(-bias / slope)), "steepness": float(slope)}
-    if not truth:
-        return model
-    likely, off = np.concatenate(probabilities), np.concatenate(truth)
-    rank = auroc(likely, off)
-    ranked = {} if rank is None else {"auroc": rank}
-    return {**model, "lost": float(off.mean()), "calibration_error": calibration_error(likely, off), **ranked}
-
-
-def _costs(tracks: Sequence[TrackFeatures]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return 1 and the logarithm of the cost of each frame (n, 2), and whether it is lost (n,)."""
-    costs = np.concatenate([features.track.costs for features in tracks])
-    off = np.concatenate([features.error for features in tracks]) > LOST_METRES
-    return np.column_stack([np.ones(len(costs)), np.log(np.maximum(costs, MIN_COST))]), off
-
-
 def posterior_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     """Yield the printed tables."""
     levels = [f"{100 * level:.0f}" for level in LEVELS]
@@ -572,9 +523,6 @@ def posterior_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         ranks = ["" if row[key] is None else f"{row[key]:.2f}" for key in ("auroc", "second_side_auroc")]
         table.append([name, str(row["tracks"]), *(f"{100 * row[key]:.1f}" for key in shares), *ranks])
     yield from markdown(["modes", "tracks", *heads, "AUROC", "second side AUROC"], table)
-    if searches := figures["searches"]:
-        yield ""
-        yield f"lost, by the cost of searches: {', '.join(f'{name} {value:.3g}' for name, value in searches.items())}"
 
 
 @click.command(cls=Command, help=__doc__)

@@ -1,4 +1,4 @@
-"""Does looking pay in Race-v0? Policies that do not look, that do, and that learn to, on held-out instances.
+"""Does it pay to observe in Race-v0? Policies that do not, that do, and that learn to, on held-out instances.
 
 All have the same instances, first populations and budgets, so that they are compared in pairs. The figure is
 ln(1 + best cost), which the rewards of an episode sum up to.
@@ -16,7 +16,7 @@ import numpy as np
 from agents import HELD_OUT, check_learners
 from posefit.arrays import Array
 from posefit.cli.output import Command
-from posefit.evolution.strategy import Strategy
+from posefit.fitting.cma import Strategy
 from posefit_envs import to_sb3_vec_env
 from posefit_envs.policies import (
     Policy,
@@ -44,7 +44,8 @@ LOG_DEVIATION = -1.0  # of PPO's first actions: of several that are clipped to 1
 SAC_ENVIRONMENTS, SAC_STEPS = 16, 24_000
 SAC_SETTINGS: dict[str, Any] = {"buffer_size": SAC_STEPS, "gradient_steps": 4}
 REFERENCES = ("round robin", "random actions", "one restarted", "halving")
-LEARNERS = ("bandit", "linear, CMA-ES", "PPO, a shared net", "PPO", "SAC")
+NETWORKS = ("PPO, a shared net", "PPO", "SAC")
+LEARNERS = ("bandit", "linear, CMA-ES", *NETWORKS)
 
 
 class Turn(NamedTuple):
@@ -245,7 +246,8 @@ def _interval(drawn: Array, value: float) -> str:
 @WORKERS
 def main(names: tuple[str, ...], seeds: int, instances: int, rows: str | None, workers: int | None) -> None:
     learners = names or LEARNERS
-    check_learners()
+    if set(learners) & set(NETWORKS):
+        check_learners()
     turns = [Turn(agent, 0, instances) for agent in REFERENCES]
     turns += [Turn(agent, seed, instances) for agent in learners for seed in range(seeds)]
     done = earlier(rows, turn_of)

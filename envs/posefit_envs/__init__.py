@@ -7,20 +7,17 @@
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
 `FitImage-v0` is a search for the pose in one silhouette whose observation is the picture, `FitState-v0` one whose
-observation is the state of the search; `Track-v0` follows a sequence; `Configure-v0` chooses and steers the optimisers
-of a search; `Race-v0` says which of several searches goes on; `Modes-v0` asks for all poses of one silhouette. Their
-docstrings are their manual. Importing this package registers them; the environments themselves are imported when they
-are made. `drive` runs an optimiser against an environment or a vector of them, `drive_each` one in every environment of
-a vector, `track_reference` returns what a tracker would commit in Track-v0, `to_sb3_vec_env` adapts a vector
-environment to Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
+observation is the state of the search; `Track-v0` follows a sequence; `Race-v0` says which of several searches goes on.
+Their docstrings are their manual. Importing this package registers them; the environments themselves are imported when
+they are made. `drive` runs an optimiser against an environment or a vector of them, `drive_each` one in every
+environment of a vector, `track_reference` returns what a tracker would commit in Track-v0, `to_sb3_vec_env` adapts a
+vector environment to Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
 `posefit_envs.policies` has references to beat.
 
 | looking for | file |
 |---|---|
 | FitImage-v0, FitState-v0, Track-v0 | fit.py, track.py |
-| Configure-v0: dynamic algorithm configuration; the population it steers | configure.py, population.py |
 | Race-v0: racing | race.py |
-| Modes-v0: niching | modes.py |
 | single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
 | arguments and numbered instances (as in sweeps: `posefit.footage.instance`) | instance.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
@@ -54,7 +51,6 @@ for _id, _entry in (
     ("FitImage", "fit:FitImage"),
     ("FitState", "fit:FitState"),
     ("Track", "track:Track"),
-    ("Configure", "configure:Configure"),
     ("Race", "race:Race"),
 ):
     register(
@@ -62,7 +58,6 @@ for _id, _entry in (
         entry_point=f"posefit_envs.{_entry}Env",
         vector_entry_point=f"posefit_envs.{_entry}VectorEnv",
     )
-register(id="posefit/Modes-v0", entry_point="posefit_envs.modes:ModesEnv")
 
 
 def __getattr__(name: str) -> Any:

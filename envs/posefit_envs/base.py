@@ -354,11 +354,6 @@ def scaled(bounds: tuple[float, float], number: Number) -> Number:
     return bounds[0] + 0.5 * (number + 1.0) * (bounds[1] - bounds[0])
 
 
-def unscaled(bounds: tuple[float, float], value: float) -> float:
-    """Return the number from -1 to 1 whose scaled value this is, but for rounding."""
-    return float(2.0 * (value - bounds[0]) / (bounds[1] - bounds[0]) - 1.0)
-
-
 def log_cost(cost: Number) -> Number:
     """Return a cost of 0 to 100 on a logarithmic scale of 0 to 1: ln(1 + cost) / ln 101."""
     shown: Number = np.log1p(cost) / LOG_HIGHEST_COST

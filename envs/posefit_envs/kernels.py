@@ -14,7 +14,6 @@ from posefit.fitting.kernels import move_to_borders, unpack_proposals
 from posefit.geometry.kernels import LANES, empty_lanes, read_joints, set_offsets
 from posefit.silhouette.kernels import count, paint_bits
 from posefit.silhouette.rasteriser import View, fill_pose, outline_poses, scratch, set_scene
-from posefit_swarm.kernels import step, update_best
 
 
 class Scenes(NamedTuple):
@@ -106,56 +105,3 @@ def draw_scenes(kinematics, chain, scenes, width, height, rows, poses, translati
                 areas[v, i, k, 0] = np.uint64(scenes.totals[i, v]) - overlap
                 areas[v, i, k, 1] = body - overlap
                 areas[v, i, k, 2] = overlap
-
-
-class Swarms(NamedTuple):
-    """The particle swarms of environments (n), k in each, with m particles."""
-
-    positions: Array  # (n, k, m, d)
-    velocities: Array  # (n, k, m, d)
-    bests: Array  # (n, k, m, d) of the particles
-    best_costs: Array  # (n, k, m)
-    leaders: NDArray[np.int64]  # (n, k) the particle with the best of them
-    costs: Array  # (n, k) its cost
-    spreads: Array  # (n, k) standard deviation of the bests, mean over coordinates
-
-
-@jit
-def move_swarms(rows, chosen, rand, omega, acceleration, most, periodic, swarms, moved):
-    """Write the particles (n, m, d) of the `chosen` (n,) swarms of some rows after their next move, with `rand` drawn.
-
-    Those are draws (n, 2, m, d) for the pulls towards a particle's best and the swarm's. Speeds are at most `most`;
-    what leaves the box stops at its border.
-    """
-    for i in rows:
-        s = chosen[i]
-        bests, velocities, leader = swarms.bests[i, s], swarms.velocities[i, s], swarms.leaders[i, s]
-        for k in range(moved.shape[1]):
-            for j in range(moved.shape[2]):
-                r1, r2 = rand[i, 0, k, j], rand[i, 1, k, j]
-                x, v, p, g = swarms.positions[i, s, k, j], velocities[k, j], bests[k, j], bests[leader, j]
-                v, x, within = step(r1, r2, omega, acceleration, x, v, p, g, -most, most, periodic[j], True)
-                velocities[k, j] = v if within else 0.0
-                moved[i, k, j] = min(max(x, -1.0), 1.0)
-
-
-@jit
-def teach_swarms(rows, chosen, moved, costs, swarms):
-    """Give the `chosen` (n,) swarms of some rows their particles' positions (n, m, d) and costs (n, m)."""
-    particles, d = moved.shape[1:]
-    for i in rows:
-        s = chosen[i]
-        bests, best_costs, leader = swarms.bests[i, s], swarms.best_costs[i, s], swarms.leaders[i, s]
-        for k in range(particles):
-            for j in range(d):
-                swarms.positions[i, s, k, j] = moved[i, k, j]
-            leader = update_best(k, moved[i, k], costs[i, k], bests, best_costs, leader)
-        spread = 0.0
-        for j in range(d):
-            mean, square = 0.0, 0.0
-            for k in range(particles):
-                mean += bests[k, j] / particles
-            for k in range(particles):
-                square += (bests[k, j] - mean) ** 2 / particles
-            spread += np.sqrt(square) / d
-        swarms.leaders[i, s], swarms.costs[i, s], swarms.spreads[i, s] = leader, best_costs[leader], spread

@@ -1,4 +1,4 @@
-"""References as policies: random and constant actions, SAPSO's schedule, a step from the best so far, and races.
+"""References as policies: random actions, a step from the best so far, and races.
 
 A policy is called with an observation and the number of the step, and returns an action.
 """
@@ -11,37 +11,11 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.check import positive
-from posefit_envs.configure import EVERY, ITERATIONS
-from posefit_envs.population import ControlAction, action_of
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
-from posefit_swarm.sapso import COOLING, TEMPERATURE
-from posefit_swarm.swarm import inertia
 
 Policy = Callable[[Any, int], Array]
 
 WHOLE_WAY = 1.0  # the last number of an action of FitState-v0 whose others are the proposal
-
-
-def sapso_action(step: int, *, iterations: int = ITERATIONS, every: int = EVERY) -> Array:
-    """Return the action (10,), float64, that makes step `step` of Configure-v0 SAPSO's.
-
-    Its stride and temperature are SAPSO's but for rounding, and so are the proposals, within 1e-12 half-ranges. Their
-    costs are the same, unless a pixel lies as near as that to a silhouette's edge.
-    """
-    iteration = min(step * every, iterations)
-    control = ControlAction(stride=inertia(iteration, iterations), temperature=TEMPERATURE * COOLING**iteration)
-    return action_of(control)
-
-
-def constant_policy(action: Any) -> Policy:
-    """Return the policy that always takes this action."""
-    constant = np.array(action, dtype=np.float64)
-    return lambda _, __: constant
-
-
-def sapso_policy(*, iterations: int = ITERATIONS, every: int = EVERY) -> Policy:
-    """Return SAPSO's own schedule as a policy of Configure-v0."""
-    return lambda _, step: sapso_action(step, iterations=iterations, every=every)
 
 
 def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:

@@ -6,12 +6,11 @@ budget is the tool's, since that of a problem ends the tool's loop by an error.
 
 | tool | function | what it returns |
 |---|---|---|
+| IOHexperimenter | ioh_problem | a problem for its loggers |
 | OptunaHub | optunahub_problem | a benchmark for studies of Optuna |
 | pymoo | pymoo_problem | a problem, evaluated a population at a time |
 | Nevergrad | nevergrad_function | a function of its benchmarks |
 | Nevergrad's benchmark command | posefit_suite | a plan of experiments |
-
-IOHexperimenter's is `problem.ioh()` of any problem of a suite.
 
 >>> import posefit
 >>> from posefit_bridges import pymoo_problem
@@ -30,12 +29,43 @@ from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE
 from posefit.suites.problem import EVALUATIONS, Infeasible, Problem, suite
 
 if TYPE_CHECKING:
+    from ioh import problem as problems
     from nevergrad.benchmark.xpbase import Experiment
     from nevergrad.functions import ExperimentFunction
     from optunahub.benchmarks import BaseProblem
     from pymoo.core.problem import Problem as PymooProblem
 
+FIRST_IOH_ID = 26_300  # function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
 OPTIMISERS = ("CMA", "OnePlusOne", "PSO", "RandomSearch", "TwoPointsDE")  # of the plan, by Nevergrad's names
+
+
+def ioh_problem(problem: Problem) -> "problems.RealSingleObjective":
+    """Return a problem of IOHexperimenter with the number, instance, bounds and, where known, the optimum.
+
+    Its count is the problem's, whose budget holds here too, and its `reset` resets both. J. de Nobel et al.,
+    IOHexperimenter: benchmarking platform for iterative optimization heuristics, Evolutionary Computation 32(3), 2024.
+    """
+    from ioh import problem as problems
+    from ioh.iohcpp import RealBounds, RealSolution
+
+    d, name = problem.dimension, f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
+    unknown = problem.optimum is None
+    optimum = RealSolution([], np.nan) if unknown else RealSolution(problem.made.truth, problem.truth_cost)
+
+    class IOHProblem(problems.RealSingleObjective):
+        def __init__(self) -> None:
+            super().__init__(name, d, problem.instance, bounds=RealBounds(d, -1.0, 1.0), optimum=optimum)
+            self.set_id(FIRST_IOH_ID + problem.id_function)
+            self.problem = problem
+
+        def evaluate(self, proposal: Array) -> float:
+            return float(problem(proposal))
+
+        def reset(self) -> None:
+            super().reset()
+            problem.reset()
+
+    return IOHProblem()
 
 
 def optunahub_problem(problem: Problem) -> "BaseProblem":

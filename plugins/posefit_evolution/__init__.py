@@ -1,8 +1,7 @@
-"""Evolution strategies for posefit: `cma`.
+"""Evolution strategies for posefit: `cma`, covariance matrix adaptation after Hansen's tutorial (2016).
 
-`cma.CMAES` is covariance matrix adaptation after Hansen's tutorial (2016), with the restarts of Auger and Hansen
-(2005), in a box whose constraints it keeps; the strategy itself is `posefit.evolution`. `pycma`, an adapter, has the
-other implementation.
+The algorithm is `posefit.fitting.cma`, with which posefit fits a person's build, too; `pycma` is an adapter to another
+implementation.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="cma", frames=(0, 3))
@@ -17,6 +16,6 @@ from posefit.hooks import RegisterOptimiser
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
     """Offer `cma`."""
-    from posefit_evolution.cma import CMAES
+    from posefit.fitting.cma import CMAES
 
     register("cma", CMAES)

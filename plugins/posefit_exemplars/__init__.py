@@ -1,19 +1,20 @@
 """A tracker that follows clips instead of frames: `exemplars`.
 
 One silhouette does not distinguish a stride from its mirrored half-cycle; a sequence of them nearly always does. So
-states are poses of recorded clips, each with a yaw. They go on as their clips do, at about their speed, or change to a
-similar clip, turn, or jump, and the likeliest path through the frames is followed. After Toyama and Blake,
+states are poses of recorded clips, each with a yaw. They continue as their clips do, at about their speed, or change to
+a similar clip, turn, or jump, and the likeliest path through the frames is followed. After Toyama and Blake,
 Probabilistic tracking in a metric space, 2001. From there every joint gives way, until contours are those of the masks:
 several hypotheses of each frame are fitted, and the likeliest sequence of them is reported some frames later.
 
 - `exemplars` has the poses, what came after each, and codes to compare them.
-- `beam` has the states that a frame may be in, and the costs of steps between them; `kernels` has its loop.
+- `beam` has the states that a frame may be in, and the costs of steps between them.
 - `frame_costs` has the costs of poses in a frame.
-- `window` is the likeliest path through the last frames, the weights of states, and sampled paths.
-- `contours` fits poses to the contours of a frame; `contour_kernels` has its loops.
+- `markov` has the likeliest path through the last frames, the weights of states, and sampled paths.
+- `contours` fits poses to the contours of a frame.
 - `hypotheses` has those of each frame, and the likeliest sequence.
 - `smoothing` filters the estimates over time.
 - `lost_model` makes the posterior's intervals hold, and gives the probability that a frame is lost.
+- `kernels` has the compiled loops.
 - `tracker` has the settings, and processes one frame after the other.
 
 >>> import posefit

@@ -11,8 +11,8 @@ from posefit.silhouette.cost import Areas, known_views, pose_costs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit_exemplars.contours import FrameContours
 
-SMALL = 40  # pixels: no side of a small picture is shorter
-FACTORS = (4, 2, 1)
+MIN_SMALL_SIDE = 40  # pixels: no side of a small picture is shorter
+SMALL_FACTORS = (4, 2, 1)
 
 
 class FrameCosts:
@@ -20,31 +20,28 @@ class FrameCosts:
 
     def __init__(self, task: Task, observation: Observation) -> None:
         self._task, self._observation, silhouettes = task, observation, observation.silhouettes
-        sides = [side for camera in task.cameras for side in (camera.width, camera.height)]
-        factor = next((factor for factor in FACTORS if min(sides) >= factor * SMALL), 1)
-        self._scene = task.body, task.cameras, silhouettes
-        self._small_scene = (
-            task.body,
-            [coarser_camera(camera, factor) for camera in task.cameras],
-            [coarser_silhouette(silhouette, factor) for silhouette in silhouettes],
-        )
-        self.share = 1.0 / factor**2  # effort of a cost in the small picture, as a share of one at full size
-        self._seeing = known_views(task.cameras, silhouettes)
-        self.skeleton, self.cameras = task.body.skeleton, len(self._seeing)  # how many cameras see something
+        side = min(side for camera in task.cameras for side in (camera.width, camera.height))
+        factor = next((factor for factor in SMALL_FACTORS if side >= factor * MIN_SMALL_SIDE), 1)
+        cameras = [coarser_camera(camera, factor) for camera in task.cameras]
+        pictures = [coarser_silhouette(silhouette, factor) for silhouette in silhouettes]
+        self._scene, self._small_scene = (task.body, task.cameras, silhouettes), (task.body, cameras, pictures)
+        self.small_share = 1.0 / factor**2  # effort of a cost in the small picture, as a share of one at full size
+        self._views = known_views(task.cameras, silhouettes)
+        self.skeleton, self.camera_count = task.body.skeleton, len(self._views)  # of cameras that show something
         self.yaw, self.usable = observation.yaw, observation.usable
         known = observation.translation if task.translation == "known" else None
         self.root = None if known is None else np.asarray(known, dtype=np.float64)  # (3,) metres, where it is known
-        # (3,) where the only camera stands that shows the person; None with several, which also show the depth
-        self.eye: Array | None = self._seeing[0].position if self.cameras == 1 else None
+        # (3,) of the only camera that shows the person; None with several, which also show the depth
+        self.camera_position: Array | None = self._views[0].position if self.camera_count == 1 else None
 
-    def placed(self, poses: Array, places: Array) -> Array:
-        """Return where poses (n, 66) stand (n, 3): where the root is known to be, or aligned, from `places` (n, 3)."""
+    def aligned(self, poses: Array, places: Array) -> Array:
+        """Return the places (n, 3) of poses (n, 66): of the known root, or those near `places` (n, 3) that fit."""
         if self.root is not None or self._task.translation == "known":
             return self.at_root(places)
         return align(*self._scene, poses, places)
 
     def at_root(self, places: Array) -> Array:
-        """Return where the root is known to be, once for each of `places` (n, 3); else these."""
+        """Return the known place of the root, once for each of `places` (n, 3); else these."""
         return places if self.root is None else np.repeat(self.root[None], len(places), axis=0)
 
     def small(self, poses: Array, places: Array) -> Array:
@@ -62,34 +59,28 @@ class FrameCosts:
         return landmark_likelihoods(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
 
     def side_odds(self, pose: Array, place: Array) -> float | None:
-        """Return the logarithm of the odds that left and right are as in a pose (66,).
-
-        None without landmarks, and with several cameras, whose silhouettes know better.
-        """
-        if self.cameras > 1 or self._observation.landmarks is None or not self._observation.landmarks[..., 2].any():
+        """Return the logarithm of the odds that left and right are as in a pose (66,), by one camera's landmarks."""
+        if self.camera_count > 1 or self._observation.landmarks is None:
             return None
-        return side_odds(self.landmarks(pose[None], place[None])[0])
+        known = self._observation.landmarks[..., 2].any()
+        return side_odds(self.landmarks(pose[None], place[None])[0]) if known else None
 
     def contours(self, place: Array) -> FrameContours:
         """Return the contours of the masks, of a person whose root is about at `place` (3,)."""
         return FrameContours.of(self._task.cameras, self._observation, place)
 
-    def measured(self, pose: Array, place: Array) -> tuple[float, Areas]:
+    def cost_and_areas(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""
-        costs, counts = pose_costs(*self._scene, pose[None], place[None])
-        return float(costs[0]), counts[:, 0]
+        costs, areas = pose_costs(*self._scene, pose[None], place[None])
+        return float(costs[0]), areas[:, 0]
 
     def reflected(self, poses: Array, place: Array) -> Array:
         """Return poses (n, 66) at about `place` (3,) reflected along each line of sight (cameras n, 66)."""
-        each = (reflected_poses(self.skeleton, poses, facing(camera, place)) for camera in self._seeing)
-        return np.concatenate([*each])
+        return np.concatenate([reflected_poses(self.skeleton, poses, facing(view, place)) for view in self._views])
 
-    def twins(self, pose: Array, place: Array) -> Array:
-        """Return the costs of a pose's twins (1 + cameras,): mirrored, and reflected along each camera's line of sight.
-
-        Where roots are aligned, a twin is as far off the reported place as both aligned places are apart.
-        """
+    def mirror_costs(self, pose: Array, place: Array) -> Array:
+        """Return the costs (1 + cameras,) of a pose's mirror image, and of its reflection along each line of sight."""
         poses = pose[None]
         poses = np.concatenate([poses, mirrored_poses(self.skeleton, poses), self.reflected(poses, place)])
-        places = self.placed(poses, np.repeat(place[None], len(poses), axis=0))
+        places = self.aligned(poses, np.repeat(place[None], len(poses), axis=0))
         return self.full(poses[1:], place + places[1:] - places[0])

@@ -1,125 +1,170 @@
-"""Poses to keep of clips, and those that a beam may go on to, in numba: plain functions over arrays."""
+"""Distances between codes of poses, and steps of poses towards contours, in numba.
 
-from typing import Any
+Plain functions over arrays, shapes checked by the callers. The codes of `LANES` poses lie side by side in a tile, so
+that loops over lanes run in vector registers. `tiles` are `exemplars.Tiles`, `contours` `contours.FrameContours`.
+"""
+
+import math
+from typing import NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, overload
 
-from posefit.arrays import jit
-from posefit.arrays.instructions import in_all_lanes
+from posefit.arrays import Array, inlined, jit
+from posefit.geometry.kernels import place_frames
+from posefit.geometry.skeleton import ANGLES
+from posefit.tracking.smoothing.kernels import NUMBERS, add_bones, add_view, write_screws
 
 DIMENSIONS = 24  # of a code: what it leaves out of the joints is below 5 mm
-TILE = 32  # codes side by side: four vector registers of AVX2, whose sums need not wait for each other
+LANES = 32
+MAX_STEP_TURN = math.radians(20.0)  # of an angle in a step
+RIGID = 1e9  # precision of an angle that the person does not have
 
 
-def lower(least: Any, start: Any, code: Any, tile: Any) -> None:
-    """Lower `least` (TILE,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, TILE) from one."""
-    away = np.full(TILE, start, dtype=np.float32)
-    for d in range(DIMENSIONS):
-        away += (tile[d] - code[d]) ** 2
-    least[:] = np.minimum(least, away)
-
-
-@intrinsic
-def _lower(typing_context: Any, least: Any, start: Any, code: Any, tile: Any) -> Any:  # noqa: ARG001
-    return types.void(least, types.float32, code, tile), _build_lower
-
-
-@overload(lower, inline="always")
-def _lower_compiled(least, start, code, tile):  # noqa: ARG001
-    return lambda least, start, code, tile: _lower(least, start, code, tile)  # type: ignore[call-arg]
-
-
-def _build_lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Write `lower` as instructions for a whole tile at once."""
-    vector, index = ir.VectorType(ir.FloatType(), TILE), ir.IntType(64)
-    least, code, tile = (context.make_array(signature.args[k])(context, builder, arguments[k]).data for k in (0, 2, 3))
-
-    def lanes(data: Any, at: int) -> Any:
-        return builder.bitcast(builder.gep(data, [index(at)]), vector.as_pointer())
-
-    away = in_all_lanes(builder, arguments[1], TILE)
-    for d in range(DIMENSIONS):
-        middle = in_all_lanes(builder, builder.load(builder.gep(code, [index(d)])), TILE)
-        step = builder.fsub(builder.load(lanes(tile, TILE * d), align=4), middle)
-        away = builder.fadd(away, builder.fmul(step, step, flags=("contract",)), flags=("contract",))
-    before = builder.load(lanes(least, 0), align=4)
-    nearer = builder.select(builder.fcmp_ordered("<", away, before), away, before)
-    builder.store(nearer, lanes(least, 0), align=4)
-    return context.get_dummy_value()
+@inlined
+def lower_distances(distances, start, code, tile):
+    """Lower `distances` (LANES,) to `start` and the squared distances of the codes of a tile (DIMENSIONS, LANES)."""
+    for lane in range(LANES):
+        total = start
+        for d in range(DIMENSIONS):
+            difference = tile[d, lane] - code[d]
+            total += difference * difference
+        distances[lane] = min(distances[lane], total)
 
 
 @jit
-def keep_apart(codes, least, kept):
-    """Return how many frames of a clip are kept, of codes (T, D), and write them to `kept` (T,).
-
-    They are the first, the last, and each whose squared distance from the one kept before it is above `least`.
-    """
-    kept[0] = 0
+def frames_apart(codes, min_square):
+    """Return the first frame of a clip with codes (T, D), those far from the latest returned one, and the last."""
+    frames = np.zeros(len(codes), np.int64)
     count, last = 1, len(codes) - 1
     for k in range(1, len(codes)):
-        away = np.float32(0.0)
+        square = np.float32(0.0)
         for d in range(codes.shape[1]):
-            step = codes[k, d] - codes[kept[count - 1], d]
-            away += step * step
-        if k == last or away > least:
-            kept[count] = k
+            difference = codes[k, d] - codes[frames[count - 1], d]
+            square += difference * difference
+        if k == last or square > min_square:
+            frames[count] = k
             count += 1
-    return count
+    return frames[:count]
 
 
 @jit
-def nearest_codes(some, near, tiles, bounds, squares, places):
-    """Write which `places` (n, count) of tiles are nearest to `some` codes (n, D), and their squared distances.
-
-    Looked at are the groups `near` (n, g) each; see `cheapest_steps`. The nearest comes first; where there are fewer
-    than `count`, squared distances are infinite.
-    """
-    away = np.empty(TILE, dtype=np.float32)
-    squares[:], places[:] = np.inf, 0
-    for i in range(len(some)):
-        for g in near[i]:
-            for t in range(bounds[g], bounds[g + 1]):
-                away[:] = np.inf
-                lower(away, np.float32(0.0), some[i], tiles[t])
-                for k in range(TILE):
-                    at = squares.shape[1] - 1
-                    if away[k] < squares[i, at]:
-                        while at > 0 and away[k] < squares[i, at - 1]:
-                            squares[i, at], places[i, at] = squares[i, at - 1], places[i, at - 1]
-                            at -= 1
-                        squares[i, at], places[i, at] = away[k], TILE * t + k
+def nearest_codes(codes, groups, tiles, count):
+    """Return the states in `groups` (n, g) nearest to codes (n, D), and squared distances (or inf), both (n, count)."""
+    squares = np.full((len(codes), count), np.inf, np.float32)
+    states = np.zeros((len(codes), count), np.int64)
+    distances = np.empty(LANES, np.float32)
+    for i in range(len(codes)):
+        for group in groups[i]:
+            for t in range(tiles.starts[group], tiles.starts[group + 1]):
+                distances[:] = np.inf
+                lower_distances(distances, np.float32(0.0), codes[i], tiles.codes[t])
+                for lane in range(LANES):
+                    rank = count - 1
+                    if distances[lane] < squares[i, rank]:
+                        while rank > 0 and distances[lane] < squares[i, rank - 1]:
+                            squares[i, rank], states[i, rank] = squares[i, rank - 1], states[i, rank - 1]
+                            rank -= 1
+                        squares[i, rank], states[i, rank] = distances[lane], tiles.states[LANES * t + lane]
+    return states, squares
 
 
 @jit
-def cheapest_steps(ahead, ways, totals, rows, near, tiles, bounds, scale, limit, least, owners, touched):
-    """Return how many poses some states of a beam go on to, each by its cheapest step.
+def cheapest_steps(codes, start_costs, totals, rows, groups, tiles, scale, limit):
+    """Return the states that some `rows` of a beam continue to, the row of each one's cheapest step, and its total.
 
-    `ahead` (speeds, n, D) is where clips go on, `ways` (speeds, n) what the root's way costs there; `rows` are the
-    states of the beam, `near` (n, g) the groups that each looks at; `tiles` (T, D, TILE) are the codes of all poses,
-    group by group from the tiles `bounds` (G + 1,) on. A step costs the squared distance of codes by `scale`. `least`
-    (T TILE,) has to hold infinity; it gets the totals below `limit`, `owners` whose they are, and `touched` which
-    places of tiles they are.
+    Row i continues at `codes` (speeds, n, D), which cost `start_costs` (speeds, n); a step to a state in its `groups`
+    (n, g) costs the squared distance times `scale`, at the cheapest speed. Totals (n,) with a step are below `limit`.
     """
+    best = np.full(len(tiles.states), np.inf)
+    parents, reached = np.empty(len(best), np.int64), np.empty(len(best), np.int64)
+    distances = np.empty(LANES, np.float32)
     count = 0
-    nearest = np.empty(TILE, dtype=np.float32)
-    for r in rows:
-        if totals[r] >= limit:
+    for row in rows:
+        if totals[row] >= limit:
             continue
-        enough = np.float32((limit - totals[r]) / scale)
-        for g in near[r]:
-            for t in range(bounds[g], bounds[g + 1]):
-                nearest[:] = enough
-                for s in range(len(ahead)):
-                    lower(nearest, np.float32(ways[s, r] / scale), ahead[s, r], tiles[t])
-                for k in range(TILE):
-                    if nearest[k] < enough:
-                        total, place = totals[r] + scale * nearest[k], TILE * t + k
-                        if total < least[place]:
-                            if least[place] == np.inf:
-                                touched[count] = place
+        farthest = np.float32((limit - totals[row]) / scale)
+        for group in groups[row]:
+            for t in range(tiles.starts[group], tiles.starts[group + 1]):
+                distances[:] = farthest
+                for speed in range(len(codes)):
+                    start = np.float32(start_costs[speed, row] / scale)
+                    lower_distances(distances, start, codes[speed, row], tiles.codes[t])
+                for lane in range(LANES):
+                    if distances[lane] < farthest:
+                        total, place = totals[row] + scale * distances[lane], LANES * t + lane
+                        if total < best[place]:
+                            if best[place] == np.inf:
+                                reached[count] = place
                                 count += 1
-                            least[place], owners[place] = total, r
-    return count
+                            best[place], parents[place] = total, row
+    reached = reached[:count]
+    return tiles.states[reached], parents[reached], best[reached]
+
+
+class Pull(NamedTuple):
+    """Where angles and places are pulled to, and how strongly."""
+
+    poses: Array  # (n, 66)
+    places: Array  # (n, 3)
+    precisions: Array  # (69,) of a place, then of a pose
+
+
+@jit
+def _solve(matrix, vector):
+    """Solve a positive definite system in place, of which the lower half is given.
+
+    The last number goes first: what turns a hand has to do with what turns its arm, and with no other limb.
+    """
+    n = vector.size
+    for j in range(n - 1, -1, -1):
+        row = matrix[j]
+        pivot = 1.0 / math.sqrt(max(row[j], 1e-12))
+        for k in range(j + 1):
+            row[k] *= pivot
+        vector[j] *= pivot
+        for i in range(j):
+            factor = row[i]
+            if factor != 0.0:
+                vector[i] -= factor * vector[j]
+                other = matrix[i]
+                for k in range(i + 1):
+                    other[k] -= factor * row[k]
+    for j in range(n):
+        total = vector[j]
+        row = matrix[j]
+        for i in range(j):
+            total -= row[i] * vector[i]
+        vector[j] = total / row[j]
+
+
+@jit
+def step_poses(kinematics, chain, radii, contours, pull, reach, poses, places):
+    """Move poses (n, 66) at `places` (n, 3) by a step to the contours; distances beyond `reach`, metres, count less."""
+    joints = chain.parents.size + 1
+    frames, sines, cosines = np.empty((joints, 4, 3)), np.empty(ANGLES), np.empty(ANGLES)
+    curves, forces = np.empty((joints, 6, 6)), np.empty((joints, 6, 1))
+    screws, matrix, slopes = np.empty((NUMBERS, 6)), np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, 1))
+    grown = np.empty((0, joints, 3)), np.empty((0, joints - 1, 2)), np.zeros((1, 1))
+    starts = contours.starts
+    for n in range(poses.shape[0]):
+        place_frames(kinematics, chain, poses[n : n + 1], places[n : n + 1], sines, cosines, frames)
+        forces[:] = 0.0
+        curves[:] = 0.0
+        for v in range(len(contours.steps)):
+            if starts[v] < starts[v + 1]:
+                camera = contours.rotations[v], contours.translations[v], contours.focals[v], contours.centres[v]
+                points = contours.points[starts[v] : starts[v + 1]]
+                contour = contours.fields[v], contours.corners[v], contours.sizes[v], points, contours.steps[v]
+                add_view(chain.parents, radii, camera, frames, contour, reach, grown, curves, forces)
+        write_screws(chain, frames, sines, cosines, screws)
+        screws[pull.precisions >= RIGID] = 0.0
+        add_bones(chain, screws, curves, forces, matrix, slopes)
+        for a in range(NUMBERS):
+            off = places[n, a] - pull.places[n, a] if a < 3 else poses[n, a - 3] - pull.poses[n, a - 3]
+            matrix[a, a] += pull.precisions[a]
+            slopes[a, 0] += pull.precisions[a] * off
+        _solve(matrix, slopes[:, 0])
+        for a in range(3):
+            places[n, a] -= slopes[a, 0]
+        for a in range(ANGLES):
+            poses[n, a] -= min(max(slopes[3 + a, 0], -MAX_STEP_TURN), MAX_STEP_TURN)

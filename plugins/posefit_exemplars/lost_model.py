@@ -1,25 +1,22 @@
 """How far a frame can be trusted: its calibrated posterior, and the probabilities that it is lost or exchanged.
 
-The calibration is fitted on the people of the library, each followed without their own clips. The error of a pose
-depends on the cost of the silhouette, the spread of the sampled tracks and the number of cameras: they give the
-expected error of the frame, in metres, and standard deviations of joints and angles are multiples of it.
+The error of a pose depends on the cost of the silhouette, the spread of the sampled tracks and the number of cameras:
+they give a frame's expected error, in metres; standard deviations of joints and angles are multiples of it.
 
 The probabilities are those of two logistic models of the same evidence: what the pose costs, the cost ratios of its
 mirrored and reflected poses, the spread of the sampled tracks, how many of them have the other side, whether the person
 moves where they face, the angle of view and the number of cameras. Each value stands beside its means over a moment and
 over a second: a lost track stays lost for a while, and masks that never fit mean less than one that fits worse now.
-`docs/studies/lost.py` fits the models.
 """
 
 import json
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -32,12 +29,9 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, second_side
 from posefit_exemplars.frame_costs import FrameCosts
 
-FILE = "calibration.json"
-ARRAYS = ("slopes", "joint_spreads", "angle_spreads", "joint_factors", "angle_factors", "none")  # of a `Calibration`
-MIN_COST = 0.1  # per cent
-MIN_SPREAD = 0.002  # metres
+MIN_COST, MIN_SPREAD = 0.1, 0.002  # per cent, and metres
 MAX_LOG_ODDS = 30.0  # logarithm
-LANDMARK_SECONDS = 0.5  # that the mean of what landmarks tell of sides reaches back
+LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
 MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known
 
 
@@ -58,18 +52,18 @@ def probability_of(odds: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """The corrections with which a frame's intervals and weights of modes hold as often as they claim."""
 
     slopes: Array  # (4,) of the logarithm of the expected error, over `evidence`
     range: tuple[float, float]  # of that logarithm in the training data
-    joint_spreads: Array = field(repr=False)  # (27,) standard deviations of each axis, in expected errors
-    angle_spreads: Array = field(repr=False)  # (66,) radians, for an expected error of a metre
-    joint_factors: Array = field(repr=False)  # (levels, 27)
-    angle_factors: Array = field(repr=False)  # (levels, 66)
+    joint_spreads: Array  # (27,) standard deviations of each axis, in expected errors
+    angle_spreads: Array  # (66,) radians, for an expected error of a metre
+    joint_factors: Array  # (levels, 27)
+    angle_factors: Array  # (levels, 66)
     sharpness: float  # the power of modes' weights
-    none: Array = field(repr=False)  # (3,) of the log-odds that no mode is right, over `none_features`
+    none: Array  # (3,) of the log-odds that no mode is right, over `none_features`
 
     def log(self, evidence: Array) -> float:
         """Return the logarithm of the expected error, from `evidence` (4,)."""
@@ -78,44 +72,36 @@ class Calibration:
     def recalibration(self, log: float) -> Recalibration:
         """Return the recalibration of a frame, from the logarithm of its expected error."""
         spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
-        factors = self.joint_factors, self.angle_factors
         none = probability_of(float(self.none @ none_features(log)))
-        return Recalibration(*spreads, *factors, sharpness=self.sharpness, none=none)
+        return Recalibration(*spreads, self.joint_factors, self.angle_factors, sharpness=self.sharpness, none=none)
 
 
 @cache
 def stored_calibration() -> Calibration:
     """Return the calibration that was fitted on the library's own people by `docs/studies/posterior.py`."""
-    stored = json.loads(files("posefit_exemplars").joinpath(FILE).read_text("utf-8"))
-    low, high = stored["range"]
-    arrays = {name: np.array(stored[name]) for name in ARRAYS}
-    return Calibration(range=(low, high), sharpness=stored["sharpness"], **arrays)
+    stored = json.loads(files("posefit_exemplars").joinpath("calibration.json").read_text("utf-8"))
+    (low, high), sharpness = stored.pop("range"), stored.pop("sharpness")
+    arrays = {name: np.array(values) for name, values in stored.items() if name != "temperature"}
+    return Calibration(range=(low, high), sharpness=sharpness, **arrays)
 
 
-def recalibrated(posterior: Posterior, pose: Array, cost: float, look: FrameCosts) -> Posterior:
-    """Return the posterior around a reported pose (66,) and its cost, recalibrated.
-
-    Where nothing is visible, the cost means nothing, and the expected error is the greatest of the training data.
-    """
+def recalibrated(posterior: Posterior, pose: Array, cost: float, frame_costs: FrameCosts) -> Posterior:
+    """Return the posterior around a reported pose (66,) and its cost, recalibrated; the cost of nothing is infinite."""
     calibration = stored_calibration()
-    values = evidence(look.skeleton, posterior, pose, cost if look.usable else math.inf, look.cameras)
+    cost = cost if frame_costs.usable else math.inf
+    values = evidence(frame_costs.skeleton, posterior, pose, cost, frame_costs.camera_count)
     return replace(posterior, recalibration=calibration.recalibration(calibration.log(values)))
 
 
-FITTED = Path(__file__).with_name("lost_model.json")  # made by `docs/studies/lost.py --store`
-REACHES = {"lately": 0.2, "in general": 1.0}  # seconds that the means reach back
-
-
-def _log_above(floor: float) -> Callable[[float], float]:
-    return lambda value: math.log(max(value, 0.0) + floor)
+MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back
 
 
 # The evidence of a frame, each with the scale on which it enters the models.
 EVIDENCE: Mapping[str, Callable[[float], float]] = {
-    "cost": _log_above(1.0),  # of the reported pose, where the person is visible
+    "cost": lambda value: math.log(max(value, 0.0) + 1.0),  # of the reported pose, where the person is visible
     "reflected": math.log,  # the least cost of poses reflected along a line of sight, over the cost
     "mirrored": math.log,  # the cost of the mirror image, over the cost
-    "farthest": _log_above(0.01),  # metres between the reported pose and the farthest sampled track
+    "farthest": lambda value: math.log(max(value, 0.0) + 0.01),  # metres to the farthest sampled track
     "second": float,  # weight of the tracks that have left and right exchanged
     "ahead": float,  # metres a second by which the root goes where it faces
     "speed": float,  # metres a second by which it goes anywhere
@@ -124,17 +110,14 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
 }
 DEFAULTS = {"reflected": 1.0, "mirrored": 1.0, "views": 1.0}  # before the first value; of other evidence 0
 MAX_VIEWS = 4  # nothing was fitted with more cameras
-TWIN_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
+MIRROR_COST_OFFSET = 1.0  # per cent, added to both costs of a ratio
 MOTION_SECONDS = 0.5  # over which the root's motion is measured
 MAX_SPEED = 2.0  # metres a second; a higher speed is no better evidence
-NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in REACHES for name in EVIDENCE))  # of features
+NAMES = (*EVIDENCE, *(f"{name}, {reach}" for reach in MEAN_SECONDS for name in EVIDENCE))  # of features
 
 
 def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> dict[str, float]:
-    """Return the values of `EVIDENCE` that a frame with a posterior has by itself.
-
-    Its `details` hold whether it is `usable` and the costs of its `twins`; see `FrameCosts.twins`.
-    """
+    """Return the values of `EVIDENCE` that a frame with a posterior has by itself."""
     assert frame.posterior is not None
     distances = joint_distances(skeleton.joints(frame.posterior.poses), skeleton.joints(frame.pose))
     visible = [camera for camera, counts in zip(cameras, frame.areas, strict=True) if counts.any()] or cameras
@@ -145,16 +128,13 @@ def evidence_of(skeleton: Skeleton, frame: Frame, cameras: Sequence[Camera]) -> 
         "views": float(min(len(visible), MAX_VIEWS)),
     }
     if frame.details["usable"]:
-        mirrored, *reflected = (frame.details["twins"] + TWIN_COST_OFFSET) / (frame.cost + TWIN_COST_OFFSET)
+        mirrored, *reflected = (frame.details["mirror_costs"] + MIRROR_COST_OFFSET) / (frame.cost + MIRROR_COST_OFFSET)
         values |= {"cost": frame.cost, "reflected": float(min(reflected)), "mirrored": float(mirrored)}
     return values
 
 
 def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: bool = False) -> dict[str, float]:
-    """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places (3,).
-
-    Metres a second, at most `MAX_SPEED`. Empty for a single place. With `backwards` the frames come in reverse.
-    """
+    """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places."""
     if len(places) < 2:
         return {}
     way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
@@ -163,10 +143,7 @@ def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: b
 
 
 def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
-    """Return how far a person at a place (3,) faces across the only camera's line of sight: 1 in a side view.
-
-    0 with several cameras, as one of them shows what another does not.
-    """
+    """Return how far a person at a place (3,) faces across the only camera's line of sight: 1 in a side view."""
     return abs(math.sin(yaw - facing(cameras[0], place))) if len(cameras) == 1 else 0.0
 
 
@@ -174,28 +151,26 @@ class EvidenceMeans:
     """The evidence of the frames so far, and its exponentially weighted means."""
 
     def __init__(self, fps: float) -> None:
-        self._keep = np.exp([[-1.0 / (seconds * fps)] for seconds in REACHES.values()])
+        self._decays = np.exp([[-1.0 / (seconds * fps)] for seconds in MEAN_SECONDS.values()])
         self._latest: dict[str, float] = {}
-        self._sums, self._weight = np.zeros((len(REACHES), len(EVIDENCE))), np.zeros((len(REACHES), 1))
+        self._sums, self._weight = np.zeros((len(MEAN_SECONDS), len(EVIDENCE))), np.zeros((len(MEAN_SECONDS), 1))
 
     def features(self, values: Mapping[str, float]) -> Array:
         """Return the evidence of the next frame and its means so far (3 E,), on the scale that was fitted.
 
-        A missing value is that of the frame before, at first that of `DEFAULTS`. In a mean, the weight of a frame
-        falls by a factor e for each reach.
+        A missing value is that of the frame before, at first that of `DEFAULTS`.
         """
         self._latest |= values
         now = np.array([scale(self._latest.get(name, DEFAULTS.get(name, 0.0))) for name, scale in EVIDENCE.items()])
-        self._sums, self._weight = self._sums * self._keep + now, self._weight * self._keep + 1.0
+        self._sums, self._weight = self._sums * self._decays + now, self._weight * self._decays + 1.0
         return np.concatenate([now, (self._sums / self._weight).ravel()])
 
 
-@dataclass(frozen=True, eq=False)
-class LogisticModel:
+class LogisticModel(NamedTuple):
     """A logistic model of some features of a frame."""
 
     rows: list[int]  # of the features that it uses
-    weights: Array = field(repr=False)
+    weights: Array
     bias: float
 
     def probability(self, features: Array) -> float:
@@ -209,13 +184,12 @@ class LogisticModel:
         return cls(rows, np.array(list(stored["weights"].values()), dtype=np.float64), float(stored["bias"]))
 
 
-@dataclass(frozen=True, eq=False)
-class FailureClassifier:
+class FailureClassifier(NamedTuple):
     """The models of lost frames and of exchanged sides, and the probability from which sides are unknown."""
 
     lost: LogisticModel
     sides: LogisticModel
-    unknown: float  # the probability of exchanged sides from which they are
+    unknown: float
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
@@ -226,17 +200,14 @@ class FailureClassifier:
 
 @cache
 def stored_classifier() -> FailureClassifier:
-    """Return the models that were fitted to people who are not in the library."""
-    return FailureClassifier.from_dict(json.loads(FITTED.read_text(encoding="utf-8")))
+    """Return the models that `docs/studies/lost.py` fitted to people who are not in the library."""
+    stored = files("posefit_exemplars").joinpath("lost_model.json").read_text("utf-8")
+    return FailureClassifier.from_dict(json.loads(stored))
 
 
 def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
-    """Yield frames with the probability that each is lost, and whether its left and right are unknown.
-
-    Their `details` hold the evidence and the probability of exchanged sides. Frames without sampled tracks stay as
-    they are.
-    """
-    memory, sides, keep = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
+    """Yield frames that have sampled tracks with the probabilities that they are lost, or have sides exchanged."""
+    means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         if frame.posterior is None:
@@ -245,18 +216,14 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         places.append(frame.translation)
         evidence = evidence_of(task.body.skeleton, frame, task.cameras)
         evidence |= root_motion(places, float(frame.pose[0]), task.fps, backwards=task.backwards)
-        features = memory.features(evidence)
+        features = means.features(evidence)
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
         known = exchanged < classifier.unknown
         if (odds := frame.details.get("sides")) is not None:  # landmarks know better
-            sides = keep * sides + [odds, 1.0]
-            known = bool(sides[0] >= MIN_SIDE_ODDS * sides[1])
-        second_side = float(known)
-        recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=second_side)
-        yield replace(
-            frame,
-            lost=classifier.lost.probability(features),
-            posterior=replace(frame.posterior, recalibration=recalibration),
-            details={**frame.details, "evidence": evidence, "exchanged": exchanged},
-        )
+            side_sums = decay * side_sums + [odds, 1.0]
+            known = bool(side_sums[0] >= MIN_SIDE_ODDS * side_sums[1])
+        recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))
+        posterior, lost = replace(frame.posterior, recalibration=recalibration), classifier.lost.probability(features)
+        details = {**frame.details, "evidence": evidence, "exchanged": exchanged}
+        yield replace(frame, lost=lost, posterior=posterior, details=details)

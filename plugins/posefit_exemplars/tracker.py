@@ -1,14 +1,9 @@
 """The tracker: its settings, the work of each frame, and the path that is reported `lag` frames later."""
 
-import importlib
 import math
-import time
-from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import tee
-from typing import cast
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,80 +13,50 @@ from posefit.fitting.check import at_least, positive
 from posefit.fitting.landmarks import landmark_costs
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.rotation import wrapped
-from posefit.tracking.method import Method, prepare
-from posefit.tracking.options import TrackOptions
-from posefit_exemplars import hypotheses
-from posefit_exemplars.beam import (
-    TURN,
-    Beam,
-    Steps,
-    Transition,
-    Transitions,
-    diverse_best,
-    merged,
-    next_states,
-    root_deviation_costs,
-    transition_costs,
-)
-from posefit_exemplars.exemplars import Rows, exemplars_of
+from posefit_exemplars import beam as beams
+from posefit_exemplars import hypotheses, markov
+from posefit_exemplars.beam import JUMP_COST, Beam
+from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
-from posefit_exemplars.smoothing import SMOOTHED, Estimate, smoothed
-from posefit_exemplars.window import (
-    FrameStates,
-    SampledPaths,
-    Sampler,
-    frame_states,
-    mean_near,
-    squares_apart,
-    state_weights,
-    viterbi_state,
-)
+from posefit_exemplars.smoothing import FILTER_REACH, Estimate, clocks, smoothed
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
-WIDTH = 400  # states of a beam
-FULL = 0.6  # share of the beam's evaluations that is for full-size costs of states
-FITTED = 0.8  # share of the budget that is for fitting hypotheses
-AROUND = 0.25  # share of the small pictures that is for where clips go on; the rest is for a search everywhere,
-SEARCHES = 10.0  # so many times a second
-GROUPS_TAKEN = 40  # of those that fit best anywhere, whose poses are evaluated; in the first frame more
-FIRST_GROUPS = 200
-OF_A_GROUP = 20  # poses, drawn at random, that stand for a group in a search everywhere
-FACING = np.radians(45.0)  # tolerance of a yaw that is given, to either side
-AWAY = 4.0  # cost over the temperature of a state whose yaw is off by twice as much, at this frame rate:
-PACE = 30.0
+BEAM_STATES = 400
+FULL_SHARE = 0.6  # of the beam's evaluations: for full-size costs of states
+FIT_SHARE = 0.8  # of the budget: for fitting hypotheses
+CONTINUED_SHARE = 0.25  # of the small pictures: for where clips continue; the rest is for a search everywhere
+SEARCHES_PER_SECOND = 10.0  # everywhere
+SEARCHED_GROUPS = 40  # those that fit best anywhere, whose poses are evaluated; in the first frame more
+FIRST_SEARCHED_GROUPS = 200
+GROUP_POSES = 20  # drawn at random, that stand for a group in a search everywhere
+YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
+WRONG_YAW_COST = 4.0  # over the temperature, of a state whose yaw is off by twice as much, for a thirtieth of a second
 
 
-@dataclass(frozen=True, eq=False)
-class _PendingFrame:
-    """A frame whose pose is not reported yet."""
+SIMILAR_DISTANCE = 0.06  # metres: standard deviation of the codes of states that are averaged
+SIMILAR_YAW = np.radians(20.0)
 
-    states: FrameStates[Beam]
-    look: FrameCosts
-    evaluations: float
-    seconds: float
-    cpu_seconds: float
+
+class _BeamFrame(NamedTuple):
+    """The beam of a frame, the weights of its states, and the effort (3,), as of an `Estimate`."""
+
+    beam: Beam
+    states: markov.FrameStates
+    frame_costs: FrameCosts
+    effort: Array
 
 
 class ExemplarTracker:
     """The likeliest path through recorded clips (Toyama and Blake, 2001).
 
-    Distances and turns in the settings are for a thirtieth of a second, whatever the frame rate.
-
     Settings:
-        spread: distance of joints from where a clip goes on, metres, root mean square; above 0.
-        turning_degrees: standard deviation of turns away from the clip; above 0.
-        jump: cost of a step to any other pose, in units of cost over the temperature; 0 or more.
+        spread: distance of joints from where a clip continues in a thirtieth of a second, metres, rms; above 0.
         temperature: divides silhouette costs; above 0. Errors of successive frames are correlated, so more than 1.
-        straying: distance of an aligned root from where its clip goes on, to the side or up, metres; above 0.
-        depth: the same towards or away from a single camera, metres; above 0.
-        pace: distance of a known root from where its clip goes on, metres; above 0.
         lag: later frames that are used before a pose is reported, 0 or more.
         mirrored: whether the mirror images of all clips are learned from as well.
-        path: whose pose the hypotheses of a frame begin with: "clips", or a method such as "sapso@pca" in their place.
         fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        transitions: the costs of steps: "clips", or MODULE:FUNCTION, which is called with a `Transition`.
         samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
         posterior_temperature: divides silhouette costs in that posterior; above 0.
     """
@@ -101,66 +66,44 @@ class ExemplarTracker:
         task: Task,
         *,
         spread: float = 0.03,
-        turning_degrees: float = 4.0,
-        jump: float = 12.0,
         temperature: float = 2.0,
-        straying: float = 0.01,
-        depth: float = 0.03,
-        pace: float = 0.008,
         lag: int = 20,
         mirrored: bool = True,
-        path: str = "clips",
         fitted: bool = True,
         smoothing: float = 1.0,
-        transitions: str = "clips",
         samples: int = 24,
         posterior_temperature: float = 8.0,
     ) -> None:
-        distances = {"spread": spread, "straying": straying, "depth": depth, "pace": pace}
-        temperatures = {"temperature": temperature, "posterior_temperature": posterior_temperature}
-        for name, value in {**distances, "turning_degrees": turning_degrees, **temperatures}.items():
-            positive(name, value)
-        for name, value in {"jump": jump, "smoothing": smoothing, "lag": lag, "samples": samples}.items():
-            at_least(name, value, 0)
+        positive("spread", spread)
+        positive("temperature", temperature)
+        positive("posterior_temperature", posterior_temperature)
+        at_least("smoothing", smoothing, 0)
+        at_least("lag", lag, 0)
+        at_least("samples", samples, 0)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
-        intervals = 30.0 / task.fps  # of a thirtieth of a second, for which the settings are meant, in a frame
-        slack, turning = math.sqrt(intervals), math.radians(turning_degrees)
-        fastest = math.inf if task.fastest_turn is None else task.fastest_turn / task.fps
         # one set of states serves both directions
         training = [motion.reversed() for motion in task.training] if task.backwards else task.training
         self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
-        self.seconds = (-1.0 if task.backwards else 1.0) / task.fps  # from a frame to the next one
-        self.steps = Steps(spread * slack, turning * slack, jump, straying, depth, pace * intervals, fastest)
-        self.transitions: Transitions = partial(transition_costs, steps=self.steps)
-        if transitions != "clips":
-            self.transitions = partial(_checked, _named(transitions))
-        self.temperature = temperature / intervals
+        self.step = beams.Step.of(task, spread)
+        self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
-        # the number of waiting frames that are only for smoothing
-        self.ahead = min(math.ceil(SMOOTHED * self.smoothing), lag)
-        self.lag, self.evaluations = lag, float(task.evaluations)  # for the beam, of a frame
+        self.lag, self.ahead = lag, min(math.ceil(FILTER_REACH * self.smoothing), lag)  # the latter for smoothing alone
+        self.delay, self.evaluations = lag - self.ahead, float(task.evaluations)  # of the beam
+        self.sampling = markov.Sampling(samples, temperature / posterior_temperature)
         self.hypotheses: hypotheses.HypothesisFilter | None = None
-        self.samples, self.power = samples, temperature / posterior_temperature  # of likelihoods in the posterior
-        share = FITTED * task.evaluations
-        self.proposer: Method | None = None
+        share = FIT_SHARE * task.evaluations
         if fitted and share >= hypotheses.MIN_EVALUATIONS:
             self.evaluations -= share
-            delay = lag - self.ahead
-            if path == "clips":
-                delay //= 2
-            else:
-                self.proposer = prepare(TrackOptions(method=path), self._proposing)
+            delay = self.delay // 2
+            self.delay -= delay
             self.hypotheses = hypotheses.HypothesisFilter(
-                task, self.exemplars, self.steps, self.temperature, share, delay, samples, self.power
+                task, self.exemplars, self.step, self.temperature, share, delay, self.sampling
             )
-        elif path != "clips":
-            least = math.ceil(hypotheses.MIN_EVALUATIONS / FITTED)
-            raise InputError(f"path {path} needs hypotheses: fitted, and evaluations of at least {least}")
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        estimates = self._path(observations, rng) if self.proposer is None else self._proposed(observations, rng)
+        estimates = self._path(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
         frames = smoothed(estimates, self.smoothing, self.ahead)
@@ -168,181 +111,143 @@ class ExemplarTracker:
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame on the likeliest path of the beam."""
-        waiting: deque[_PendingFrame] = deque()
-        latest: FrameStates[Beam] | None = None
-        delay, sampler = self.lag - self.ahead, None
-        if self.hypotheses is None:
-            sampler = Sampler(self.samples, self.power, rng.spawn(1)[0])
-        else:
-            delay -= self.hypotheses.delay
-        every = max(round(self.task.fps / SEARCHES), 1)
+        rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else None
+        for window in markov.windows(self._beams(observations, rng), self.delay):
+            start, frame, states = clocks(), window[0], [frame.states for frame in window]
+            estimate = self._estimated(frame, markov.viterbi_state(states), markov.state_weights(states))
+            if sampler is not None and self.sampling.paths:
+                rows = markov.sample_states(states, rows, self.sampling, sampler)
+                poses, places = self._poses(frame.beam)[rows], frame.beam.places[rows]
+                paths = markov.SampledPaths.of(self.task.body.skeleton, poses, places, estimate.pose)
+                estimate = replace(estimate, paths=paths)
+            yield replace(estimate, effort=frame.effort + clocks() - start)
+
+    def _beams(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[_BeamFrame]:
+        """Yield the beam of each frame."""
+        interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
+        latest: _BeamFrame | None = None
         for number, observation in enumerate(observations):
-            start, cpu_start = time.perf_counter(), time.process_time()
-            look = FrameCosts(self.task, observation)
-            latest, used = self._evaluated(look, latest, number % every == 0, rng)
-            seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu_start
-            waiting.append(_PendingFrame(latest, look, used, seconds, cpu_seconds))
-            if len(waiting) > delay:
-                yield self._estimated(waiting, sampler)
-        while waiting:
-            yield self._estimated(waiting, sampler)
+            start, frame_costs = clocks(), FrameCosts(self.task, observation)
+            before = None if latest is None else latest.beam
+            beam, costs, evaluations = self._candidates(frame_costs, before, number % interval == 0, rng)
+            states = markov.frame_states(costs)
+            if latest is not None:
+                known = frame_costs.root, frame_costs.camera_position
+                steps = beams.transition_costs(self.exemplars, latest.beam, beam, self.step, *known)
+                states = markov.frame_states(costs, latest.states, steps)
+            beam = replace(beam, totals=states.totals)
+            latest = _BeamFrame(beam, states, frame_costs, clocks(evaluations) - start)
+            yield latest
 
-    @property
-    def _proposing(self) -> Task:
-        return replace(self.task, evaluations=int(self.evaluations))
-
-    def _proposed(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
-        """Yield the estimate of each frame by another method."""
-        assert self.proposer is not None
-        coming, again = tee(observations)
-        for frame, observation in zip(self.proposer.follow(self._proposing, coming, rng), again, strict=False):
-            effort = frame.evaluations, frame.seconds, frame.cpu_seconds or 0.0
-            yield Estimate(frame.pose, frame.translation, FrameCosts(self.task, observation), *effort)
-
-    def _evaluated(
-        self, look: FrameCosts, before: FrameStates[Beam] | None, everywhere: bool, rng: np.random.Generator
-    ) -> tuple[FrameStates[Beam], float]:
-        """Return the states of a frame, searched `everywhere` or where clips go on, and the evaluations it took."""
-        latest, seconds, root = None if before is None else before.beam, self.seconds, look.root
-        if latest is not None and not look.usable:
-            beam = next_states(self.exemplars, latest, seconds, self.steps, WIDTH, root)
-            if root is not None:
-                beam = replace(beam, places=np.repeat(root[None], len(beam), axis=0))
-            return self._joined(beam, np.zeros(len(beam)), before, look), 0.0
-        last = 3 + look.cameras  # the reported pose, its twins, and what is left of a small picture's share
+    def _candidates(
+        self, frame_costs: FrameCosts, before: Beam | None, everywhere: bool, rng: np.random.Generator
+    ) -> tuple[Beam, Array, float]:
+        """Return the states of a frame, from `everywhere` or where clips continue, their costs, and the evaluations."""
+        root = frame_costs.root
+        if before is not None and not frame_costs.usable:
+            beam = beams.next_states(self.exemplars, before, self.step, BEAM_STATES, root)
+            return replace(beam, places=frame_costs.at_root(beam.places)), np.zeros(len(beam)), 0.0
+        # the reported pose, its mirror images, and the fraction of a small picture's share
+        reserve = 3 + frame_costs.camera_count
         evaluations = self.evaluations
-        if latest is not None and self.hypotheses is not None:
-            evaluations = max(evaluations / look.cameras, (1.0 - FITTED) * MIN_EVALUATIONS)  # several leave less open
+        if before is not None and self.hypotheses is not None:  # several cameras leave less open
+            evaluations = max(evaluations / frame_costs.camera_count, (1.0 - FIT_SHARE) * MIN_EVALUATIONS)
         # no more states than have a cost in a small picture
-        full = int(min(FULL * evaluations, (evaluations - last) / (1.0 + look.share)))
-        small = int((evaluations - full - last) / look.share)
-        around = int(AROUND * small) if latest is not None or self.task.first_pose is not None else 0
-        beams, looked = list[Beam](), 0
-        if everywhere or latest is None:
-            elsewhere, looked = self._elsewhere(look, latest, small - around, rng)
-            beams.append(elsewhere)
-        if latest is not None:
-            beams.append(next_states(self.exemplars, latest, seconds, self.steps, around, root))
+        full = int(min(FULL_SHARE * evaluations, (evaluations - reserve) / (1.0 + frame_costs.small_share)))
+        small = int((evaluations - full - reserve) / frame_costs.small_share)
+        nearby = int(CONTINUED_SHARE * small) if before is not None or self.task.first_pose is not None else 0
+        parts, small_count = list[Beam](), 0
+        if everywhere or before is None:
+            elsewhere, small_count = self._elsewhere(frame_costs, before, small - nearby, rng)
+            parts.append(elsewhere)
+        if before is not None:
+            parts.append(beams.next_states(self.exemplars, before, self.step, nearby, root))
         elif self.task.first_pose is not None:
-            first = self._first_states(self.task.first_pose, around)
-            beams = [replace(elsewhere, totals=elsewhere.totals + self.steps.jump), first]
-        beam = self._placed(look, merged(*beams), latest is not None)
-        away = yaw_costs(beam.yaws, look.yaw) * PACE / self.task.fps
-        totals = beam.totals + away + look.small(self._poses(beam), beam.places) / self.temperature
-        used = (looked + len(beam)) * look.share
-        best = diverse_best(self.exemplars, beam, totals, full)
-        beam = beam.chosen(best)
-        poses = self._poses(beam)
-        fits = (
-            away[best]
-            + look.full(poses, beam.places) / self.temperature
-            + landmark_costs(look.landmarks(poses, beam.places))
-        )
-        used += len(beam)
-        best = diverse_best(self.exemplars, beam, beam.totals + fits, WIDTH)
-        return self._joined(beam.chosen(best), fits[best], before, look), used
-
-    def _joined(self, beam: Beam, fits: Array, before: FrameStates[Beam] | None, look: FrameCosts) -> FrameStates[Beam]:
-        """Return a frame, joined to the one before."""
-        if before is None:
-            return frame_states(beam, fits, None, None)
-        transition = Transition(self.exemplars, before.beam, beam, self.seconds, look.root, look.eye)
-        return frame_states(beam, fits, before, self.transitions(transition))
+            first = self._first_states(self.task.first_pose, nearby)
+            parts = [replace(elsewhere, totals=elsewhere.totals + JUMP_COST), first]
+        beam = self._placed(frame_costs, beams.merged(*parts), before is not None)
+        turn_costs = yaw_costs(beam.yaws, frame_costs.yaw) * 30.0 / self.task.fps
+        totals = beam.totals + turn_costs + frame_costs.small(self._poses(beam), beam.places) / self.temperature
+        small_count += len(beam)
+        rows = beams.diverse_best(self.exemplars, beam, totals, full)
+        beam = beam.rows(rows)
+        poses, full_count = self._poses(beam), len(beam)
+        silhouette_costs = frame_costs.full(poses, beam.places) / self.temperature
+        costs = turn_costs[rows] + silhouette_costs + landmark_costs(frame_costs.landmarks(poses, beam.places))
+        best = beams.diverse_best(self.exemplars, beam, beam.totals + costs, BEAM_STATES)
+        return beam.rows(best), costs[best], small_count * frame_costs.small_share + full_count
 
     def _elsewhere(
-        self, look: FrameCosts, before: Beam | None, most: int, rng: np.random.Generator
+        self, frame_costs: FrameCosts, before: Beam | None, count: int, rng: np.random.Generator
     ) -> tuple[Beam, int]:
         """Return states that fit, from anywhere, and the number of small pictures that were evaluated."""
-        taken = min(GROUPS_TAKEN if before is not None else FIRST_GROUPS, max(most // (4 * OF_A_GROUP), 1))
-        count = max(most - taken * OF_A_GROUP, 1)
-        states, middle, reach = self.exemplars.draw(count, rng), 0.0, np.pi
-        known = self.task.yaw if before is None and look.yaw is None else look.yaw
+        max_groups = FIRST_SEARCHED_GROUPS if before is None else SEARCHED_GROUPS
+        group_count = min(max_groups, max(count // (4 * GROUP_POSES), 1))
+        drawn = max(count - group_count * GROUP_POSES, 1)
+        states, middle, reach = self.exemplars.draw(drawn, rng), 0.0, np.pi
+        known = self.task.yaw if before is None and frame_costs.yaw is None else frame_costs.yaw
         if known is not None:
-            middle, reach = known, FACING
-        yaws = middle + rng.uniform(-reach, reach, count)
-        beam = self._placed(look, self._started(states, yaws, before), False)
-        best = np.argsort(look.small(self._poses(beam), beam.places), kind="stable")[:taken]
-        groups = [self.exemplars.group_members(self.exemplars.owners[states[row]]) for row in best]
-        some = [rows if len(rows) <= OF_A_GROUP else rng.choice(rows, OF_A_GROUP, replace=False) for rows in groups]
-        yaws = np.repeat(yaws[best], [len(rows) for rows in some])
-        return self._started(np.concatenate(some), yaws, before), len(beam)
+            middle, reach = known, YAW_TOLERANCE
+        yaws = middle + rng.uniform(-reach, reach, drawn)
+        beam = self._placed(frame_costs, self._started(states, yaws, before), False)
+        best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[:group_count]
+        members, starts = self.exemplars.members, self.exemplars.starts
+        groups = [members[starts[group] : starts[group + 1]] for group in self.exemplars.groups[states[best]]]
+        poses = [rows if len(rows) <= GROUP_POSES else rng.choice(rows, GROUP_POSES, replace=False) for rows in groups]
+        yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
+        return self._started(np.concatenate(poses), yaws, before), len(beam)
 
-    def _first_states(self, angles: Array, most: int) -> Beam:
-        """Return the states, at most `most`, nearest to a first pose whose angles (63,) and yaw are known."""
-        yaw = self.task.yaw or 0.0
-        code = self.exemplars.coding.coded(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
-        apart = self.exemplars.squares - 2.0 * (self.exemplars.codes @ code)
-        turns = [-TURN, 0.0, TURN]
-        near = np.argsort(apart, kind="stable")[: min(most // len(turns), WIDTH)]
-        states, yaws = np.tile(near, len(turns)), yaw + np.repeat(turns, len(near))
-        return self._started(states, yaws, None)
+    def _first_states(self, angles: Array, count: int) -> Beam:
+        """Return the states, at most `count`, nearest to a first pose whose angles (63,) and yaw are known."""
+        yaw, codes = self.task.yaw or 0.0, self.exemplars.codes
+        code = self.exemplars.coding.of_poses(np.array([[yaw, 0.0, 0.0, *angles]]))[0]
+        squares = (codes**2).sum(axis=1) - 2.0 * (codes @ code)  # and a constant
+        turns = [-beams.CANDIDATE_TURN, 0.0, beams.CANDIDATE_TURN]
+        nearest = np.argsort(squares, kind="stable")[: min(count // len(turns), BEAM_STATES)]
+        return self._started(np.tile(nearest, len(turns)), yaw + np.repeat(turns, len(nearest)), None)
 
     def _started(self, states: Rows, yaws: Array, before: Beam | None) -> Beam:
-        """Return states that are reached by a jump, or that begin a track."""
-        parent, total, place = -1, 0.0, self.task.anchor
+        """Return states that are reached by a jump, or that start a track."""
+        total, place = 0.0, self.task.anchor
         if before is not None:
-            parent = int(before.totals.argmin())
-            total, place = before.totals[parent] + self.steps.jump, before.places[parent]
-        many = len(states)
-        places = np.repeat(place[None], many, axis=0)
-        return Beam(states, yaws, np.full(many, parent), np.full(many, total), places)
+            best = int(before.totals.argmin())
+            total, place = before.totals[best] + JUMP_COST, before.places[best]
+        return Beam(states, yaws, np.full(len(states), total), np.repeat(place[None], len(states), axis=0))
 
     def _poses(self, beam: Beam) -> Array:
-        return self.exemplars.turned(beam.states, beam.yaws)
+        return self.exemplars.with_yaws(beam.states, beam.yaws)
 
-    def _placed(self, look: FrameCosts, beam: Beam, expected: bool) -> Beam:
+    def _placed(self, frame_costs: FrameCosts, beam: Beam, expected: bool) -> Beam:
         """Return states with aligned roots; where they were `expected`, the distance from there adds to their costs."""
-        places = look.placed(self._poses(beam), beam.places)
-        if not expected or self.task.translation == "known":
-            return replace(beam, places=places)
-        off = root_deviation_costs(places, beam.places, look.eye, self.steps)
-        return replace(beam, places=places, totals=beam.totals + off)
+        places, totals = frame_costs.aligned(self._poses(beam), beam.places), beam.totals
+        if expected and self.task.translation != "known":
+            totals = totals + beams.root_deviation_costs(places, beam.places, frame_costs.camera_position)
+        return replace(beam, places=places, totals=totals)
 
-    def _estimated(self, waiting: deque[_PendingFrame], sampler: Sampler | None) -> Estimate:
-        """Return the estimate of the oldest waiting frame: the weighted mean of the states like that of the path."""
-        start, cpu_start = time.perf_counter(), time.process_time()
-        window = [frame.states for frame in waiting]
-        row, likely, oldest = viterbi_state(window), state_weights(window), waiting.popleft()
-        beam, look, others, paths = oldest.states.beam, oldest.look, None, None
+    def _estimated(self, frame: _BeamFrame, row: int, weights: Array) -> Estimate:
+        """Return the estimate of a frame: the weighted mean of the states like that of the path."""
+        beam, frame_costs, alternatives = frame.beam, frame.frame_costs, None
         if self.hypotheses is not None:
-            unlike = beam.chosen(diverse_best(self.exemplars, beam, beam.totals, self.hypotheses.unlike(look.cameras)))
-            others = self._poses(unlike), unlike.places
-        codes, turns = self.exemplars.codes[beam.states], beam.yaws - beam.yaws[row]
-        squares = squares_apart(codes, codes[row], turns)
-        pose, place = mean_near(row, likely, squares, self._poses(beam), beam.places)
-        if look.usable:
-            place = look.placed(pose[None], place[None])[0]
-        if sampler is not None and (rows := sampler.draw(window)) is not None:
-            paths = SampledPaths.of(self.task.body.skeleton, self._poses(beam)[rows], beam.places[rows], pose)
-        seconds = oldest.seconds + time.perf_counter() - start
-        cpu_seconds = oldest.cpu_seconds + time.process_time() - cpu_start
-        return Estimate(pose, place, look, oldest.evaluations, seconds, cpu_seconds, paths, others)
+            count = self.hypotheses.diverse_count(frame_costs.camera_count)
+            diverse = beam.rows(beams.diverse_best(self.exemplars, beam, beam.totals, count))
+            alternatives = self._poses(diverse), diverse.places
+        codes = self.exemplars.codes[beam.states]
+        squares = state_distances(codes, codes[row], beam.yaws - beam.yaws[row])
+        pose, place = markov.mean_near(row, weights, squares, self._poses(beam), beam.places)
+        if frame_costs.usable:
+            place = frame_costs.aligned(pose[None], place[None])[0]
+        return Estimate(pose, place, frame_costs, frame.effort, alternatives=alternatives)
+
+
+def state_distances(codes: Codes, code: Codes, turns: Array) -> Array:
+    """Return the squared distances (n,) of codes (n, D) from one, and of turns (n,) from 0, in standard deviations."""
+    squares = ((codes - code) ** 2).sum(axis=1) / SIMILAR_DISTANCE**2
+    return np.asarray(squares + (wrapped(turns) / SIMILAR_YAW) ** 2)
 
 
 def yaw_costs(yaws: Array, known: float | None) -> Array:
     """Return the costs (n,) of yaws (n,), radians, in a frame whose yaw is about `known`."""
     if known is None:
         return np.zeros(len(yaws))
-    return np.asarray(AWAY * np.clip(np.abs(wrapped(yaws - known)) / FACING - 1.0, 0.0, 1.0))
-
-
-def _named(name: str) -> Transitions:
-    """Return the function MODULE:FUNCTION. Raises ValueError where there is none."""
-    module, _, function = name.partition(":")
-    try:
-        model = getattr(importlib.import_module(module), function)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(
-            f"transitions must be clips or MODULE:FUNCTION that can be imported, got {name}: {error}"
-        ) from None
-    if not callable(model):
-        raise InputError(f"transitions must name a function, got {name}, which is a {type(model).__name__}")
-    return cast(Transitions, model)
-
-
-def _checked(transitions: Transitions, transition: Transition) -> Array:
-    """Return the costs of a model of transitions. Raises ValueError where they are not one finite number a step."""
-    costs, shape = np.asarray(transitions(transition), dtype=np.float64), (len(transition.before), len(transition.beam))
-    if costs.shape != shape or not np.isfinite(costs).all():
-        raise InputError(f"transitions must return finite costs of shape {shape}, got shape {costs.shape}")
-    return costs
+    excess = np.abs(wrapped(yaws - known)) / YAW_TOLERANCE - 1.0
+    return np.asarray(WRONG_YAW_COST * np.clip(excess, 0.0, 1.0))

@@ -3,7 +3,7 @@
 - `particle.Particle` is the bootstrap filter of Gordon, Salmond and Smith (1993), the SAPSO paper's opponent.
 - `annealed.Annealed` is the annealed particle filter of Deutscher and Reid (2005).
 
-`weighting` weighs particles, and computes how sharply.
+`weighting` weighs particles, computes how sharply, and resamples by weight.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="annealed", frames=(0, 3))

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.fitting.box import Space, converted, displacement, draw_population, sample_normal
 from posefit.fitting.check import at_least, between, positive
-from posefit.uncertainty.smc import systematic_rows
-from posefit_filters.weighting import sharpness, weigh
+from posefit_filters.weighting import sharpness, systematic_rows, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10

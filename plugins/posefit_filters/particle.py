@@ -9,8 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.box import Space, converted, draw_population, repair, sample_normal
 from posefit.fitting.check import at_least, positive
-from posefit.uncertainty.smc import systematic_rows
-from posefit_filters.weighting import weigh
+from posefit_filters.weighting import systematic_rows, weigh
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost

@@ -1,8 +1,9 @@
-"""From costs to weights, and how sharply costs are weighed."""
+"""From costs to weights, how sharply costs are weighed, and resampling by weights."""
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array, jit
 
@@ -15,6 +16,15 @@ def weigh(costs: Array, beta: float) -> Array:
     rises = np.where(known, costs, np.inf) - costs[known].min()
     weights: Array = np.exp(-beta * rises) if beta else known.astype(np.float64)  # GORDON1993 (likelihood)
     return np.asarray(weights / weights.sum())
+
+
+def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
+    """Return `count` rows, each as often as its weight times `count`, rounded up or down: systematic resampling.
+
+    `u` in [0, 1) is the offset of the evenly spaced points.
+    """
+    rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
+    return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
 
 
 HALVINGS = 60  # ours: bisection steps; a double has 53 bits

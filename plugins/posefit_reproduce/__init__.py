@@ -8,7 +8,27 @@ Each has `--help`, and `--json` for one JSON object on stdout. Other measurement
 folder `docs/studies`.
 
     commands.py     the command lines
-    sapso/, vsmm/   the experiments
+    sapso/, vsmm/   the experiments; `sapso/letter.py` is an optimiser, `sapso-letter`
     bench/          the benchmark
     jobs.py         runs jobs in processes, by the engine of `posefit sweep`
 """
+
+from posefit import hookimpl
+from posefit.hooks import RegisterCommand, RegisterOptimiser
+
+
+@hookimpl
+def posefit_register_commands(register: RegisterCommand) -> None:
+    """Register `reproduce` and `bench`."""
+    from posefit_reproduce.commands import bench_command, reproduce_group
+
+    register(reproduce_group)
+    register(bench_command)
+
+
+@hookimpl
+def posefit_register_optimisers(register: RegisterOptimiser) -> None:
+    """Offer `sapso-letter`, which the reproduction of the SAPSO paper compares with `sapso`."""
+    from posefit_reproduce.sapso.letter import LetterSAPSO
+
+    register("sapso-letter", LetterSAPSO)

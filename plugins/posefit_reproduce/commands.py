@@ -5,14 +5,13 @@ it runs.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
 import click
 
-from posefit import hookimpl
 from posefit.cli.options import JSON
 from posefit.cli.output import progress, say
 from posefit.errors import InputError
@@ -121,10 +120,3 @@ def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
             yield from _named_lines(value, f"{group}{name}.")
         else:
             yield f"{group + name:38} " + (f"{value:.4g}" if isinstance(value, float) else str(value))
-
-
-@hookimpl
-def posefit_register_commands(register: Callable[[click.Command], None]) -> None:
-    """Register `reproduce` and `bench`."""
-    register(reproduce_group)
-    register(bench_command)

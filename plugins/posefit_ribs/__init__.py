@@ -10,114 +10,13 @@ M. Faldor et al., Dominated novelty search: rethinking local competition in qual
 True
 """
 
-from typing import Any, final
-
-import numpy as np
-
-from posefit.plugin import Adapter, Array, RegisterOptimiser, Space, at_least, draw_population, hookimpl, positive
-
-MIN_POPULATION_OF_A_STRATEGY = 4  # proposals of a strategy: half of them are its parents
-
-
-@final
-class Ribs(Adapter):
-    """CMA-ES that restarts from an archive of dominated novelty search: from proposals far from all better ones.
-
-    An archive of `capacity` proposals keeps those that are farthest from their nearest better ones. Several evolution
-    strategies search at a time, and each starts again, after so many populations, from a random one of them. `modes`
-    are the proposals of the archive that are better than all their neighbours.
-
-    Settings:
-        population_size: proposals at a time, those of all strategies together, 4 or more.
-        strategies: that search at a time, 1 or more, with at least 4 proposals each.
-        capacity: proposals that the archive holds, 2 or more.
-        neighbours: better ones whose distance counts, and neighbours that a mode is better than, 1 or more.
-        populations: of a strategy until it starts again, 1 or more.
-        step: first standard deviation of a strategy, in half-ranges of the box, above 0; at most that of the start.
-    """
-
-    def __init__(
-        self,
-        space: Space,
-        rng: np.random.Generator,
-        *,
-        population_size: int = 24,
-        strategies: int = 2,
-        capacity: int = 100,
-        neighbours: int = 1,
-        populations: int = 40,
-        step: float = 0.3,
-    ) -> None:
-        from ribs.archives import DNSArchive
-        from ribs.emitters import EvolutionStrategyEmitter
-
-        at_least("population_size", population_size, MIN_POPULATION_OF_A_STRATEGY)
-        at_least("strategies", strategies, 1)
-        at_least("capacity", capacity, 2)
-        at_least("neighbours", neighbours, 1)
-        at_least("populations", populations, 1)
-        positive("step", step)
-        self._first, self._neighbours = draw_population(space, rng, population_size), neighbours
-        super().__init__(space, self._first[0])
-        self._archive: Any = DNSArchive(
-            solution_dim=space.dimensions,
-            measure_dim=self._where(self._first).shape[1],
-            capacity=capacity,
-            k_neighbors=neighbours,
-            seed=int(rng.integers(2**31)),
-        )
-        if space.start is not None:
-            step = min(step, max(float(np.mean(space.start.spread)), 1e-6))
-        strategies = min(strategies, population_size // MIN_POPULATION_OF_A_STRATEGY)
-        self._strategies: list[Any] = [
-            EvolutionStrategyEmitter(
-                self._archive,
-                x0=self._first[k],
-                sigma0=step,
-                ranker="obj",
-                selection_rule="mu",
-                restart_rule=populations,
-                batch_size=population_size // strategies + (k < population_size % strategies),
-                seed=int(rng.integers(2**31)),
-            )
-            for k in range(strategies)
-        ]
-
-    def propose(self) -> Array:
-        """Return the next population (n, d)."""
-        if self._archive.empty:
-            return self._first
-        return np.concatenate([one.ask() for one in self._strategies])
-
-    def learn(self, proposals: Array, costs: Array) -> None:
-        """Let the archive choose among its proposals and these, and every strategy learn from its own."""
-        values, where, first = -costs, self._where(proposals), self._archive.empty
-        added = self._archive.add(proposals, values, where)
-        if not first:
-            stops = np.cumsum([one.batch_size for one in self._strategies])
-            for one, stop in zip(self._strategies, stops.tolist(), strict=True):
-                mine = slice(stop - one.batch_size, stop)
-                about = {name: value[mine] for name, value in added.items()}
-                one.tell(proposals[mine], values[mine], where[mine], about)
-
-    def modes(self) -> Array:
-        """Return the proposals (k, d) that are better than all their neighbours, the best first."""
-        kept = self._archive.data()
-        proposals, costs = np.asarray(kept["solution"]), -np.asarray(kept["objective"])
-        order = np.argsort(costs, kind="stable")
-        where = np.asarray(kept["measures"])[order]
-        away = np.linalg.norm(where[:, None] - where[None], axis=-1)
-        near = np.argsort(away, axis=1, kind="stable")[:, 1 : self._neighbours + 1]
-        best = (near > np.arange(len(order))[:, None]).all(axis=1)
-        return np.asarray(proposals[order][best])
-
-    def _where(self, proposals: Array) -> Array:
-        """Return points (n, m) as far apart as proposals (n, d) are: what wraps around goes round a circle."""
-        turns = proposals[:, self._space.periodic] * np.pi
-        return np.column_stack([proposals[:, ~self._space.periodic], np.cos(turns) / np.pi, np.sin(turns) / np.pi])
+from posefit import hookimpl
+from posefit.hooks import RegisterOptimiser
 
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
     """Register `ribs`."""
+    from posefit_ribs.adapter import Ribs
+
     register("ribs", Ribs, needs=("ribs", "posefit[ribs]"))

@@ -1,11 +1,8 @@
 """Particle swarms for posefit: `sapso`, `pso`, and `random`, the baseline every optimiser has to beat.
 
-- `sapso.SAPSO` is Algorithm 1 of the paper that posefit is built after, simulated-annealed particle swarm optimisation;
-  what the paper leaves open are its settings.
+- `sapso.SAPSO` is Algorithm 1 of the paper that posefit is built after, simulated-annealed particle swarm optimisation.
 - `pso.PSO` is the swarm of Kennedy and Eberhart (1995), constricted as by Clerc and Kennedy (2002).
 - `random.Random` draws uniformly.
-
-`swarm.SwarmState` is what both swarms share, and `kernels` has the equations (1) and (2).
 
 >>> import posefit
 >>> track = posefit.track("walk", method="sapso", frames=(0, 3))

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from posefit.arrays import Array
-from posefit.fitting.box import Space, draw_population
-from posefit.fitting.check import at_least
+from posefit.plugin import Array, Space, at_least, draw_population
 
 
 class Random:

@@ -1,42 +1,33 @@
-"""Simulated-annealed particle swarm optimisation: the paper's Algorithm 1."""
+"""Simulated-annealed particle swarm optimisation: Algorithm 1 of Li, Sun, Chen and Li (2012), as ask and tell.
 
-from typing import Literal
+Attributes have the paper's letters. `posefit_reproduce.sapso.letter` follows it where this reads it otherwise.
+"""
+
+import math
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from posefit.arrays import Array
-from posefit.fitting.box import REDRAWS, Space
-from posefit.fitting.check import at_least, between, choices, positive
-from posefit.fitting.problem import PoseProblem
-from posefit_swarm.swarm import ACCELERATION, ALPHA, INERTIA, SwarmState, check_swarm, inertia, speed_limits
+from posefit.plugin import Array, Space, at_least, between, displacement, draw_population, positive, wrap
 
-POPULATION_SIZE = 40  # N, section 5.2
-ITERATIONS = 60  # C, section 5.2
-TEMPERATURE = 1.0  # T, section 5.2
-COOLING = 0.95  # gamma, section 5.2
-STOP_TEMPERATURE = 0.0  # T0; Interpretation S5
+REDRAWS = 10  # ours: of rand() for a particle that is no pose to the prior; then it stays. Interpretation S7
+
+Rows = NDArray[np.int64]
 
 
 class SAPSO:
-    """Algorithm 1 as an ask/tell optimiser. Velocities and positions are those of the unit box.
+    """Algorithm 1. Positions and velocities are those of the unit box.
 
     Settings:
-        population_size (N): size of the swarm, 1 or more. Section 5.2.
+        population_size (N): of the swarm, 1 or more. Section 5.2.
         iterations (C): moves of the swarm, 1 or more; it is evaluated once more (Interpretation S10). Section 5.2.
         temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
-        cooling (gamma): factor on the temperature after each iteration, 0 to 1. Section 5.2.
+        cooling (gamma): factor on the temperature after each iteration (Interpretation S6), 0 to 1. Section 5.2.
         stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
         inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Interpretation S5.
         acceleration (c1, c2): of the pulls towards the personal and the swarm's best, 0 or more. Section 3.1.
         alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. Section 2.2.
-        redraws: of rand() before a particle that breaks a constraint is stopped, 0 or more. Interpretation S7.
-        cool: once an "iteration", or once an "acceptance", with one shared temperature. Interpretation S6.
-        rand: fresh for every "dimension", or one "scalar" a particle. Interpretation S8.
-        velocity_limits: "symmetric" about 0, or "literal", alpha times the range's own ends. Interpretation S9.
-        rejected_velocity: of a particle whose move was refused, "kept" or "zeroed". Interpretation S11.
-        velocity_check: velocities beyond their limits are "clamped", or "redrawn" as step 2c says. Interpretation S7.
-        last_generation: of moves, "evaluated" or "skipped". Interpretation S10.
-        variant: "paper" sets the letter of the settings that Interpretations S6 to S10 name; "default" leaves them.
     """
 
     def __init__(
@@ -44,69 +35,102 @@ class SAPSO:
         space: Space,
         rng: np.random.Generator,
         *,
-        population_size: int = POPULATION_SIZE,
-        iterations: int = ITERATIONS,
-        temperature: float = TEMPERATURE,
-        cooling: float = COOLING,
-        stop_temperature: float = STOP_TEMPERATURE,
-        inertia: float = INERTIA,
-        acceleration: float = ACCELERATION,
-        alpha: float = ALPHA,
-        redraws: int = REDRAWS,
-        cool: Literal["iteration", "acceptance"] = "iteration",
-        rand: Literal["dimension", "scalar"] = "dimension",
-        velocity_limits: Literal["symmetric", "literal"] = "symmetric",
-        rejected_velocity: Literal["kept", "zeroed"] = "kept",
-        velocity_check: Literal["clamped", "redrawn"] = "clamped",
-        last_generation: Literal["evaluated", "skipped"] = "evaluated",
-        variant: Literal["default", "paper"] = "default",
+        population_size: int = 40,
+        iterations: int = 60,
+        temperature: float = 1.0,
+        cooling: float = 0.95,
+        stop_temperature: float = 0.0,
+        inertia: float = 0.9,
+        acceleration: float = 2.0,
+        alpha: float = 0.15,
     ) -> None:
-        check_swarm(population_size, iterations, inertia, acceleration, alpha, redraws)
+        at_least("population_size", population_size, 1)
+        at_least("iterations", iterations, 1)
         positive("temperature", temperature)
         between("cooling", cooling, 0.0, 1.0)
         at_least("stop_temperature", stop_temperature, 0.0)
-        choices(SAPSO.__init__, locals())
-        if variant == "paper":
-            cool, rand, velocity_limits = "acceptance", "scalar", "literal"
-            velocity_check, last_generation = "redrawn", "skipped"
-        self._iterations, self._inertia, self._acceleration = iterations, inertia, acceleration
-        self._last = iterations if last_generation == "evaluated" else iterations - 1  # Interpretation S10
-        self._temperature, self._cooling, self._stop = temperature, cooling, stop_temperature
-        self._cool_each = cool == "acceptance"
-        self._kept = 1.0 if rejected_velocity == "kept" else 0.0  # Interpretation S11
-        self._iteration, self._dimensions = 0, space.dimensions
-        limits = speed_limits(space, alpha, velocity_limits)
-        clamped = velocity_check == "clamped"
-        self._swarm = SwarmState(space, rng, population_size, limits, redraws, rand, clamped)  # SAPSO A1.1
+        between("inertia", inertia, 0.1, math.inf, ends=False)
+        at_least("acceleration", acceleration, 0.0)
+        positive("alpha", alpha)
+        self.space, self.rng, self.c, self.C = space, rng, 0, iterations
+        self.T, self.gamma, self.T0 = temperature, cooling, stop_temperature
+        self.A, self.acceleration, self.alpha = inertia, acceleration, alpha
+        self.moved = draw_population(space, rng, population_size)  # SAPSO A1.1
+        self.x, self.cost = self.moved.copy(), np.full(population_size, np.inf)
+        self.pbest, self.pbest_cost = self.x.copy(), self.cost.copy()
+        self.v = first_velocities(space, rng, population_size, alpha)
 
     def ask(self) -> Array:
-        """Return the particles (n, d) after their move; none once the iterations or the temperature are used up."""
-        if self._iteration > self._last or self._temperature <= self._stop:  # SAPSO A1.2
-            return np.empty((0, self._dimensions))
-        return self._swarm.moved.copy()
+        """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
+        goes_on = self.c <= self.C and self.T > self.T0  # SAPSO A1.2
+        return self.moved.copy() if goes_on else self.moved[:0]
 
     def tell(self, proposals: Array, costs: Array) -> None:
-        """Accept or refuse the move, remember the best, and move on."""
-        swarm, how = self._swarm, (self._temperature, self._kept)
-        if self._iteration < self._iterations:
-            omega = inertia(self._iteration, self._iterations, self._inertia)
-            accepted = swarm.accept_and_move(proposals, costs, *how, omega, self._acceleration)
-        else:
-            accepted, _ = swarm.accept(proposals, costs, *how)
-        if self._iteration > 0:
-            # SAPSO A1.2e
-            self._temperature *= self._cooling ** (np.count_nonzero(accepted) if self._cool_each else 1)
-        self._iteration += 1
+        """Accept or refuse the moves by their costs (N,), remember the bests, cool, and move on."""
+        with np.errstate(invalid="ignore"):  # infinity less infinity; nan is never accepted
+            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))  # Metropolis' criterion
+        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))  # SAPSO A1.2d
+        self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
+        better = self.cost < self.pbest_cost  # SAPSO A1.2b
+        self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
+        if self.c > 0:
+            self.T *= self.gamma  # SAPSO A1.2e
+        if self.c < self.C:
+            self.v, self.moved = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)
+        self.c += 1
 
-    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
-        """Return the next populations (k, n, d) and their costs (k, n); the last one, which moves no more, is asked."""
-        before = self._iteration
-        after = min(before + evaluations // len(self._swarm.moved), self._iterations)
-        omegas = [inertia(step, self._iterations, self._inertia) for step in range(before, after)]
-        schedule = np.tile([0.0, self._acceleration, self._cooling], (len(omegas), 1))
-        schedule[:, 0] = omegas
-        schedule[: before == 0, 2] = 1.0  # the first moves are not cooled after
-        annealing = self._kept, self._stop, self._cool_each
-        searched, self._temperature = self._swarm.compiled_search(problem, schedule, self._temperature, annealing)
-        self._iteration += len(searched[1])
-        return searched
+    def step(self, rows: Rows) -> tuple[Array, Array]:
+        """Return velocities and positions (k, d) of some particles (k,) after a move."""
+        x, gbest, omega = self.x[rows], self.pbest[self.pbest_cost.argmin()], inertia_at(self.c, self.C, self.A)
+        phi1, phi2 = self.acceleration * self.rng.random((2, *x.shape))  # Interpretation S8
+        to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
+        v = omega * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest  # SAPSO (1)
+        return fly(self.space, x, limited(v, self.alpha))
+
+
+def inertia_at(c: int, C: int, A: float) -> float:
+    """Return omega of iteration c of C: it falls from A to 0.1. Section 3.1."""
+    return A / math.exp(c * math.log(10.0 * A) / C)  # SAPSO inertia
+
+
+def limited(v: Array, alpha: float) -> Array:
+    """Return velocities (n, d) clamped to their limits. Constraint 1, Interpretation S9."""
+    return np.minimum(np.maximum(v, -alpha), alpha)  # SAPSO 2.2 velocity
+
+
+def first_velocities(space: Space, rng: np.random.Generator, count: int, alpha: float) -> Array:
+    """Return the velocities (count, d) of first particles, towards the prediction where there is one."""
+    if space.start is None:
+        return rng.uniform(-alpha, alpha, (count, space.dimensions))
+    v_pred = space.start.velocity
+    low, high = np.minimum(v_pred, 0.0), np.maximum(v_pred, 0.0)  # Interpretation S12
+    return limited(rng.uniform(low, high, (count, space.dimensions)), alpha)  # SAPSO (7)
+
+
+def fly(space: Space, x: Array, v: Array) -> tuple[Array, Array]:
+    """Return velocities and positions (n, d) of particles at x (n, d): the walls of the box stop them."""
+    there = wrap(space, x + v)  # SAPSO (2)
+    inside = np.minimum(np.maximum(there, -1.0), 1.0)
+    return np.where(inside == there, v, 0.0), inside
+
+
+def redrawn(
+    x: Array,
+    step: Callable[[Rows], tuple[Array, Array]],
+    allowed: Callable[[Array, Array], NDArray[np.bool_]],
+    redraws: int,
+) -> tuple[Array, Array]:
+    """Return velocities and positions (n, d) after a step from x (n, d) that is allowed. Interpretation S7.
+
+    A particle whose step is not has rand() drawn again so many times, and then stays where it is. `step` returns the
+    velocities and positions (k, d) of some particles (k,), and `allowed` which of these are (k,).
+    """
+    v, moved = step(np.arange(len(x)))
+    broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c
+    if len(broken):
+        again = step(np.repeat(broken, redraws))
+        works = allowed(*again).reshape(len(broken), redraws)
+        first, any_works = redraws * np.arange(len(broken)) + works.argmax(axis=1), works.any(axis=1, keepdims=True)
+        v[broken] = np.where(any_works, again[0][first], 0.0)
+        moved[broken] = np.where(any_works, again[1][first], x[broken])
+    return v, moved

@@ -3,15 +3,14 @@
 It follows a person in milliseconds a frame, by joints that rules find in the silhouette, as long as one of its motion
 models knows what the person does: walking, arms held out, jumping jacks, jumps, squats. Its steps, by number:
 
-- 1, 2: `joints`, the outline and the skeleton line of a mask, and where 17 points of the body are, with hidden ones
-  predicted (2.7).
+- 1: `preprocess`, the outline and the skeleton line of a mask.
+- 2: `joints`, where 17 points of the body are, with hidden ones predicted.
 - 3: `motion`, how a state, defined in `state`, goes on to the next frame.
+- 4, 5: `groups`, which models belong together, and which group is the likeliest.
 - 6: `measurement`, what cameras measure of a state (6.1), and `imm`, the filter.
-- 4, 5, 7 to 9: `switching`, which models belong together, which group is the likeliest, when one comes into force and
-  when it goes.
+- 7 to 9: `switching`, when a group comes into force and when it ends.
 
-`settings` has the patent's letter beside ours. `tracker` is `vsmm`, from its settings to a frame; `joined` leads a
-swarm by the models. `kernels` has the loops.
+`tracker` is `vsmm`, from its settings to a frame; `search` is that of `sapso+vsmm`, in every frame.
 
 >>> import posefit
 >>> track = posefit.track("jacks", method="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0)
@@ -26,8 +25,7 @@ from posefit.hooks import RegisterTracker
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `vsmm` and `sapso+vsmm`."""
-    from posefit_vsmm.joined import joined
-    from posefit_vsmm.tracker import vsmm
+    from posefit_vsmm.tracker import VSMM, swarm_led_by_models
 
-    register("vsmm", vsmm)
-    register("sapso+vsmm", joined)
+    register("vsmm", VSMM)
+    register("sapso+vsmm", swarm_led_by_models)

@@ -1,12 +1,11 @@
 """What cameras measure of a state: the rules' joints, against the projected points of the state. VSMM 6.1.
 
-How far off a detected joint is, is counted in the standard deviations of its prediction and its detection together:
-the squared Mahalanobis distance, known as the normalised innovation squared (NIS). A validation gate on it decides
-which detections are accepted, and its mean over a frame is the surprise of that frame.
+A validation gate on the squared Mahalanobis distance decides which detections are accepted.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,23 +13,20 @@ from posefit.arrays import Array
 from posefit.fitting.landmarks import DEVIATION, GROUPS, MIRRORED
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics, place_frames
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, Skeleton
+from posefit.geometry.skeleton import BONES
 from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import OWN, Lines, detected, rule_errors
-from posefit_vsmm.kernels import bend, points_and_jacobian
+from posefit_vsmm.joints import detect, rule_errors
 from posefit_vsmm.motion import leg_of
-from posefit_vsmm.settings import Settings
-from posefit_vsmm.state import ENDS, ERROR, FIRST_BONE, POINTS, Reliance
+from posefit_vsmm.preprocess import Lines
+from posefit_vsmm.state import ENDS, ERROR, DependentJoints, decode, differentiate
 
-NEAREST = 0.05  # metres: a smaller distance to the camera counts as this one
-NARROWEST, WIDEST = 0.35, 1.2  # legs: gates around where points are expected
-FAR = 1e3  # legs: a gate that is none
-DEVIATIONS = 3.0  # between these, so many standard deviations
-SURPRISE = 16.0  # the Mahalanobis gate, squared standard deviations in the image: a detection farther off is rejected
-LEAST = 0.05  # the lowest confidence that counts
-TINY = 1e-12
-KNOWN = 0.002  # metres: the deviation of a translation that is known
+MIN_DEPTH = 0.05  # metres: a smaller distance to the camera counts as this one
+GATE_DEVIATIONS = 3.0  # the gate around where a point is expected, in standard deviations
+MIN_GATE, MAX_GATE = 0.35, 1.2  # legs: between these
+NO_GATE = 1e3  # legs: a gate that is none
+MAX_DISTANCE = 16.0  # squared standard deviations in the image: a detection farther off is rejected
+MIN_CONFIDENCE = 0.05  # a lower one counts as this one
+KNOWN_VARIANCE = 0.002**2  # square metres: of a translation that is known
 
 
 def head_radius(body: Body) -> float:
@@ -38,55 +34,18 @@ def head_radius(body: Body) -> float:
     return float(body.radii[BONES.index("head")].mean())
 
 
-@dataclass(frozen=True, eq=False)
-class Figure:
-    """A skeleton as its states move it."""
-
-    skeleton: Skeleton
-    reliance: Reliance = field(repr=False)
-
-    def points(self, state: Array) -> tuple[Array, Array]:
-        """Return the points (17, 3) in metres of a state (43,), and their Jacobian (17, 3, 33) by its error."""
-        matrix, offset = self.reliance.matrix, self.reliance.offset
-        pose, chained = np.empty(ANGLES), np.empty(matrix.shape)
-        bend(state, matrix, offset, np.empty(matrix.shape[1]), pose, chained)
-        sines, cosines = np.empty(ANGLES), np.empty(ANGLES)
-        frames = np.empty((len(JOINTS), 4, 3))
-        place_frames(kinematics(), self.skeleton.chain, pose[None], state[None, :3], sines, cosines, frames)
-        count = len(POINTS)
-        points, jacobian = np.empty((count, 3)), np.zeros((count, 3, ERROR))
-        others = np.empty((count, 3, len(offset)))
-        points_and_jacobian(sines, cosines, frames, frames[:, 3].copy(), points, jacobian, others)
-        jacobian[:, :, FIRST_BONE:] += (others.reshape(-1, len(offset)) @ chained).reshape(count, 3, -1)
-        return points, jacobian
-
-    def project(self, camera: Camera, state: Array) -> tuple[Array, Array]:
-        """Return the projected points (17, 2) of a state, in pixels, and their Jacobian (17, 2, 33)."""
-        points, jacobian = self.points(state)
-        inside = points @ camera.rotation.T + camera.translation
-        depths = np.maximum(inside[:, 2], NEAREST)
-        pixels = inside[:, :2] / depths[:, None] * camera.focal + camera.centre
-        moving = camera.rotation @ jacobian  # (17, 3, 33)
-        ratio = (inside[:, :2] / depths[:, None])[:, :, None]
-        by_error = camera.focal[None, :, None] / depths[:, None, None] * (moving[:, :2] - ratio * moving[:, 2:])
-        return pixels, by_error
-
-
-@dataclass(frozen=True, eq=False)
-class JointMeasurement:
+class JointMeasurement(NamedTuple):
     """What one camera measured."""
 
     points: Array  # (17, 2) pixels
     confidence: Array  # (17,); 0 is hidden
-    variances: Array = field(repr=False)  # (17, 2) square pixels
+    variances: Array  # (17, 2) square pixels
     unassigned: int  # end points of the skeleton line that belong to none of them
-    # mean squared standard deviations a coordinate (NIS / 2) of the points that the rules detected by themselves
-    surprise: float | None  # None where the camera shows nobody
 
     def imputed(self, points: Array) -> "JointMeasurement":
         """Return the same with other points (17, 2) where none are detected, as if they were. Interpretation V9."""
-        shown = self.confidence > 0.0
-        return replace(self, points=np.where(shown[:, None], self.points, points), confidence=np.ones(len(shown)))
+        visible = self.confidence > 0.0
+        return self._replace(points=np.where(visible[:, None], self.points, points), confidence=np.ones(len(visible)))
 
 
 def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
@@ -95,81 +54,90 @@ def with_sides(landmarks: Array, expected: Array) -> tuple[Array, Array]:
     Sides that a detector exchanged are those that are nearer to where the points are expected (17, 2).
     """
     joints = ENDS[:, 0]
-    alone = joints == ENDS[:, 1]
-    given = landmarks[joints]
+    single = joints == ENDS[:, 1]  # points that are a joint, not the middle of two
+    placed = landmarks[joints]
     for group in GROUPS:
-        rows = np.flatnonzero(alone & np.isin(joints, group) & (given[:, 2] > 0.0))
+        rows = np.flatnonzero(single & np.isin(joints, group) & (placed[:, 2] > 0.0))
         exchanged = landmarks[MIRRORED[joints[rows]]]
-        off, other = (np.linalg.norm(those[:, :2] - expected[rows], axis=1).sum() for those in (given[rows], exchanged))
-        if other < off:
-            given[rows] = exchanged
-    return given[:, :2], np.where(alone, np.minimum(given[:, 2], 1.0), 0.0)
+        both = np.stack([placed[rows], exchanged])[..., :2]
+        direct, other = np.linalg.norm(both - expected[rows], axis=2).sum(axis=1)
+        if other < direct:
+            placed[rows] = exchanged
+    return placed[:, :2], np.where(single, np.minimum(placed[:, 2], 1.0), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class JointCameras:
-    """A body before cameras."""
+    """A body, as its states move it, before cameras."""
 
     body: Body
     cameras: Sequence[Camera]
-    figure: Figure
-    how: Settings
+    dependent: DependentJoints
+    patent: bool = False
+    joint_noise: float = 1.0
+
+    def project(self, camera: Camera, states: Array) -> tuple[Array, Array]:
+        """Return the projected points (r, 17, 2) of states (r, 43), in pixels, and their Jacobians (r, 17, 2, 33)."""
+
+        def pixels(states: Array) -> Array:
+            points = self.body.skeleton.joints(*decode(states, self.dependent))[..., ENDS, :].mean(axis=-2)
+            inside = points @ camera.rotation.T + camera.translation
+            slopes = inside[..., :2] / np.maximum(inside[..., 2:], MIN_DEPTH)
+            return np.asarray(slopes * camera.focal + camera.centre)
+
+        return differentiate(pixels, states)
 
     def detect(
         self, views: Sequence[Lines | None], expected: Array, spread: Array, landmarks: Array | None = None
     ) -> list[JointMeasurement]:
         """Return the joints that each camera shows, where a state (43,) is expected with a covariance (33, 33).
 
-        Detections outside the Mahalanobis gate are rejected. Where a camera shows nobody, no joint is detected.
         `landmarks` (V, 27, 3) are those of an `Observation`; a joint is where they and the rules have it on average.
         """
-        given = np.zeros((len(views), len(JOINTS), 3)) if landmarks is None else landmarks
-        each = zip(self.cameras, views, given, strict=True)
-        return [self._detected(camera, lines, expected, spread, view) for camera, lines, view in each]
+        each = zip(self.cameras, views, [None] * len(views) if landmarks is None else landmarks, strict=True)
+        return [self._detect(camera, lines, expected, spread, view) for camera, lines, view in each]
 
-    def _detected(
-        self, camera: Camera, lines: Lines | None, expected: Array, spread: Array, landmarks: Array
+    def _detect(
+        self, camera: Camera, lines: Lines | None, expected: Array, spread: Array, landmarks: Array | None
     ) -> JointMeasurement:
-        pixels, jacobian = self.figure.project(camera, expected)
+        pixels, jacobian = (part[0] for part in self.project(camera, expected[None]))
         if lines is None:
-            return JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0, None)
+            return JointMeasurement(pixels, np.zeros(len(pixels)), np.ones_like(pixels), 0)
         depth = float((camera.rotation @ expected[:3] + camera.translation)[2])
-        metre = float(camera.focal.mean()) / max(depth, NEAREST)  # in pixels, at the root's depth
+        metre = float(camera.focal.mean()) / max(depth, MIN_DEPTH)  # in pixels, at the root's depth
         leg = leg_of(self.body.skeleton) * metre
-        covariances = jacobian @ spread @ jacobian.transpose(0, 2, 1)
-        gates = DEVIATIONS * np.sqrt(np.einsum("pii->pi", covariances).max(axis=1))
-        gates = np.clip(gates, NARROWEST * leg, WIDEST * leg) if self.how.gates else np.full_like(gates, FAR * leg)
-        (bias, deviation), radius = rule_errors(self.how.joint_errors), head_radius(self.body) * metre
-        points, sure, unassigned = detected(lines, pixels, gates, leg, radius, bias, self.how.assignment)
-        variances = self.how.joint_noise * (deviation * leg) ** 2
-        if self.how.joint_errors == "measured":
-            variances = variances / np.maximum(sure, LEAST)[:, None]
-        if landmarks.any():
-            placed, trusted = with_sides(landmarks, pixels)
-            rules = (sure > 0.0)[:, None] / variances
-            total = rules + np.maximum(trusted, TINY)[:, None] / (DEVIATION * metre) ** 2
-            placed = np.where(trusted[:, None] > 0.0, placed, points)
+        covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)
+        gates = GATE_DEVIATIONS * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).max(axis=1))
+        gates = np.full_like(gates, NO_GATE * leg) if self.patent else np.clip(gates, MIN_GATE * leg, MAX_GATE * leg)
+        bias, deviation = rule_errors(self.patent)
+        head = head_radius(self.body) * metre
+        points, confidence, unassigned = detect(lines, pixels, gates, leg, head, bias, nearest=self.patent)
+        variances = self.joint_noise * (deviation * leg) ** 2
+        if not self.patent:  # Interpretation V8
+            variances = variances / np.maximum(confidence, MIN_CONFIDENCE)[:, None]
+        if landmarks is not None and landmarks.any():
+            placed, trust = with_sides(landmarks, pixels)
+            rules = (confidence > 0.0)[:, None] / variances
+            total = rules + np.maximum(trust, 1e-12)[:, None] / (DEVIATION * metre) ** 2
+            placed = np.where(trust[:, None] > 0.0, placed, points)
             points, variances = placed + rules / total * (points - placed), 1.0 / total
-            sure = np.maximum(sure, trusted)
-        off = points - pixels
-        distance = np.einsum("pi,pij,pj->p", off, np.linalg.inv(covariances + variances[:, :, None] * np.eye(2)), off)
-        accepted = (distance < SURPRISE) | (not self.how.gates)
-        confidence, own = np.where(accepted, sure, 0.0), (sure > 0.0) & OWN
-        dropped = np.count_nonzero((confidence == 0.0) & (sure > 0.0))
-        surprise = float(distance[own].mean() / 2.0) if own.any() else 0.0
-        return JointMeasurement(points, confidence, variances, unassigned + int(dropped), surprise)
+            confidence = np.maximum(confidence, trust)
+        residuals = points - pixels
+        innovations = covariances + variances[:, :, None] * np.eye(2)
+        distances = (residuals * np.linalg.solve(innovations, residuals[..., None])[..., 0]).sum(axis=1)
+        rejected = (distances >= MAX_DISTANCE) & (confidence > 0.0) & (not self.patent)
+        confidence = np.where(rejected, 0.0, confidence)
+        return JointMeasurement(points, confidence, variances, unassigned + int(np.count_nonzero(rejected)))
 
-    def measure(self, state: Array, measured: Sequence[JointMeasurement], known: Array | None) -> Measurement:
-        """Return the residuals of detected joints for a state (43,). Hidden joints have no row. Interpretation V9."""
-        residuals, jacobians, noise = [np.zeros(0)], [np.zeros((0, ERROR))], [np.zeros(0)]
+    def measure(self, states: Array, measured: Sequence[JointMeasurement], known: Array | None) -> Measurement:
+        """Return the residuals of detected joints, and of a known translation (3,), for states (r, 43). V9."""
+        count, parts = len(states), []
         for camera, joints in zip(self.cameras, measured, strict=True):
-            pixels, jacobian = self.figure.project(camera, state)  # VSMM 6.1
-            shown = joints.confidence > 0.0
-            residuals.append((joints.points - pixels)[shown].ravel())
-            jacobians.append(jacobian[shown].reshape(-1, ERROR))
-            noise.append(joints.variances[shown].ravel())
+            visible = joints.confidence > 0.0
+            pixels, jacobians = (part[:, visible] for part in self.project(camera, states))  # VSMM 6.1
+            parts.append((joints.points[visible] - pixels, jacobians, joints.variances[visible]))
         if known is not None:
-            residuals.append(known - state[:3])
-            jacobians.append(np.eye(3, ERROR))
-            noise.append(np.full(3, KNOWN**2))
-        return Measurement(np.concatenate(residuals), np.concatenate(jacobians), np.diag(np.concatenate(noise)))
+            parts.append((known - states[:, :3], np.tile(np.eye(3, ERROR), (count, 1, 1)), np.full(3, KNOWN_VARIANCE)))
+        residuals = np.concatenate([residual.reshape(count, -1) for residual, _, _ in parts], axis=1)
+        jacobians = np.concatenate([jacobian.reshape(count, -1, ERROR) for _, jacobian, _ in parts], axis=1)
+        return Measurement(residuals, jacobians, np.diag(np.concatenate([noise.ravel() for *_, noise in parts])))

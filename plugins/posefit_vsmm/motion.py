@@ -5,11 +5,11 @@ body's, its origin the root, so that places and directions do not matter. Length
 them; the models that the package carries are fitted to CMU clips by docs/studies/make_models.py.
 """
 
-import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,141 +18,147 @@ from posefit.errors import InputError
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
 from posefit.reading import parsed_json, read_text
-from posefit_vsmm import kernels
-from posefit_vsmm.settings import Poses, Shrink
-from posefit_vsmm.state import ERROR, STATE, Reliance, free_errors
+from posefit_vsmm.state import (
+    STATE,
+    TURNS,
+    DependentJoints,
+    differentiate,
+    free_errors,
+    inverse_tangents,
+    joined_state,
+    lengths,
+    product,
+    quaternions_of,
+    tangents,
+    unit,
+)
 
 FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
-SIZE_LIMIT = 10_000_000  # bytes of a file of models
 CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
+SIZE_LIMIT = 10_000_000  # bytes of a file of models
 
 
 @dataclass(frozen=True, eq=False)
-class MotionModel:
-    """One model, for a body and a frame rate; a `posefit_vsmm.imm.Model`."""
+class MotionModels:
+    """Models (r,) side by side, for a body and a frame rate. Each has a state of its own."""
 
-    name: str
-    matrix: Array = field(repr=False)  # (43, 40) F less the identity, of the quaternions
-    offset: Array = field(repr=False)  # (43,)
-    noise: Array = field(repr=False)  # (33, 33) covariance of W
-    poses: Array = field(repr=False)  # (n, 40) quaternions of its typical poses, heading along +z
-    captured: Array = field(repr=False)  # (n, 40) those of poses that it was fitted to
+    names: tuple[str, ...]
+    matrices: Array = field(repr=False)  # (r, 43, 40) F less the identity, of the quaternions
+    offsets: Array = field(repr=False)  # (r, 43)
+    noises: Array = field(repr=False)  # (r, 33, 33) covariance of W
+    poses: Array = field(repr=False)  # (r, n, 40) quaternions of typical poses, heading along +z
+    captured: Array = field(repr=False)  # (r, n, 40) those of poses that a model was fitted to
     leg: float = 1.0  # metres
     share: float = 1.0  # of the step at 30 frames a second
 
-    def predict(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return the state (43,) one frame later, and the covariance (33, 33) of its error."""
-        moved, jacobian = self.step(state)
-        return moved, jacobian @ covariance @ jacobian.T + self.noise
+    def of(self, names: Sequence[str]) -> "MotionModels":
+        """Return some of the models."""
+        rows = [self.names.index(name) for name in names]
+        chosen = {name: getattr(self, name)[rows] for name in ("matrices", "offsets", "noises", "poses", "captured")}
+        return replace(self, names=tuple(names), **chosen)
 
-    def step(self, state: Array) -> tuple[Array, Array]:
-        """Return the state (43,) one frame later, and the Jacobian (33, 33) of its error by the error before."""
-        moved, jacobian = np.empty(STATE), np.zeros((ERROR, ERROR))
-        count = (STATE - 3) // 4
-        scratch = np.empty(count), np.empty(4 * count), np.empty(4 * count), np.empty((4 * count, 3))
-        flow = np.empty((STATE, ERROR - 3))
-        kernels.step(self.matrix, self.offset, self.share, self.leg, state, *scratch, flow, moved, jacobian)
-        return moved, jacobian
-
-    def nearest(self, state: Array, among: Poses = "typical") -> Array:
-        """Return a state (43,) with its place and heading, in the pose nearest to it. Interpretation V16."""
-        heading, quaternions = without_heading(state)
-        poses = self.poses if among == "typical" else self.captured
-        similarity = np.abs(np.einsum("nij,ij->ni", poses.reshape(len(poses), -1, 4), quaternions))
-        pose = poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
-        pose[:4] = turned(pose[:4], *heading)
-        same_sign = np.where((pose * state[3:]).reshape(-1, 4).sum(axis=1) < 0.0, -1.0, 1.0)
-        return unit(np.concatenate([state[:3], pose * np.repeat(same_sign, 4)]))
-
-    def fitted_to(self, skeleton: Skeleton, fps: float) -> "MotionModel":
-        """Return the model for a body's legs and another frame rate, of which a step is a share of a step at 30."""
-        share = FPS / fps
+    def fitted_to(self, skeleton: Skeleton, fps: float, process_noise: float = 1.0) -> "MotionModels":
+        """Return the models for a body's legs and another frame rate, of which a step is a share of a step at 30."""
+        leg, share = leg_of(skeleton), FPS / fps
         scale = np.maximum(free_errors(skeleton), STIFF)
-        scale[:3] = leg_of(skeleton)
-        noise = self.noise * np.outer(scale, scale) * share
-        return replace(self, noise=noise, leg=float(scale[0]), share=share)
+        scale[:3] = leg
+        noises = process_noise * share * self.noises * np.outer(scale, scale)  # Interpretation V7
+        return replace(self, noises=noises, leg=leg, share=share)
+
+    def predict(self, states: Array, covariances: Array) -> tuple[Array, Array]:
+        """Return the states (r, 43) one frame later, and the covariances (r, 33, 33) of their errors."""
+        moved, changes = differentiate(self.step, states)
+        jacobians = inverse_tangents(moved) @ changes
+        return moved, jacobians @ covariances @ jacobians.swapaxes(1, 2) + self.noises
+
+    def predict_numbers(self, states: Array, covariances: Array) -> tuple[Array, Array]:
+        """Return the same for covariances (r, 43, 43) of the states' numbers. Interpretation V4."""
+        before = unit(states)
+        changes = inverse_tangents(before)
+        moved, after = self.predict(before, changes @ covariances @ changes.swapaxes(1, 2))
+        return moved, lifted(moved, after)
+
+    def step(self, states: Array) -> Array:
+        """Return the states (r, n, 43) one frame later, n of each model: moved by F without their headings."""
+        headings, before = without_heading(states)
+        signs = np.where(before[..., :1] < 0.0, -1.0, 1.0)  # F is that of quaternions with w above 0
+        inputs = (signs * before).reshape(*states.shape[:-1], -1)
+        change = self.share * (inputs @ self.matrices.swapaxes(1, 2) + self.offsets[:, None])
+        after = before + signs * quaternions_of(change)
+        after /= lengths(after)
+        after[..., 0, :] = product(headings, after[..., 0, :])
+        w, y = headings[..., 0], headings[..., 2]
+        sine, cosine = 2.0 * w * y, w * w - y * y
+        side, up, ahead = self.leg * np.moveaxis(change[..., :3], -1, 0)
+        way = np.stack([cosine * side + sine * ahead, up, cosine * ahead - sine * side], axis=-1)
+        return joined_state(states[..., :3] + way, after)
+
+    def typical_states(self, yaws: Array, place: Array) -> Array:
+        """Return the states (n, 43) of all typical poses at a place (3,), turned by each of some yaws."""
+        headings = np.stack([np.cos(0.5 * yaws), np.sin(0.5 * yaws)], axis=1) @ np.eye(4)[[0, 2]]
+        turns = np.tile(self.poses.reshape(-1, TURNS, 4), (len(yaws), 1, 1, 1))
+        turns[:, :, 0] = product(headings[:, None], turns[:, :, 0])
+        return joined_state(np.tile(place, (turns.shape[0] * turns.shape[1], 1)), turns.reshape(-1, TURNS, 4))
+
+    def captured_nearest(self, name: str, state: Array) -> Array:
+        """Return a state (43,) with its place and heading, in the captured pose of a model nearest to it."""
+        poses = self.captured[self.names.index(name)].reshape(-1, TURNS, 4)
+        heading, turns = without_heading(state)
+        similarity = np.abs(np.einsum("nij,ij->ni", poses, turns))
+        pose = poses[np.arccos(np.minimum(similarity, 1.0)).sum(axis=1).argmin()].copy()
+        pose[0] = product(heading, pose[0])
+        signs = np.where((pose * quaternions_of(state)).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+        return unit(joined_state(state[:3], signs * pose))
 
 
-@dataclass(frozen=True, eq=False)
-class VectorModel:
-    """A model of states of 43 numbers, which it brings to unit length before a step. Interpretation V4."""
-
-    model: MotionModel
-
-    def predict(self, state: Array, covariance: Array) -> tuple[Array, Array]:
-        """Return the state (43,) one frame later, and the covariance (43, 43) of its error."""
-        before = unit(state)
-        moved, jacobian = self.model.step(before)
-        flow = jacobian @ inverse_tangent(before)
-        return moved, lifted(moved, flow @ covariance @ flow.T + self.model.noise)
+def without_heading(states: Array) -> tuple[Array, Array]:
+    """Return the headings (..., 4), twists about the vertical, of states (..., 43), and their quaternions without."""
+    turns = quaternions_of(states).copy()
+    headings = turns[..., 0, :] * [1.0, 0.0, 1.0, 0.0]
+    sizes = lengths(headings)
+    headings = np.where(sizes > 1e-9, headings / np.maximum(sizes, 1e-9), [1.0, 0.0, 0.0, 0.0])
+    turns[..., 0, :] = product(headings * [1.0, 1.0, -1.0, 1.0], turns[..., 0, :])
+    return headings, turns
 
 
-def unit(state: Array) -> Array:
-    """Return a state (43,) whose quaternions have length 1."""
-    quaternions = state[3:].reshape(-1, 4)
-    return np.concatenate([state[:3], (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).ravel()])
+def lifted(states: Array, covariances: Array) -> Array:
+    """Return the covariances (r, 43, 43) of the numbers of states (r, 43), of those of their errors (r, 33, 33)."""
+    changes = tangents(states)
+    return np.asarray(changes @ covariances @ changes.swapaxes(1, 2) + 1e-9 * np.eye(STATE))
 
 
-def tangent(state: Array) -> Array:
-    """Return how the numbers of a state (43,) change with its error: (43, 33)."""
-    from scipy.linalg import block_diag  # a fifth of a second to import
-
-    change = np.empty((STATE - 3, 3))
-    kernels.tangents(state[3:], change)
-    return np.asarray(block_diag(np.eye(3), *change.reshape(-1, 4, 3)))
-
-
-def inverse_tangent(state: Array) -> Array:
-    """Return how the error of a state (43,) changes with its numbers: (33, 43)."""
-    return np.asarray(tangent(state).T * np.repeat([1.0, 4.0], [3, STATE - 3]))
-
-
-def lifted(state: Array, covariance: Array) -> Array:
-    """Return the covariance (43, 43) of a state's numbers, of that of its error (33, 33)."""
-    matrix = tangent(state)
-    return np.asarray(matrix @ covariance @ matrix.T + 1e-9 * np.eye(STATE))
-
-
-@dataclass(frozen=True, eq=False)
-class Library:
+class Library(NamedTuple):
     """All models, and how the joints that a state does not hold follow it."""
 
-    models: dict[str, MotionModel]
-    reliance: Reliance
+    models: MotionModels
+    dependent: DependentJoints
     # degrees: one and ten steps on clips that were not used, against standing still
     report: dict[str, dict[str, float]]
 
 
 @lru_cache(maxsize=2)
-def library(shrink: Shrink = "identity", path: str = "") -> Library:
+def library(path: str = "", literal: bool = False) -> Library:
     """Return the models of a file that docs/studies/make_models.py wrote; without one, those that the package carries.
 
-    Raises ValueError naming the file where it holds no such models.
+    Literal ones are shrunk towards zero, as in the patent; else towards the identity. Interpretation V5. Raises
+    ValueError naming the file where it holds no such models.
     """
-    if not path:
-        return _library(json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8")), shrink)
     try:
-        return _library(parsed_json(read_text(path, SIZE_LIMIT)), shrink)
+        text = read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / "models.json").read_text("utf-8")
+        stored = parsed_json(text)
+        models: dict[str, Any] = stored["models"]
+        fits = [model["zero" if literal else "identity"] for model in models.values()]
+        matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
+        poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
+        turns = captured.reshape(*captured.shape[:2], TURNS, 4)
+        captured = (turns / lengths(turns)).reshape(captured.shape)
+        dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
+        reports = {name: model["report"] for name, model in models.items()}
     except (FileNotFoundError, LookupError, TypeError, ValueError) as error:
         raise InputError(f"{path}: expected motion models as make_models.py writes them, got {error!r}") from None
-
-
-def _library(stored: dict[str, Any], shrink: Shrink) -> Library:
-    models = {
-        name: MotionModel(
-            name,
-            np.array(one[shrink]["matrix"]),
-            np.array(one[shrink]["offset"]),
-            np.array(one[shrink]["noise"]),
-            np.array(one["poses"]),
-            np.array([unit(np.concatenate([np.zeros(3), pose]))[3:] for pose in one["captured"]]),
-        )
-        for name, one in stored["models"].items()
-    }
-    reliance = Reliance(*(np.array(stored["reliance"][key]) for key in ("matrix", "offset")))
-    return Library(models, reliance, {name: one["report"] for name, one in stored["models"].items()})
+    return Library(MotionModels(tuple(models), matrices, offsets, noises, poses, captured), dependent, reports)
 
 
 def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:
@@ -164,18 +170,3 @@ def ridge(inputs: Array, outputs: Array, weight: float = LAMBDA) -> Array:
 def leg_of(skeleton: Skeleton) -> float:
     """Return how long a leg is, in metres, from hip to ankle."""
     return float(skeleton.lengths[[SKELETON_BONES.index(bone) for bone in ("lfemur", "ltibia")]].sum())
-
-
-def without_heading(state: Array) -> tuple[tuple[float, float], Array]:
-    """Return the heading (w, y) of a state (43,), and its quaternions (10, 4) without it, with w positive.
-
-    The heading is the part of the first one that turns about the vertical.
-    """
-    quaternions = np.empty((len(state) // 4, 4))
-    return kernels.headed(state, quaternions.reshape(-1), np.empty(len(quaternions))), quaternions
-
-
-def turned(quaternion: Array, w: float, y: float) -> Array:
-    """Return a quaternion (4,) turned about the vertical by another one, (w, 0, y, 0)."""
-    a, b, c, d = quaternion.tolist()
-    return np.array([w * a - y * c, w * b + y * d, w * c + y * a, w * d - y * b])

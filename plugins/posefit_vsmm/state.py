@@ -1,73 +1,34 @@
-"""The state that the motion models move, and the points of a body that a silhouette may show. VSMM 3 and 6.1.
+"""The state that the motion models move, its quaternions, and the points of a body that a silhouette may show.
 
 A state is (43,): the root's translation in metres, then w, x, y, z of the whole body and of nine bones, each turned
 against its parent. Its error is (33,): metres, then a rotation vector a quaternion, applied on its right
-(Interpretation V4); `imm.PLACED` moves the one by the other. A joint that the state does not hold, such as the back's,
-follows those that it holds: see `Reliance`. The 17 points are Interpretation V2.
+(Interpretation V4). A joint that the state does not hold, such as the back's, follows those that it holds: see
+`DependentJoints`. The 17 points are Interpretation V2.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.rotation import (
-    joint_angles_from_rotation,
-    root_angles_from_rotation,
-    rotation_from_joint_angles,
-    rotation_from_root_angles,
-)
+from posefit.geometry import rotation
 from posefit.geometry.skeleton import ANGLES, INNER, JOINTS, Skeleton, turns_of
 
-BONES = (
-    "lfemur",
-    "ltibia",
-    "rfemur",
-    "rtibia",
-    "lhumerus",
-    "lradius",
-    "rhumerus",
-    "rradius",
-    "lowerneck",
-)  # hips, knees, shoulders, elbows, neck
-STATE = 3 + 4 * (1 + len(BONES))  # a place, and a quaternion of the whole body and of each bone
-ERROR = 3 + 3 * (1 + len(BONES))  # a step, and a rotation vector of each of them
+# hips, knees, shoulders, elbows, neck
+BONES = ("lfemur", "ltibia", "rfemur", "rtibia", "lhumerus", "lradius", "rhumerus", "rradius", "lowerneck")
+TURNS = 1 + len(BONES)  # quaternions of a state: the whole body's, and each bone's
+STATE, ERROR = 3 + 4 * TURNS, 3 + 3 * TURNS
 FIRST_BONE = 6  # where the bones' part of an error starts: behind the step and the whole body's rotation vector
-# Where in an error the whole body's yaw, pitch and roll are: small turns about its y, x and z, whereas a rotation
-# vector has them in the order x, y, z.
-YAW_PITCH_ROLL = (4, 3, 5)
 HELD = tuple(JOINTS.index(bone) for bone in BONES)  # the joints that these bones end in
-HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[j] for j in INNER if j not in HELD])
+HELD_ANGLES, OTHER_ANGLES = turns_of(BONES), turns_of([JOINTS[joint] for joint in INNER if joint not in HELD])
+DIFFERENCE = 1e-4  # metres and radians to either side, from which functions of a state are differentiated
 
-
-def bone_errors(bone: str) -> slice:
-    """Return where in an error (33,) the rotation vector of a bone is."""
-    first = FIRST_BONE + 3 * BONES.index(bone)
-    return slice(first, first + 3)
-
-
-@dataclass(frozen=True, eq=False)
-class Reliance:
-    """How the other joints follow: their angles are `matrix` @ the nine rotation vectors + `offset`."""
-
-    matrix: Array = field(repr=False)  # (36, 27)
-    offset: Array = field(repr=False)  # (36,) radians
-
-
-def encode(poses: Array, translations: Array) -> Array:
-    """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
-    from scipy.spatial.transform import Rotation  # a quarter of a second to import
-
-    root = rotation_from_root_angles(poses[:, :3])
-    held = rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
-    rotations = np.concatenate([root[:, None], held], axis=1)
-    quaternions = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    quaternions = quaternions.reshape(len(poses), -1, 4)
-    quaternions[0] *= np.where(quaternions[0, :, :1] < 0.0, -1.0, 1.0)
-    for k in range(1, len(poses)):
-        turned = np.einsum("ij,ij->i", quaternions[k], quaternions[k - 1]) < 0.0
-        quaternions[k, turned] *= -1.0
-    return np.column_stack([translations, quaternions.reshape(len(poses), -1)])
+_W, _X, _Y, _Z = np.eye(4)
+# row a holds the products (4, 4) of the a-th of the units 1, i, j, k with each of them
+_PRODUCTS = np.array([_W, _X, _Y, _Z, _X, -_W, _Z, -_Y, _Y, -_Z, -_W, _X, _Z, _Y, -_X, -_W]).reshape(4, 16)
+# where the numbers of quaternions (10, 4, 1) are in a state, and their rotation vectors (10, 1, 3) in an error
+_NUMBERS, _VECTORS = np.arange(3, STATE).reshape(TURNS, 4, 1), np.arange(3, ERROR).reshape(TURNS, 1, 3)
 
 
 def free_errors(skeleton: Skeleton) -> Array:
@@ -75,41 +36,125 @@ def free_errors(skeleton: Skeleton) -> Array:
     return np.concatenate([np.ones(FIRST_BONE), skeleton.free[HELD_ANGLES].astype(np.float64)])
 
 
-def decode(states: Array, reliance: Reliance) -> tuple[Array, Array]:
-    """Return the poses (n, 66) and the translations (n, 3) of states (n, 43)."""
-    from scipy.spatial.transform import Rotation  # a quarter of a second to import
-
-    n = len(states)
-    quaternions = Rotation.from_quat(states[:, 3:].reshape(-1, 4), scalar_first=True)
-    rotations = quaternions.as_matrix().reshape(n, -1, 3, 3)
-    vectors = quaternions.as_rotvec().reshape(n, -1)[:, 3:]
-    poses = np.zeros((n, ANGLES))
-    poses[:, :3] = root_angles_from_rotation(rotations[:, 0])
-    poses[:, HELD_ANGLES] = joint_angles_from_rotation(rotations[:, 1:]).reshape(n, -1)
-    poses[:, OTHER_ANGLES] = vectors @ reliance.matrix.T + reliance.offset
-    return poses, states[:, :3].copy()
+def joined_state(translations: Array, turns: Array) -> Array:
+    """Return the states (..., 43) of translations (..., 3) and quaternions (..., 10, 4)."""
+    return np.concatenate([translations, turns.reshape(*turns.shape[:-2], -1)], axis=-1)
 
 
-# Each point is the middle of two joints, or one joint twice.
-_BETWEEN = {
-    "head": ("upperneck", "head"),
-    "root": ("root", "root"),
-    "torso": ("upperback", "upperback"),
-    "left clavicle": ("thorax", "lclavicle"),
-    "right clavicle": ("thorax", "rclavicle"),
-    "left shoulder": ("lclavicle", "lclavicle"),
-    "right shoulder": ("rclavicle", "rclavicle"),
-    "left elbow": ("lhumerus", "lhumerus"),
-    "right elbow": ("rhumerus", "rhumerus"),
-    "left hand": ("lwrist", "lwrist"),
-    "right hand": ("rwrist", "rwrist"),
-    "left hip": ("lhipjoint", "lhipjoint"),
-    "right hip": ("rhipjoint", "rhipjoint"),
-    "left knee": ("lfemur", "lfemur"),
-    "right knee": ("rfemur", "rfemur"),
-    "left foot": ("lfoot", "lfoot"),
-    "right foot": ("rfoot", "rfoot"),
+def quaternions_of(states: Array) -> Array:
+    """Return the quaternions (..., 10, 4) of states (..., 43)."""
+    return states[..., 3:].reshape(*states.shape[:-1], TURNS, 4)
+
+
+def lengths(vectors: Array) -> Array:
+    """Return the lengths (..., 1) of vectors (..., n)."""
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None])
+
+
+def unit(states: Array) -> Array:
+    """Return states (..., 43) whose quaternions have length 1."""
+    turns = quaternions_of(states)
+    return joined_state(states[..., :3], turns / lengths(turns))
+
+
+def product(first: Array, second: Array) -> Array:
+    """Return the products (..., 4) of quaternions (..., 4)."""
+    return np.asarray((second[..., None, :] @ (first @ _PRODUCTS).reshape(*first.shape, 4))[..., 0, :])
+
+
+def rotation_matrices(turns: Array) -> Array:
+    """Return the rotations (..., 3, 3) of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(turns, -1, 0)
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def rotation_vectors(turns: Array) -> Array:
+    """Return the rotation vectors (..., 3) of unit quaternions (..., 4), none longer than pi."""
+    turns = np.where(turns[..., :1] < 0.0, -turns, turns)
+    sines = lengths(turns[..., 1:])
+    angles = 2.0 * np.arctan2(sines, turns[..., :1])
+    return np.asarray(turns[..., 1:] * np.where(sines < 1e-8, 2.0, angles / np.maximum(sines, 1e-8)))
+
+
+def plus(states: Array, errors: Array) -> Array:
+    """Return states (..., 43) moved by errors (..., 33)."""
+    vectors = errors[..., 3:].reshape(*errors.shape[:-1], TURNS, 3)
+    halves = 0.5 * lengths(vectors)
+    turns = np.concatenate([np.cos(halves), 0.5 * np.sinc(halves / np.pi) * vectors], axis=-1)
+    return unit(joined_state(states[..., :3] + errors[..., :3], product(quaternions_of(states), turns)))
+
+
+def minus(first: Array, second: Array) -> Array:
+    """Return the errors (..., 33) that lead from states `second` to `first`, both (..., 43), the shorter way round."""
+    inverses = quaternions_of(second) * [1.0, -1.0, -1.0, -1.0]
+    return joined_state(first[..., :3] - second[..., :3], rotation_vectors(product(inverses, quaternions_of(first))))
+
+
+def differentiate(function: Callable[[Array], Array], states: Array) -> tuple[Array, Array]:
+    """Return a function, of (r, n, 43), of states (r, 43), and its derivatives (r, ..., 33) by errors."""
+    errors = DIFFERENCE * np.concatenate([np.zeros((1, ERROR)), np.eye(ERROR), -np.eye(ERROR)])
+    values = function(plus(states[:, None], errors))
+    derivatives = (values[:, 1 : 1 + ERROR] - values[:, 1 + ERROR :]) / (2.0 * DIFFERENCE)
+    return values[:, 0], np.moveaxis(derivatives, 1, -1)
+
+
+def tangents(states: Array) -> Array:
+    """Return how the numbers of states (r, 43) change with their errors: (r, 43, 33)."""
+    matrices = np.tile(np.eye(STATE, ERROR), (len(states), 1, 1))
+    matrices[:, 3:, 3:] = 0.0
+    changes = product(quaternions_of(states)[:, :, None], 0.5 * np.eye(4)[1:])  # (r, 10, 3, 4)
+    matrices[:, _NUMBERS, _VECTORS] = changes.swapaxes(2, 3)
+    return matrices
+
+
+def inverse_tangents(states: Array) -> Array:
+    """Return how the errors of states (r, 43) change with their numbers: (r, 33, 43)."""
+    # the columns of a quaternion's tangents are orthogonal and of length 1/2
+    return np.asarray(tangents(states).swapaxes(1, 2) * np.repeat([1.0, 4.0], [3, STATE - 3]))
+
+
+class DependentJoints(NamedTuple):
+    """How the other joints follow: their angles are `matrix` @ the nine rotation vectors + `offset`."""
+
+    matrix: Array  # (36, 27)
+    offset: Array  # (36,) radians
+
+
+def encode(poses: Array, translations: Array) -> Array:
+    """Return the states (n, 43) of poses (n, 66) and translations (n, 3); signs are those that change least."""
+    root = rotation.rotation_from_root_angles(poses[:, :3])
+    held = rotation.rotation_from_joint_angles(poses[:, HELD_ANGLES].reshape(len(poses), -1, 3))
+    rotations = np.concatenate([root[:, None], held], axis=1)
+    turns = np.stack([rotation.quaternions(rotations[:, k])[:, [3, 0, 1, 2]] for k in range(TURNS)], axis=1)
+    return joined_state(translations, np.where(turns[:1, :, :1] < 0.0, -turns, turns))
+
+
+def decode(states: Array, dependent: DependentJoints) -> tuple[Array, Array]:
+    """Return the poses (..., 66) and the translations (..., 3) of states (..., 43)."""
+    turns, lead = quaternions_of(states), states.shape[:-1]
+    rotations, vectors = rotation_matrices(turns), rotation_vectors(turns[..., 1:, :])
+    poses = np.zeros((*lead, ANGLES))
+    poses[..., :3] = rotation.root_angles_from_rotation(rotations[..., 0, :, :])
+    poses[..., HELD_ANGLES] = rotation.joint_angles_from_rotation(rotations[..., 1:, :, :]).reshape(*lead, -1)
+    poses[..., OTHER_ANGLES] = vectors.reshape(*lead, -1) @ dependent.matrix.T + dependent.offset
+    return poses, states[..., :3].copy()
+
+
+# The joints that the 17 points are the middles of
+_MIDDLE = {"head": ("upperneck", "head"), "root": ("root",), "torso": ("upperback",)}
+_SIDES = {"clavicle": ("thorax", "?clavicle"), "shoulder": ("?clavicle",), "elbow": ("?humerus",), "hand": ("?wrist",)}
+_SIDES |= {"hip": ("?hipjoint",), "knee": ("?femur",), "foot": ("?foot",)}  # ? is l or r
+_BETWEEN = _MIDDLE | {
+    f"{side} {name}": tuple(joint.replace("?", side[0]) for joint in joints)
+    for name, joints in _SIDES.items()
+    for side in ("left", "right")
 }
 POINTS = tuple(_BETWEEN)
 AT = {name: k for k, name in enumerate(POINTS)}
-ENDS = np.array([[JOINTS.index(joint) for joint in pair] for pair in _BETWEEN.values()])  # (17, 2) two joints a point
+# (17, 2) two joints a point, or one twice
+ENDS = np.array([[JOINTS.index(joints[k]) for k in (0, -1)] for joints in _BETWEEN.values()])

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posefit.arrays.compiling import compiled_once
 from posefit.errors import InputError
 from posefit.reading import quoted
 
@@ -39,11 +38,13 @@ def inlined(function: Callable[..., Any]) -> Any:
 def _compiled(function: Callable[..., Any], inline: str) -> Any:
     import numba
 
+    from posefit.arrays.compiling import cached
+
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}, "inline": inline}
     # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
     options["no_cfunc_wrapper"] = True
     compiled: Any = numba.njit(**options)(function)
-    return compiled if compiled is function else compiled_once(compiled)  # NUMBA_DISABLE_JIT: nothing is compiled
+    return compiled if compiled is function else cached(compiled)  # NUMBA_DISABLE_JIT: nothing is compiled
 
 
 def writeable(values: ArrayLike) -> Array:

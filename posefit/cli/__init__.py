@@ -1,6 +1,6 @@
 """The command line. Messages and progress go to stderr, results to stdout; a mistake is one line and exit status 2.
 
-The commands stand in `tracking`, `ambiguity`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
+The commands stand in `tracking`, `sweeping`, `motions`, `suite` and `plugins`; plugins add others, see
 `posefit.hooks`. What each does is imported when it runs.
 """
 
@@ -12,7 +12,6 @@ from itertools import chain
 import click
 
 from posefit.cli import plugins, suite, sweeping, tracking
-from posefit.cli.ambiguity import ambiguity
 from posefit.cli.group import Group
 from posefit.cli.motions import motions
 from posefit.cli.output import Command, say
@@ -22,7 +21,7 @@ from posefit.version import __version__
 
 THREAD_SECONDS = 1.0  # that threads have to end after a command
 GROUPS: dict[str, tuple[click.Command, ...]] = {
-    "Follow a person": (tracking.track, tracking.fit, tracking.extract, ambiguity),
+    "Follow a person": (tracking.track, tracking.fit, tracking.extract),
     "Compare methods": (sweeping.sweep, sweeping.report, suite.suite),
     "Look around": (motions, plugins.plugins, plugins.check),
 }
@@ -48,10 +47,10 @@ class _Commands(Command, Group):
 
 
 def _added() -> dict[str, click.Command]:
-    from posefit.registry import plugins_of
+    from posefit.registry import COMMAND, plugins_of
 
-    added = plugins_of("commands", tuple(main.commands))
-    return {command.name or "": command for plugin in added for command in plugin.offers}
+    added = plugins_of((COMMAND,), tuple(main.commands))
+    return {command.name or "": command for plugin in added for command in plugin.commands}
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})

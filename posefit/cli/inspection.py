@@ -7,12 +7,10 @@ from collections.abc import Iterable, Iterator
 from inspect import Parameter, getdoc
 from typing import Any
 
-import click
-
 from posefit.errors import InputError
 from posefit.hooks import PROJECT
 from posefit.reading import quoted, suggestion
-from posefit.registry import BLOCK, KINDS, LOAD, STRICT, Offer, Plugin, Registry
+from posefit.registry import BLOCK, COMMAND, KINDS, LOAD, STRICT, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
 
 
@@ -80,7 +78,7 @@ def _wrapped(text: str, first: str, other: str) -> list[str]:
     return textwrap.wrap(text, width, initial_indent=first, subsequent_indent=other)
 
 
-def diagnosis(plugins: Iterable[Plugin[Any]], verbose: bool = False) -> tuple[list[str], bool]:
+def diagnosis(plugins: Iterable[Plugin], verbose: bool = False) -> tuple[list[str], bool]:
     """Return the lines of `posefit plugins doctor`, and whether all is well.
 
     Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
@@ -88,7 +86,10 @@ def diagnosis(plugins: Iterable[Plugin[Any]], verbose: bool = False) -> tuple[li
     lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
     states = set[str]()
     for plugin in plugins:
-        offers = ", ".join(f"{_kind(offer)} {offer.name}" for offer in plugin.offers)
+        offers = ", ".join(
+            [f"{offer.kind} {offer.name}" for offer in plugin.offers]
+            + [f"{COMMAND} {command.name}" for command in plugin.commands]
+        )
         state: str = "empty" if plugin.state == "loaded" and not offers else plugin.state
         states.add(state)
         cause = " ".join(plugin.cause.split()) or f"offers {offers}"  # on one line, whatever the error says
@@ -97,11 +98,11 @@ def diagnosis(plugins: Iterable[Plugin[Any]], verbose: bool = False) -> tuple[li
         lines.append(f"{state:8}  {plugin.name} ({plugin.distribution} {plugin.version}): {cause}")
         lines += [f"          {traced}" for traced in plugin.traceback.splitlines() if verbose]
         for offer in plugin.offers:
-            if isinstance(offer, Offer) and offer.missing:
+            if offer.missing:
                 lines.append(f"          {offer.name} is not usable yet: python -m pip install '{offer.missing}'")
-            if isinstance(offer, Offer) and not offer.summary:
+            if not offer.summary:
                 lines.append(f"          {offer.name} has no docstring to be listed with")
-            if isinstance(offer, Offer) and not offer.missing and plugin.distribution != PROJECT:
+            if not offer.missing and plugin.distribution != PROJECT:
                 lines.append(f"          next: posefit check {offer.kind} {offer.name}")
     hint = "" if verbose else "; -v shows where they fail"
     if "broken" in states:
@@ -109,9 +110,3 @@ def diagnosis(plugins: Iterable[Plugin[Any]], verbose: bool = False) -> tuple[li
     else:
         lines.append("all plugins are loaded, but not all offer something" if "empty" in states else "all plugins work")
     return lines, not states & {"broken", "empty"}
-
-
-def _kind(offer: Any) -> str:
-    if isinstance(offer, Offer):
-        return offer.kind
-    return "command" if isinstance(offer, click.Command) else "claim"

@@ -51,12 +51,11 @@ def doctor(context: click.Context, verbose: bool) -> None:
     import warnings
 
     from posefit.cli.inspection import diagnosis
-    from posefit.registry import plugins_of, registry
+    from posefit.registry import COMMAND, KINDS, plugins_of
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the report below says the same
-        mine = plugins_of("commands", _own(context))
-        lines, well = diagnosis([*registry().plugins, *mine, *plugins_of("claims")], verbose)
+        lines, well = diagnosis(plugins_of((*KINDS, COMMAND), _own(context)), verbose)
     click.echo("\n".join(lines))
     context.exit(0 if well else 1)
 

@@ -53,10 +53,10 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
 @click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
 @click.option("--out", metavar="DIR", help="New folder for IOHprofiler's files.")
-@click.option("--bundle", metavar="FILE", help="New .zip for a leaderboard, as `suite submit` writes it.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_run(
     optimiser: str,
+    *,
     functions: tuple[int, ...],
     dimensions: tuple[int, ...],
     instances: tuple[int | None, int | None],
@@ -65,7 +65,6 @@ def suite_run(
     texts: tuple[str, ...],
     infeasible: Any,
     out: str | None,
-    bundle: str | None,
     as_json: bool,
 ) -> None:
     """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
@@ -80,7 +79,6 @@ def suite_run(
         whole("budget", budget, 1)
         whole("seed", seed, 0)
         check_free(out)
-        check_free(bundle)
         numbers = _numbers(*instances)
         chosen_functions, chosen_dimensions = functions or None, dimensions or (9,)
         problems = Suite(
@@ -96,8 +94,6 @@ def suite_run(
         )
         runs = list(progress(asked, len(problems), "run"))
     _print(runs, out, as_json)
-    if bundle is not None:
-        _write_bundle(runs, bundle)
 
 
 @suite.command("table")
@@ -123,74 +119,6 @@ def suite_table(ledger: str, iohprofiler: str | None, coco: str | None, as_json:
         write_coco(runs, coco)
         say(f"written to {coco}: COCO's files")
     _print(runs, iohprofiler, as_json)
-
-
-@suite.command("submit")
-@click.argument("ledger", metavar="DIR")
-@click.option("--out", required=True, metavar="FILE", help="New .zip: the bundle.")
-def suite_submit(ledger: str, out: str) -> None:
-    """Write the runs of a sweep of single searches in DIR as a bundle, whose every claim can be evaluated again."""
-    from posefit.files import check_free
-    from posefit.sweep.ledger import Ledger
-    from posefit.sweep.table import search_runs
-
-    check_free(out)
-    _write_bundle(list(search_runs(Ledger(ledger, say))), out)
-
-
-@suite.command("verify")
-@click.argument("bundles", nargs=-1, required=True, metavar="FILE...", type=click.Path(exists=True))
-@click.option("--repeat", default=0, metavar="K", help="Run K searches again, which the bundle's digest chooses.")
-@click.pass_context
-def suite_verify(context: click.Context, bundles: tuple[str, ...], repeat: int) -> None:
-    """Evaluate every point of bundles again, and refuse what does not match: then the exit status is 1."""
-    import time
-
-    from posefit.fitting.check import whole
-    from posefit.reading import counted
-    from posefit.suites.verification import verified
-
-    whole("repeat", repeat, 0)
-    refused = 0
-    for path in bundles:
-        began = time.perf_counter()
-        try:
-            with results_alone():
-                bundle = verified(path, repeat, lambda name: say(f"repeats {name}"))
-        except InputError as error:
-            refused += 1
-            click.echo(f"refused: {error}")
-            continue
-        what = f"{counted(len(bundle.runs), 'run')}, {counted(bundle.evaluated, 'point')} evaluated"
-        what += f", {counted(bundle.repeated, 'repeat')}" * bool(repeat)
-        click.echo(f"{path}: verified, {what} in {time.perf_counter() - began:.1f} s; digest {bundle.digest[:12]}")
-        for reason in bundle.unrepeatable:
-            say(f"seeds not checked of {reason}")
-    context.exit(1 if refused else 0)
-
-
-@suite.command("board")
-@click.argument("bundles", nargs=-1, metavar="[DIR|FILE]...")
-@click.option("--out", required=True, metavar="FILE", help="The page; an earlier one is replaced.")
-@click.option("--repeat", default=0, metavar="K", help="Of each bundle given, run K searches again.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def suite_board(bundles: tuple[str, ...], out: str, repeat: int, as_json: bool) -> None:
-    """Write a leaderboard of verified bundles beside posefit's own methods; what is refused is listed."""
-    from posefit.report.board import write_board
-    from posefit.report.write import leaderboard_lines
-
-    with results_alone():
-        board = write_board(bundles, out, repeat, say)
-    for line in [json.dumps(board)] if as_json else leaderboard_lines(board):
-        click.echo(line)
-
-
-def _write_bundle(runs: "Sequence[SuiteRun]", path: str) -> None:
-    from posefit.reading import counted
-    from posefit.suites.bundles import write_bundle
-
-    digest = write_bundle(runs, path)
-    say(f"written to {path}: {counted(len(runs), 'run')}; digest {digest[:12]}")
 
 
 def _numbers(start: int | None, stop: int | None) -> range:

@@ -1,7 +1,7 @@
 """`posefit sweep` and `posefit report`."""
 
 import json
-from contextlib import closing, nullcontext, suppress
+from contextlib import closing, nullcontext
 from itertools import islice
 from typing import Any
 
@@ -71,34 +71,17 @@ def sweep(
 @click.command()
 @click.argument("ledger", metavar="DIR")
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
-@click.option(
-    "--serve", is_flag=True, help="Show the report on this machine alone while the sweep goes on; write none."
-)
-@click.option("--port", type=int, help="Of --serve; by default a free one.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def report(ledger: str, out: str | None, serve: bool, port: int | None, as_json: bool, **others: Any) -> None:
+def report(ledger: str, out: str | None, as_json: bool, **others: Any) -> None:
     """Write the results of a sweep to DIR as one page that any browser opens, offline.
 
     Without --out it prints which method leads and the leaderboard, and writes no page.
 
-    It may be written while the sweep goes on, of the cells that are done. With --serve a page shows the progress, what
-    failed and the report so far, and reloads itself until Ctrl-C ends it.
+    It may be written while the sweep goes on, of the cells that are done.
     """
-    if serve:
-        given = {"out": out, **others, "json": as_json or None}
-        if twice := [name for name, value in given.items() if value is not None]:
-            raise click.UsageError(f"--serve must be given without --{twice[0]}, which it does not write")
-        from posefit.report.live import address_of, serving
-
-        with suppress(KeyboardInterrupt), serving(ledger, port or 0, say) as server:
-            click.echo(f"showing {ledger} at {address_of(server)} until Ctrl-C")
-            server.serve_forever()
-        return
-    if port is not None:
-        raise click.UsageError("--port must be given with --serve, got it without")
     from posefit.report.write import leaderboard_lines, write_report
 
     summary = write_report(ledger, out, warn=say, **others)

@@ -7,22 +7,18 @@ from importlib.util import find_spec
 from keyword import iskeyword
 from pathlib import Path
 from string import Template
-from typing import Literal
 
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting.check import one_of
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
-from posefit.registry import KINDS, Kind, plugins_of, registry
+from posefit.registry import COMMAND, KINDS, Registrable, plugins_of, registry
 
-COMMAND: Literal["command"] = "command"  # a kind of plugin that registers no method
 TAKEN = {"Frame"}  # names that a template's module has already
 
 
-def write_plugin(
-    name: str, kind: Kind | Literal["command"], folder: str | Path | None = None, own: Sequence[str] = ()
-) -> Path:
+def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None, own: Sequence[str] = ()) -> Path:
     """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
 
     `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
@@ -51,7 +47,6 @@ def write_plugin(
         "module": module,
         "dashed": name.replace("_", "-"),
         "class_name": class_name,
-        "point": f"{module}-commands" if kind == COMMAND else module,
         "usage": f"posefit check {kind} {name}\n" * (kind != COMMAND) + f"posefit {used}",
     }
     target = Path(folder or f"posefit-{words['dashed']}")
@@ -68,11 +63,10 @@ def write_plugin(
     return target
 
 
-def _taken(kind: Kind | Literal["command"], own: Sequence[str]) -> dict[str, str]:
+def _taken(kind: Registrable, own: Sequence[str]) -> dict[str, str]:
     """Return the names that a new plugin cannot have, each with the distribution that has it."""
-    if kind != "command":
+    if kind != COMMAND:
         return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
-    theirs = {
-        str(one.name): plugin.distribution for plugin in plugins_of("commands", tuple(own)) for one in plugin.offers
-    }
+    plugins = plugins_of((COMMAND,), tuple(own))
+    theirs = {str(command.name): plugin.distribution for plugin in plugins for command in plugin.commands}
     return dict.fromkeys(own, PROJECT) | theirs

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.uncertainty.landscape import Box
-from posefit.uncertainty.landscape import displacement as displacement
-from posefit.uncertainty.landscape import wrap as wrap
 
 REDRAWS = 100  # Interpretation S7
 BATCH = 8  # ours: after the first, so many redraws are made at once
@@ -25,13 +23,39 @@ class Start:
     velocity: Array  # (d,) v_pred
 
 
-class Space(Box, Protocol):
+class Space(Protocol):
     """The box [-1, 1]^d, part of which is feasible: all that an optimiser knows of it. `SearchSpace` is one."""
+
+    @property
+    def dimensions(self) -> int:
+        """d."""
+        ...
+
+    @property
+    def periodic(self) -> NDArray[np.bool_]:
+        """Which coordinates wrap around (d,)."""
+        ...
 
     @property
     def start(self) -> Start | None:
         """Where to start; None for anywhere."""
         ...
+
+    def feasible(self, proposals: Array) -> NDArray[np.bool_]:
+        """Return which proposals (n, d) lie in the box and are allowed (n,)."""
+        ...
+
+
+def wrap(space: Space, proposals: Array) -> Array:
+    """Return proposals (..., d) with their periodic coordinates brought into [-1, 1)."""
+    if not space.periodic.any():
+        return proposals
+    return np.where(space.periodic, (proposals + 1.0) % 2.0 - 1.0, proposals)
+
+
+def displacement(space: Space, origin: Array, target: Array) -> Array:
+    """Return target - origin (..., d), the short way round where a coordinate is periodic."""
+    return wrap(space, target - origin)
 
 
 def extent(space: Space) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,6 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, repair
 
-if TYPE_CHECKING:
-    from posefit.fitting.problem import PoseProblem
-
-PIECE = 4096  # ours: evaluations in one compiled piece, which nothing interrupts
 WORST = 1e15  # few libraries bear nan, infinity or the square of 1e300
 
 
@@ -41,17 +37,6 @@ class Filter(Optimiser, Protocol):
         ...
 
 
-class Niching(Optimiser, Protocol):
-    """An optimiser that searches for several optima and separates them."""
-
-    def modes(self) -> Array:
-        """Return the proposals (k, d) that it takes for optima of their own, the best first.
-
-        They are among those passed to `tell`; k is at least 1 after the first `tell`.
-        """
-        ...
-
-
 # Builds an optimiser for one search, as `factory(space, rng, **settings)`: a Space, a numpy Generator that is the
 # only source of randomness, and keyword-only settings. The driver fills in the settings `evaluations`, the budget of
 # one search, and `iterations`, the populations after the first that this budget holds, for a factory that takes them.
@@ -62,21 +47,6 @@ OptimiserFactory = Callable[..., Optimiser]
 # What becomes of an optimiser in the next frame: a new one starts around the prediction, SAPSO (6), (7); the same
 # one, a `Filter`, carries its particles on; or a new one starts anywhere.
 NextFrame = Literal["start", "carry", "forget"]
-
-
-class Chaining(Optimiser, Protocol):
-    """An optimiser whose `ask` and `tell` are compiled too, and go on without coming back to Python in between."""
-
-    def compiled_search(self, problem: "PoseProblem", evaluations: int) -> tuple[Array, Array]:
-        """Return the next populations (k, n, d) and their costs (k, n), bit for bit as ask, evaluate and tell do.
-
-        They have at most so many evaluations. There are none where the optimiser, or the problem's `compiled`, has no
-        such form, at the end of the search, or where the next population would go over; then it is asked.
-        """
-        ...
-
-
-NOTHING_SEARCHED = np.empty((0, 0, 0)), np.empty((0, 0))  # what `compiled_search` returns where it has no populations
 
 
 def finite_costs(costs: Array) -> Array:
@@ -144,9 +114,6 @@ def populations(
     TypeError where `evaluate` returns anything else than an array of costs (n,).
     """
     used = 0
-    for proposals, costs in _chained(optimiser, evaluate, evaluations):
-        used += len(proposals)
-        yield proposals, costs
     while len(proposals := optimiser.ask()) and used + len(proposals) <= evaluations:
         used += len(proposals)
         costs = evaluate(proposals)
@@ -157,31 +124,6 @@ def populations(
         optimiser.tell(proposals, costs)
     if not used:
         raise BudgetError(f"evaluations must hold one population of {len(proposals)}, got {evaluations}")
-
-
-def compiled_search_of(optimiser: Optimiser) -> Callable[["PoseProblem", int], tuple[Array, Array]] | None:
-    """Return an optimiser's method `compiled_search`; None where it has none, or a subclass has another ask or tell."""
-
-    def owner(name: str) -> type:
-        return next((kind for kind in type(optimiser).__mro__ if name in vars(kind)), object)
-
-    search = owner("compiled_search")
-    own = search is not object and issubclass(search, owner("ask")) and issubclass(search, owner("tell"))
-    return optimiser.compiled_search if own else None  # type: ignore[attr-defined, no-any-return]
-
-
-def _chained(
-    optimiser: Optimiser, evaluate: Callable[[Array], Array], evaluations: int
-) -> Iterator[tuple[Array, Array]]:
-    """Yield the first populations with their costs, as many as both sides have a compiled form for."""
-    problem: Any = getattr(evaluate, "__self__", None)
-    search = compiled_search_of(optimiser)
-    if search is None or not hasattr(problem, "compiled") or evaluate != problem.evaluate:
-        return
-    while len((searched := search(problem, min(evaluations, PIECE)))[1]):
-        problem.count_poses(searched[1].size)
-        evaluations -= searched[1].size
-        yield from zip(*searched, strict=True)
 
 
 def minimise(

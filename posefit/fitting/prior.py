@@ -6,7 +6,7 @@ And how far the body tilts with them: the root is no part of a prior, but its pi
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,6 @@ from posefit.motion.motion import Motion
 
 RIDGE = 0.05  # ours: of the regression, where a latent's range is 2
 OVER = 0.75 * np.pi  # ours: radians to either side; who tilts so far turns over
-
-
-# What `inverse_transform` and `feasible` are when compiled: each a function of `posefit.arrays.jit` that returns
-# nothing, and arguments of it that never change. It is called as `function(latents, *arguments, results)` with results
-# to be written, joint angles (n, 63) or which latents are feasible (n,), the same bits as the methods return.
-CompiledLatents = tuple[tuple[Callable[..., None], tuple[Any, ...]], tuple[Callable[..., None], tuple[Any, ...]]]
 
 
 class Latents(Protocol):
@@ -57,8 +51,6 @@ class Prior(Latents, Protocol):
 
     A prior whose joint angles are affine in the latents may say so: by an attribute `affine`, the weights (m, 63) that
     latents are multiplied with and the angles (63,) where all of them are 0. Then a GPU decodes, where one draws.
-    One whose methods are compiled loops may offer them by an attribute `compiled`, see `CompiledLatents`. Then a search
-    need not come back to Python for every population.
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:

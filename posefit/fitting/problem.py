@@ -8,19 +8,15 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array, writeable
-from posefit.arrays.calling import address_of
 from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, between
-from posefit.fitting.kernels import Constraint, Objective, move_to_borders
+from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.kernels import kinematics
-from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.cost import (
     BETA,
-    SCALE,
     Areas,
     costs_in,
     drawing_of,
@@ -29,8 +25,6 @@ from posefit.silhouette.cost import (
     mean_over_views,
     pose_costs,
 )
-from posefit.silhouette.drawn import count_poses
-from posefit.silhouette.kernels import count_areas
 from posefit.silhouette.mask import Silhouette, coarser_camera, coarser_silhouette
 from posefit.silhouette.sharing import parts_of, work_through
 
@@ -145,35 +139,6 @@ class PoseProblem:
         """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
         scene = self.body, self.cameras, self.silhouettes
         return pose_costs(*scene, poses, translations, self.beta, self.threads)
-
-    def compiled(self) -> Objective | None:
-        """Return the cost as compiled loops take it, for this process only; None where it has no such form.
-
-        It has where one view is drawn, in one thread, the translation is not aligned, and the prior has the attribute
-        `compiled`. What evaluates it reports the evaluations to `count_poses`.
-        """
-        space, views = self.space, self._drawings
-        prior = getattr(space.prior, "compiled", None)
-        simple = space.translation != "aligned" and space.root_order == "yaw_first" and len(views) == self.threads == 1
-        if prior is None or not simple or self.on_device:
-            return None
-        m, ((recover, recovering), (near, clusters)) = len(space.prior.low), prior
-        drawing = kinematics(), *views[0][0]
-        poses, translations, latents, angles = (np.empty((0, columns)) for columns in (ANGLES, 3, m, ANGLES - 3))
-        areas, allowed = np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=bool)
-        nearness = address_of(near, (latents, *clusters, allowed)), clusters
-        return Objective(
-            Constraint(space.centre, space.half, space.dimensions - m, *nearness),
-            *(space.anchor, space.tilt_mean),
-            *(address_of(recover, (latents, *recovering, angles)), recovering),
-            *(address_of(count_areas, (*drawing, poses, translations, areas)), drawing),
-            *(SCALE, float(self.beta)),
-        )
-
-    def count_poses(self, count: int) -> None:
-        """Report so many evaluations of what `compiled` returned."""
-        for _, silhouette in self._drawings:
-            count_poses(count, silhouette)
 
     @cached_property
     def on_device(self) -> bool:

@@ -4,10 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evolution.strategy import Strategy, default_population_size
-from posefit.fitting.box import REDRAWS
+from posefit.fitting.box import Start
+from posefit.fitting.cma import CMAES, default_population_size
+from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
@@ -112,27 +114,29 @@ def fit_shape(
     return Shape(shaped(body, factors, height), factors, SPREAD, cost(factors), height)
 
 
+@dataclass(frozen=True, eq=False)
+class FactorBox:
+    """The box that factors are searched in: [-1, 1]^17, whose half-range is `REACH` spreads of their logarithms."""
+
+    start: Start
+    dimensions: int = len(NAMES)
+    periodic: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(len(NAMES), dtype=bool))
+
+    def feasible(self, proposals: Array) -> NDArray[np.bool_]:
+        """Return which proposals (n, 17) lie in the box (n,)."""
+        return np.asarray((np.abs(proposals) <= 1.0).all(axis=1))
+
+
 def _search(cost: Callable[[Array], float], start: Array, rng: np.random.Generator, *, first: bool = False) -> Array:
-    """Return the factors (17,) of least cost, by CMA-ES in spreads of their logarithms."""
-    mean = np.clip(np.log(start) / SPREAD, -REACH, REACH)
+    """Return the factors (17,) of least cost, by CMA-ES from the factors `start` (17,)."""
+
+    def evaluate(proposals: Array) -> Array:
+        points = REACH * proposals  # in spreads of the logarithms
+        return np.array([cost(np.exp(SPREAD * point)) + PULL * float(point @ point) for point in points])
+
+    mean, width = np.clip(np.log(start) / (REACH * SPREAD), -1.0, 1.0), (WIDTH if first else NEAR) / REACH
+    box = FactorBox(Start(mean, np.full(len(NAMES), width), np.zeros(len(NAMES))))
     population = default_population_size(len(NAMES))
-    strategy = Strategy(mean, np.full(len(NAMES), WIDTH if first else NEAR), population)
-    best, least = mean, np.inf
-    for _ in range(GENERATIONS if first else AGAIN):
-        asked = _within_reach(strategy, rng, population)
-        costs = np.array([cost(np.exp(SPREAD * point)) + PULL * float(point @ point) for point in asked])
-        if costs.min() < least:
-            best, least = asked[costs.argmin()], costs.min()
-        strategy.learn(asked, costs)
-    return np.asarray(np.exp(SPREAD * best))
-
-
-def _within_reach(strategy: Strategy, rng: np.random.Generator, count: int) -> Array:
-    """Return so many draws (count, d): what is out of reach is drawn again, and at last clipped."""
-    asked = strategy.sample(rng, count)
-    for _ in range(REDRAWS):
-        beyond = np.flatnonzero((np.abs(asked) > REACH).any(axis=1))
-        if not len(beyond):
-            break
-        asked[beyond] = strategy.sample(rng, len(beyond))
-    return np.clip(asked, -REACH, REACH)
+    evaluations = population * (GENERATIONS if first else AGAIN)
+    best = minimise(evaluate, CMAES(box, rng, population_size=population), evaluations, budget_known=True)
+    return np.asarray(np.exp(REACH * SPREAD * best.proposal))

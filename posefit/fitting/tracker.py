@@ -15,7 +15,7 @@ from posefit.fitting.check import at_least, between, choices, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
-from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, RootOrder, SearchSpace, Translation
+from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchSpace, Translation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -27,7 +27,6 @@ SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiple
 KEPT = 3  # frames: how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
-PAPER = {"prediction": "literal", "tilt": "box", "root_order": "xyz"}  # Interpretations S12, S16 and S3 to the letter
 FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
 
@@ -114,58 +113,39 @@ class Prediction:
     Settings:
         spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Interpretation S5.
         floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Interpretation S5.
-        prediction (v_pred): the "latest" step, or the "literal" one before it. Interpretation S12.
         root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
         tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Interpretation S16.
-        tilt_share: of the training poses, above 0 and at most 1, whose tilt is searched. Ours.
-        tilt_margin_degrees: what is searched beyond them, to either side, 0 or more. Ours.
         translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
-        modes: searches of a frame that its modes are weighed by, the track's own and others; 0 weighs none. Ours.
-        modes_share: their evaluations, over those of the track's own search, above 0. Ours.
-        posterior_temperature: what costs are divided by where modes are weighed, above 0. Ours.
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
-        root_order: the root's angles are "yaw_first", or the paper's "xyz", without a tilt. Interpretation S3.
-        variant: "paper" sets the letter of SAPSO's paper: a "literal" prediction, a "box" of tilts, "xyz".
+        variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
+            (S16), and a root that turns about x, then y, then z (S3).
     """
 
     spread: float = SPREAD
     floor: float = FLOOR
-    prediction: Literal["latest", "literal"] = "latest"
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
     tilt: Literal["learned", "box"] = "learned"
-    tilt_share: float = TILT_SHARE
-    tilt_margin_degrees: float = TILT_MARGIN_DEGREES
     translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
-    modes: int = 0
-    modes_share: float = 0.2
-    posterior_temperature: float = 2.0
     relocalise_gap: int | None = None
-    root_order: RootOrder = "yaw_first"
     variant: Literal["default", "paper"] = "default"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
         choices(Prediction, vars(self))
-        if self.variant == "paper":
-            for name, value in PAPER.items():
-                object.__setattr__(self, name, value)
-        for name in ("floor", "modes_share", "posterior_temperature", "tilt_share"):
-            positive(name, getattr(self, name))
-        between("tilt_share", self.tilt_share, 0.0, 1.0)
+        positive("floor", self.floor)
         between("beta", self.beta, 0.0, 1.0)
-        for name in ("spread", "tilt_margin_degrees", "root_range_degrees", "translation_range"):
+        for name in ("spread", "root_range_degrees", "translation_range"):
             for value in np.atleast_1d(getattr(self, name)):
                 at_least(name, value, 0.0)
-        whole("modes", self.modes, 0)
         whole("relocalise_gap", self.relocalise_gap or 0, 0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
-        if self.tilt == "box" or not training:
+        if self.tilt == "box" or self.variant == "paper" or not training:
             return None
-        return Tilt.of(prior, training, self.tilt_share, float(np.radians(self.tilt_margin_degrees)))
+        return Tilt.of(prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES)))
 
 
 class Follower:
@@ -191,7 +171,7 @@ class Follower:
             task.translation,
             np.array(prediction.translation_range),
             tilt=self._tilt,
-            root_order=prediction.root_order,
+            root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
         earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
         self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
@@ -213,7 +193,7 @@ class Follower:
             space = replace(space, root_range=reach)
         space = space.around(latest[-1], anchor=anchor)
         # Interpretation S12: v_pred = gbest_t - gbest_{t-1}, and zero where there is no such pair
-        back = 1 if self._how.prediction == "latest" else 2
+        back = 2 if self._how.variant == "paper" else 1
         step = np.zeros(space.dimensions)
         if len(latest) > back:
             half = np.where(space.half > 0.0, space.half, 1.0)  # as in proposals: 0 where nothing is searched
@@ -268,14 +248,10 @@ class SynthesisTracker:
                 continue
             optimiser = self._ready(optimiser, space, rng)
             problem = self.problem(space, observation)
-            best = self.minimum(problem, optimiser)
+            best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
             follower.commit(best.proposal)
             latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
             yield latest
-
-    def minimum(self, problem: PoseProblem, optimiser: Optimiser) -> Minimum:
-        """Return the best of the search of a frame."""
-        return minimise(problem.evaluate, optimiser, self.task.evaluations, budget_known=True)
 
     def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
         """Return the latest frame once more, at no evaluation; before the first one, the middle of the box."""

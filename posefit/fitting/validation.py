@@ -18,9 +18,8 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
-from posefit.fitting.optimiser import NOTHING_SEARCHED, BudgetError, Optimiser, compiled_search_of
+from posefit.fitting.optimiser import BudgetError, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.problem import PoseProblem
 from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
@@ -89,18 +88,6 @@ class CheckedOptimiser:
         with self._called("tell"):
             self._optimiser.tell(proposals, costs)
 
-    def compiled_search(self, problem: PoseProblem, evaluations: int) -> tuple[Array, Array]:
-        """Return the optimiser's next populations and their costs; none where it has no compiled form."""
-        search = compiled_search_of(self._optimiser)
-        if search is None:
-            return NOTHING_SEARCHED
-        with self._called("compiled_search"):
-            proposals, costs = search(problem, evaluations)
-        if len(costs):
-            self._check(np.concatenate(proposals))
-            self._first = False
-        return proposals, costs
-
     def advance(self, space: Space) -> None:
         """Pass the next frame's space on."""
         self._space, self._first = space, True
@@ -160,7 +147,6 @@ class CheckedPrior:
         self._prior, self._name = prior, name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
         self.affine = getattr(prior, "affine", None)
-        self.compiled = getattr(prior, "compiled", None)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn from joint angles (T, 63), and return itself."""

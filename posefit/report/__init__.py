@@ -16,12 +16,9 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | the figures of a row, their labels and digits | columns.py |
 | the methods compared on the runs that they share; the leaderboard | contest.py |
 | cost over evaluations, targets reached, errors of joints, calibration, running times, as numbers | curves.py |
-| the sentences of the first screen; published claims | summary.py |
-| the best method of each instance, and a selector | selection.py |
+| the sentences of the first screen | summary.py |
 | the data of the page; its animations | content.py, animations.py |
 | the page: markup, style and scripts as one document | page/ |
-| the report of a running sweep | live.py |
-| the leaderboard of a suite, of bundles that were verified | board.py |
 | figures by matplotlib, and the folder of a paper's figures and tables | figures.py |
 | LaTeX, CSV and IOHprofiler's files | export.py |
 | the command that runs one row again | repeat.py |

@@ -12,7 +12,6 @@ from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
 from posefit.motion.built_in import average_skeleton
 from posefit.reading import counted
-from posefit.registry import plugins_of
 from posefit.report import curves
 from posefit.report.animations import animations_of
 from posefit.report.columns import COLUMNS, SEARCH_COLUMNS
@@ -28,11 +27,9 @@ from posefit.report.contest import (
 )
 from posefit.report.page import COLOURS
 from posefit.report.runs import Runs, damage, views
-from posefit.report.selection import selection_of
 from posefit.report.summary import (
     leader_sentence,
     not_worse,
-    published_claims,
     three_tracks,
     unpaired_sentence,
 )
@@ -83,20 +80,6 @@ SEARCH_SCORE = {
 
 def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs."""
-    changed = time.localtime((ledger.path / ROWS).stat().st_mtime)
-    made = f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', changed)}"
-    if runs.is_search:
-        return search_data(runs, "Report of single searches", made)
-    return _data(runs, "Report of a sweep", made, lambda data: _tracks(ledger, runs, data, warn))
-
-
-def search_data(runs: Runs, title: str, made: str) -> dict[str, Any]:
-    """Return the data of a page about single searches; `made` says of what and when."""
-    return _data(runs, title, made, lambda data: _searches(runs, data))
-
-
-def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], dict[str, Any]]) -> dict[str, Any]:
-    """Return the data of a page; `rest` adds what tracks alone or searches alone have."""
     contest = contest_of(runs)
     data: dict[str, Any] = {"sections": []}
     answer = "Every cell failed." if runs.failures else "No run has an error yet: there is nothing to compare."
@@ -114,11 +97,12 @@ def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], di
             "taking_part": contest.methods,
             **(_search_curves(contest) if runs.is_search else _track_curves(contest, board[0]["method"])),
         }
+    changed = time.localtime((ledger.path / ROWS).stat().st_mtime)
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
     data |= {
-        "title": title,
+        "title": "Report of single searches" if runs.is_search else "Report of a sweep",
         "headline": answer,
-        "made": made,
+        "made": f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', changed)}",
         "header": _header(runs, contest),
         "methods": [{"name": name, **fields} for name, fields in zip(runs.methods, runs.variants, strict=True)],
         "joints": [place.replace("_", " ") for place in PLACES],
@@ -128,17 +112,16 @@ def _data(runs: Runs, title: str, made: str, rest: Callable[[dict[str, Any]], di
         "colours": COLOURS,
         "warnings": warnings,
         "warned": {row: [warnings.index(text) for text in texts] for row, texts in runs.warnings.items()},
-        "live": None,
         "failures": runs.failures,
-        **rest(data),
+        **(_searches(runs, data) if runs.is_search else _tracks(ledger, runs, data, warn)),
     }
     return data | {"sections": [*data["sections"], *(["failures"] if runs.failures else [])]}
 
 
 def _tracks(ledger: Ledger, runs: Runs, data: dict[str, Any], warn: Callable[[str], None]) -> dict[str, Any]:
     """Return the rows of tracks, their animations, and the sections of the page."""
-    needed = {"selection": "selection", "joints": "joint_errors", "certainty": "certainty"}  # for these sections
-    compared = ["leaderboard", "comparison", "selection", "curves", "joints", "certainty"] if "answer" in data else []
+    needed = {"joints": "joint_errors", "certainty": "certainty"}  # for these sections
+    compared = ["leaderboard", "comparison", "curves", "joints", "certainty"] if "answer" in data else []
     baselines = {name: _by_instance(runs, f"baseline_{name}") for name in BASELINES}
     rows = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
     rows |= {name: np.round(runs.figures[name], COLUMNS[name].stored_digits) for name in runs.table_figures}
@@ -173,8 +156,6 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     title = "Targets reached, of all runs and 51 costs an instance"
     return {
         "examples": three_tracks(contest, leader),
-        "claims": published_claims(contest, [claim for one in plugins_of("claims") for claim in one.offers]),
-        "selection": selection_of(contest),
         "evaluations": evaluations,
         "charts": [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]
         if len(evaluations)
@@ -326,7 +307,7 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
         notes.append("Budgets differ: compare methods of one budget only, as a longer search has lower costs.")
     if runs.is_search and len(_of_methods(runs, "infeasible")) > 1:
         notes.append("Infeasible proposals are treated differently: compare methods that treat them in the same way.")
-    if len(_of_methods(runs, "version")) > 1 and any(runs.keys):
+    if len(_of_methods(runs, "version")) > 1:
         notes.append("Commands run rows again if the same versions are installed.")
     return notes
 

@@ -21,7 +21,6 @@ from posefit.suites.running import SuiteRun
 from posefit.sweep.cell import settings_text
 from posefit.sweep.table import is_search, search_run
 from posefit.uncertainty.calibration import BINS
-from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
@@ -88,11 +87,11 @@ class _Row(NamedTuple):
     data: tuple[Any, ...]  # joint errors, modes and trace of a track; run and hits of a search
 
 
-def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
+def runs_of(ledger: "Ledger") -> Runs:
     """Return the finished rows of a ledger, in an order that does not depend on which of them finished first.
 
-    If every cell failed there are no rows, but failures. Raises ValueError where there is neither, unless the ledger
-    may be empty, and where it holds both tracks and single searches.
+    If every cell failed there are no rows, but failures. Raises ValueError where there is neither, and where it holds
+    both tracks and single searches.
     """
     quarantined = ledger.quarantined()
     rows: list[_Row] = []
@@ -116,7 +115,7 @@ def runs_of(ledger: "Ledger", *, may_be_empty: bool = False) -> Runs:
             places[place] = sys.intern(_text(_place(spec)))
         texts = (places[place], *heads[fields])
         rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row["warnings"]), figures, tuple(data)))
-    if not kinds and not may_be_empty and not ledger.bad():
+    if not kinds and not ledger.bad():
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
     return _sorted_runs(ledger.version, True in kinds, rows, quarantined, ledger.bad())
 
@@ -128,16 +127,6 @@ def _track_data(row: Mapping[str, Any], grids: dict[bytes, Any]) -> tuple[Any, .
     trace = grids.setdefault(evaluations.tobytes(), evaluations), np.array(row["trace"]["cost"], np.float32)
     figures = np.array([column.value(row) for column in COLUMNS.values()], np.float64)
     return figures, joints, _binned(row["mode_reliability"]), trace
-
-
-def runs_of_searches(named: Sequence[tuple[str, SuiteRun]]) -> Runs:
-    """Return searches as `runs_of` does, each with the name of the bundle it is of, which makes another method."""
-    rows = []
-    for bundle, run in named:
-        spec = {**vars(run), "evaluations": run.budget, "bundle": bundle}
-        figures, *data = _search_data(run)
-        rows.append(_Row(_text(_place(spec)), _text(_variant(spec)), "", run.seed, "", (), figures, tuple(data)))
-    return _sorted_runs(posefit_build().removeprefix("posefit "), True, rows, (), ())
 
 
 def _search_data(run: SuiteRun) -> tuple[Any, ...]:
@@ -226,9 +215,7 @@ def _bad_row(reason: str) -> dict[str, Any]:
 
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
     if is_search(spec):
-        fields = {
-            name: spec[name] for name in ("method", "settings", "infeasible", "version", "bundle") if name in spec
-        }
+        fields = {name: spec[name] for name in ("method", "settings", "infeasible", "version")}
         return {**fields, "budget": spec["evaluations"] / spec["dimension"]}
     return {name: spec[name] for name in _METHOD_FIELDS}
 
@@ -240,8 +227,7 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
     else:
         count = variant["hypotheses"]
         words = [f"{variant['evaluations']} evaluations", f"{count} {'hypothesis' if count == 1 else 'hypotheses'}"]
-    source = [f"of {variant['bundle']}"] if "bundle" in variant else variant["version"].split(", ")
-    return [*settings_text(variant["settings"]), *words, *source]
+    return [*settings_text(variant["settings"]), *words, *variant["version"].split(", ")]
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,14 +1,13 @@
-"""The sentences of a report's first screen: the leader, how certain that is, and published claims."""
+"""The sentences of a report's first screen: the leader, and how certain that is."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from posefit.hooks import ClaimedOrder
 from posefit.reading import counted
-from posefit.report.contest import Contest, interquartile_mean, is_random
-from posefit.statistics.ranks import LEVEL, wilcoxon
+from posefit.report.contest import Contest, is_random
+from posefit.statistics.ranks import LEVEL
 from posefit.tracking.measures import BASELINES
 
 NAMED = 4  # names that a sentence lists; of more it gives the number
@@ -164,45 +163,6 @@ def unpaired_sentence(contest: Contest) -> str:
         each = "one seed" if seeds == 1 else f"{seeds} seeds"
         clauses.append(f"{spare} {'more ' if clauses else ''}{where}, which are of {each} of every instance")
     return "; ".join(clauses)
-
-
-def published_claims(contest: Contest, orders: Iterable[ClaimedOrder]) -> list[dict[str, Any]]:
-    """Return the result of each published order of methods that all take part, with at least two runs each.
-
-    Each step from a method to the next has a paired test, Holm's over all steps: on instances with their seeds
-    (`adjusted`), and on instances alone, each by the mean over its seeds (`by_instance`). A step is `confirmed` if the
-    next method is better in the former at 5 %; a `difference` above 0, in degrees, is in its favour.
-    """
-    known = [contest.runs.variants[m]["method"] for m in contest.methods]
-    results = []
-    for order in orders:
-        if not set(order.methods) <= set(known) or contest.blocks.shape[1] < 2:
-            continue
-        chosen = [known.index(name) for name in order.methods]
-        errors, tested = contest.of("error")[chosen], contest.tested_errors()[chosen]
-        pairs = [(k, k + 1) for k in range(len(chosen) - 1)]
-        by_instance = wilcoxon(errors.mean(axis=2, keepdims=True), pairs)
-        steps = [
-            {
-                "difference": step.difference,
-                "p": step.p_value,
-                "adjusted": step.adjusted,
-                "by_instance": instances.adjusted,
-                "confirmed": step.difference > 0.0 and step.adjusted < LEVEL,
-            }
-            for step, instances in zip(wilcoxon(tested, pairs), by_instance, strict=True)
-        ]
-        result = {
-            "source": order.source,
-            "said": order.statement,
-            "methods": [contest.methods[m] for m in chosen],
-            "errors": [interquartile_mean(values) for values in errors],
-            "blocks": tested[0].size,
-            "instances": errors.shape[1],
-            "steps": steps,
-        }
-        results.append(result)
-    return results
 
 
 def listed(names: Sequence[str]) -> str:

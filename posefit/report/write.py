@@ -16,7 +16,7 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
 
 MAX_MISSING = 20  # instances that are named if they are not compared
-PRINTED = ("header", "answer", "leaderboard", "baselines", "claims", "selection", "times")
+PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
 
 def write_report(
@@ -30,11 +30,11 @@ def write_report(
 ) -> dict[str, Any]:
     """Write the report of a ledger to a file, and return what the command prints.
 
-    That is the header, the answer, the leaderboard, the baselines, published claims and selection of tracks, and the
-    running times of single searches. Without `out` no page is written; an earlier report of that name is replaced,
-    nothing else is. `figures` is a new folder for figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for
-    IOHprofiler's files, `csv` a new file of all rows. Raises ValueError where the ledger has no finished row or
-    something cannot be written, and ImportError where figures need matplotlib: before anything is written, if possible.
+    That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
+    `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
+    figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows.
+    Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
+    need matplotlib: before anything is written, if possible.
     """
     _check_places(Path(path), out, [figures, iohprofiler, csv])
     if figures is not None:
@@ -51,7 +51,8 @@ def write_report(
         raise InputError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
     data = data_of(ledger, runs, warn)
     if out is not None:
-        write_page(data, out)
+        with replaced_file(out, MARK.encode()) as building:
+            building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         write_figures(runs, figures)
     if iohprofiler is not None:
@@ -110,24 +111,11 @@ def _gap_lines(header: dict[str, Any]) -> list[str]:
     return lines
 
 
-def check_page(out: str) -> None:
-    """Return nothing. Raises InputError where a page cannot be written to a file of this name."""
-    if Path(out).suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
-    if not replaceable(Path(out), MARK.encode()):
-        raise InputError(f"{out}: expected a new name or an earlier report, got something else")
-    check_place(out)
-
-
-def write_page(data: dict[str, Any], out: str) -> None:
-    """Write the page that shows the data of a report; an earlier report of that name is replaced."""
-    with replaced_file(out, MARK.encode()) as building:
-        building.write_text(document(data), encoding="utf-8", newline="\n")
-
-
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:
-    if out is not None:
-        check_page(out)
+    if out is not None and Path(out).suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--out must be a file that ends in .html, got {cut(out)}")
+    if out is not None and not replaceable(Path(out), MARK.encode()):
+        raise InputError(f"{out}: expected a new name or an earlier report, got something else")
     places = [place for place in (out, *others) if place is not None]
     for place in places:
         if Path(place).resolve() == ledger.resolve() or places.count(place) > 1:

@@ -126,7 +126,12 @@ def costs_in(
 
 
 def mismatch(areas: Areas, beta: float = BETA) -> Array:
-    """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Interpretation S2."""
+    """Return the cost (n,) of areas R, B, Y (n, 3), 0 to 100. SAPSO (4), Interpretation S2.
+
+    Raises InputError where the areas have another shape.
+    """
+    if np.ndim(areas) != 2 or np.shape(areas)[1] != 3:
+        raise InputError(f"areas must have shape (n, 3), got {np.shape(areas)}")
     costs = np.zeros(len(areas))
     kernels.add_mismatch(areas, SCALE, beta, costs)
     return costs

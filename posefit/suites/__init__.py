@@ -12,8 +12,4 @@
 | the instances of each function | instances.py |
 | the boxes that are searched, made by `docs/studies/make_boxes.py` | boxes.py |
 | an optimiser on a problem; the run of any loop; scores of runs | running.py |
-| runs as a file with the points of their improvements | bundles.py |
-| whether all that such a file claims is so | verification.py |
-| runs of posefit's own methods, made by `docs/studies/make_bundles.py` | methods.zip |
-| a problem as one of IOHexperimenter's | iohexperimenter.py |
 """

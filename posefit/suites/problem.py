@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from pickle import PicklingError
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 
@@ -31,9 +31,6 @@ from posefit.suites.functions import (
     suite_function,
 )
 from posefit.suites.instances import SuiteInstance, suite_instance
-
-if TYPE_CHECKING:
-    from posefit.suites.iohexperimenter import IOHProblem
 
 Infeasible = Literal["repair", "reject", "penalise"]
 INFEASIBLE: tuple[Infeasible, ...] = ("repair", "reject", "penalise")
@@ -128,15 +125,6 @@ class Problem:
     def noise_free(self, proposals: object) -> Array:
         """Return the costs (n,) of proposals (n, d), without noise and uncounted: a search that calls this cheats."""
         return self._noise_free(self._checked(proposals).reshape(-1, self.dimension))[0]
-
-    def ioh(self) -> "IOHProblem":
-        """Return the problem as one of IOHexperimenter's: its count is this one's, and its `reset` resets both.
-
-        Raises ImportError without the library ioh.
-        """
-        from posefit.suites.iohexperimenter import IOHProblem
-
-        return IOHProblem(self)
 
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""

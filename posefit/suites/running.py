@@ -17,7 +17,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
-from posefit.registry import registry, version_of
+from posefit.registry import registry
 from posefit.statistics.profiles import attained, expected_running_time, hits, running_time_interval
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
@@ -32,7 +32,6 @@ class SuiteRun:
     suite: str
     method: str
     settings: Mapping[str, Any]
-    version: str  # of posefit and of the method, with digests of their sources
     function: int
     dimension: int
     instance: int
@@ -43,7 +42,6 @@ class SuiteRun:
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
     costs: Array = field(repr=False)  # (k,)
-    points: Array | None = field(default=None, repr=False)  # see `Problem.points`; None of a ledger without them
 
     @property
     def cost(self) -> float:
@@ -67,13 +65,13 @@ def run_on(
     evaluations = EVALUATIONS * problem.dimension if evaluations is None else evaluations
     chosen, space = dict(chosen or {}), problem.space
     rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
-    offer = registry().offer("optimiser", method)
-    settings.check(method, offer.factory, chosen)
+    factory = registry().optimiser(method)
+    settings.check(method, factory, chosen)
     with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
-        optimiser = offer.factory(space, rng, **settings.planned(offer.factory, chosen, evaluations))
+        optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
     guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
     minimise(problem.evaluate, guarded, evaluations, budget_known=True)
-    return run_of(problem, method, chosen, seed=seed, budget=evaluations, source=offer.origin)
+    return run_of(problem, method, chosen, seed=seed, budget=evaluations)
 
 
 def run_of(
@@ -83,12 +81,11 @@ def run_of(
     *,
     seed: int = 0,
     budget: int | None = None,
-    source: str = "",
 ) -> SuiteRun:
     """Return the run that any loop has made on a problem, by the name of its method and its settings.
 
-    `budget` is the problem's where it has one. `source` names the method's source, such as `my_search 3fa29b1c`: see
-    `posefit.version.source_digest`. Raises ValueError where nothing feasible was evaluated, or more than the budget.
+    `budget` is the problem's where it has one. Raises ValueError where nothing feasible was evaluated, or more than the
+    budget.
     """
     if not len(problem.points):
         raise InputError(f"{problem.id}: {method} must propose something feasible, got {problem.evaluations} rejected")
@@ -100,7 +97,6 @@ def run_of(
         problem.suite,
         method,
         dict(chosen or {}),
-        version_of([source] if source else []),
         problem.id_function,
         problem.dimension,
         problem.instance,
@@ -110,7 +106,6 @@ def run_of(
         problem.truth_cost,
         problem.targets,
         *problem.trace,
-        problem.points,
     )
 
 

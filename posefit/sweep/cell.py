@@ -37,9 +37,7 @@ class CellResult:
     """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
-    # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; of a search the points (k, d) of its improvements,
-    # float64
-    joints: bytes = field(repr=False)
+    joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
 
 
 class _Spec:
@@ -204,8 +202,7 @@ class SearchCell(_Spec):
             "trace": {"evaluations": [int(used) for used in run.evaluations], "cost": run.costs.tolist()},
             "warnings": [],
         }
-        assert run.points is not None
-        return CellResult(row, run.points.astype("<f8").tobytes())
+        return CellResult(row, b"")
 
 
 Cell = TrackCell | SearchCell

@@ -6,7 +6,7 @@ import shlex
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import fields
 from itertools import islice
 from pathlib import Path
@@ -46,8 +46,6 @@ def swept(
         if keep_old and outdated:
             old = {_unversioned(row["spec"]) for row in driver.ledger.rows() if row["spec"]["version"] in outdated}
             cells = [cell for cell in cells if cell.key in driver.ledger or _unversioned(cell.spec) not in old]
-        with suppress(OSError, ValueError):  # no room: the sweep will say so, if it needs any
-            driver.ledger.begin(keys_of(cells))
         bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
         started = False
 

@@ -2,34 +2,28 @@
 
 ledger.json          the format of the folder
 rows/NAME.jsonl      finished rows, one log a driver
-rows/NAME.joints     the joints of the rows' frames; of single searches the points at which the cost fell
+rows/NAME.joints     the joints of the rows' frames
 leases/KEY.n         the nth attempt at a cell: who runs it, or why it failed
 quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
-plans/NAME.cells     the cells of a plan that was begun here, when, and how many were done then
 aside/               damaged lines and files; their cells are run again
 """
 
-import hashlib
 import io
-import json
 import os
 import re
 import sys
-import time
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.files import create_once, replaced_file
-from posefit.fitting.check import finite_number, whole
+from posefit.files import create_once
 from posefit.geometry.skeleton import JOINTS as SKELETON_JOINTS
 from posefit.reading import cut, parsed_json, quoted, read_text
 from posefit.sweep.cell import other_version
@@ -44,23 +38,12 @@ if TYPE_CHECKING:
     from posefit.arrays import Array
 
 INDEX = "ledger.json"
-ROWS, LEASES, QUARANTINE, ASIDE, PLANS = FOLDERS = ("rows", "leases", "quarantine", "aside", "plans")
+ROWS, LEASES, QUARANTINE, ASIDE = FOLDERS = ("rows", "leases", "quarantine", "aside")
 FORMAT = 1
 MAX_INDEX_BYTES = 10_000
 REASON = 120  # characters of why a row is bad
 MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
 VERSION = re.compile(rb'"version": "([^"]*)"')  # in a row
-PLANNED, SHORT = b'{"cells": ', 8  # how the file of a plan begins; bytes of each key that it holds
-
-
-@dataclass(frozen=True)
-class BegunPlan:
-    """A plan that a sweep began here, with the first 8 bytes of the key of each of its cells, one after the other."""
-
-    cells: int
-    begun: float  # seconds since 1970
-    settled: int  # cells that were done or in quarantine then
-    keys: bytes
 
 
 class Ledger:
@@ -106,10 +89,6 @@ class Ledger:
     def __contains__(self, key: str) -> bool:
         return key in self._places
 
-    def keys(self) -> Iterator[str]:
-        """Return the keys of all finished cells."""
-        return iter(self._places)
-
     @property
     def version(self) -> str:
         """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
@@ -124,33 +103,6 @@ class Ledger:
     def bad(self) -> list[str]:
         """Return of each row that was put aside, and whose cell has no other row: its file, its line, and why."""
         return [reason for key, reason in self._bad.values() if key and key not in self]
-
-    def begin(self, keys: Iterable[str]) -> None:
-        """Write down the cells of a plan that is begun, or gone on with, so that its progress can be read."""
-        settled, quarantined, short = 0, self.quarantined_keys(), bytearray()
-        for key in keys:
-            settled += key in self or key in quarantined
-            short += bytes.fromhex(key[: 2 * SHORT])
-        head = {"cells": len(short) // SHORT, "begun": time.time(), "settled": settled}
-        path = self.path / PLANS / f"{hashlib.sha256(short).hexdigest()[:16]}.cells"
-        with replaced_file(path, PLANNED) as building:
-            building.write_bytes(json.dumps(head).encode() + b"\n" + short)
-
-    def plans(self) -> list[BegunPlan]:
-        """Return the plans that were begun here, the latest first; a damaged one is left out."""
-        plans = []
-        for path in (self.path / PLANS).glob("*.cells"):
-            if not path.is_file():
-                continue
-            try:
-                head, _, short = path.read_bytes().partition(b"\n")
-                plan = BegunPlan(**parsed_json(head), keys=short)
-                finite_number("begun", plan.begun)
-                if whole("cells", plan.cells, 0) == len(short) // SHORT >= whole("settled", plan.settled, 0):
-                    plans.append(plan)
-            except (OSError, ValueError, TypeError):
-                continue
-        return sorted(plans, key=lambda plan: -plan.begun)
 
     def in_quarantine(self, key: str) -> bool:
         """Return whether a cell is in quarantine."""
@@ -214,15 +166,6 @@ class Ledger:
         except Exception:  # whatever a hostile archive raises
             pass
         raise InputError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
-
-    def points(self, row: Mapping[str, Any]) -> "Array | None":
-        """Return the points (k, d) at which the cost of a row's search fell; None where they are missing or damaged."""
-        start, length, checksum = row["joints"]
-        dimension = row["spec"]["dimension"]
-        data = joints_at((self.path / ROWS / self._places[row["key"]][0]).with_suffix(JOINTS), start, length)
-        if not data or zlib.crc32(data) != checksum or len(data) % (8 * dimension):
-            return None
-        return np.frombuffer(data, "<f8").reshape(-1, dimension).astype(np.float64)
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
@@ -321,7 +264,7 @@ def _check_format(path: Path) -> None:
         raise InputError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
     if form != FORMAT:
         raise InputError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
-    for name in (ROWS, LEASES, QUARANTINE, ASIDE):
+    for name in FOLDERS:
         if not (path / name).is_dir():
             raise InputError(
                 f"{path / name}: expected a folder of the ledger, got {'a file' if (path / name).exists() else 'none'}"

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
@@ -84,20 +83,19 @@ def search_runs(ledger: "Ledger") -> Iterator[SuiteRun]:
         if not is_search(row["spec"]):
             raise InputError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
         count += 1
-        yield search_run(row, ledger.points(row))
+        yield search_run(row)
     if not count:
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
 
 
-def search_run(row: Mapping[str, Any], points: Array | None = None) -> SuiteRun:
-    """Return the run of a row of a single search, with the points of `Ledger.points`."""
+def search_run(row: Mapping[str, Any]) -> SuiteRun:
+    """Return the run of a row of a single search."""
     spec, trace = row["spec"], row["trace"]
     return SuiteRun(
-        **{name: value for name, value in spec.items() if name != "evaluations"},
+        **{name: value for name, value in spec.items() if name not in ("evaluations", "version")},
         budget=spec["evaluations"],
         truth_cost=row["truth_cost"],
         targets=row["truth_cost"] + TARGETS,
         evaluations=np.array(trace["evaluations"], dtype=np.float64),
         costs=np.array(trace["cost"], dtype=np.float64),
-        points=points,
     )

@@ -2,16 +2,18 @@
 
 import copy
 import inspect
+import io
 import pickle
 import random
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, get_origin
 
 import numpy as np
 
+from posefit.reading import quoted
 from posefit.settings import settings_of
 from posefit.testing.results import BrokenError, SkippedError, expect
 
@@ -44,7 +46,16 @@ def construction(case: PluginCase) -> None:
         len(by_position) == len(case.arguments),
         f"a factory must take ({taken}) and keyword-only settings, got {len(by_position)} that are not keyword-only",
     )
+    untyped = [setting.name for setting in settings_of(case.factory) if setting.annotation is inspect.Parameter.empty]
+    expect(not untyped, f"a setting must have a type, such as {(untyped or ['n'])[0]}: int = 40, got none")
     case.build()
+
+
+def silence(case: PluginCase) -> None:
+    """Nothing is printed."""
+    with redirect_stdout(io.StringIO()) as printed:
+        case.use()
+    expect(not printed.getvalue(), f"a plugin must print nothing, got {quoted(printed.getvalue())}")
 
 
 def unknown_setting(case: PluginCase) -> None:

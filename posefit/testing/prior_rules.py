@@ -4,6 +4,7 @@ import tempfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +44,10 @@ class Case(PluginCase):
         before, random = angles.copy(), global_random_state()
         returned = prior.fit(angles, built_in.average_skeleton())
         return Fitting(prior, returned, np.array_equal(angles, before), random == global_random_state())
+
+    def use(self, **more: Any) -> None:
+        """Let a prior learn."""
+        self.build(**more).fit(walking_angles(), built_in.average_skeleton())
 
     @property
     def fitted(self) -> Prior:
@@ -232,6 +237,7 @@ RULES = [
     file,
     learns,
     bad_input,
+    common.silence,
     common.nonsense_settings,
     searchable,
     speed,

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from posefit import limits
 
 SECONDS = 60.0  # how long a check may take before its plugin counts as one that never returns
+POSEFIT = Path(__file__).parents[1]  # whose frames of a traceback are not a plugin's
 SAME_CAUSE = 2  # checks that fail for the same cause before the others are not run
 
 
@@ -132,11 +133,10 @@ def _cause(detail: str) -> str:
 
 
 def _plugin_traceback(error: BaseException) -> str:
-    """Return an error's traceback without the frames of the kit that called the plugin."""
+    """Return an error's traceback from the plugin's first frame on, without those of posefit that called it."""
     rest = error.__traceback__
     while rest is not None:
-        file = rest.tb_frame.f_code.co_filename
-        if file != limits.__file__ and Path(file).parent != Path(__file__).parent:
+        if POSEFIT not in Path(rest.tb_frame.f_code.co_filename).parents:
             return "".join(traceback.format_exception(type(error), error, rest)).strip()
         rest = rest.tb_next
     return ""

@@ -81,6 +81,12 @@ class Case(PluginCase):
         segmenter: Segmenter = self.factory(painted()[0], **{**self.settings, **more})
         return segmenter
 
+    def use(self, **more: Any) -> None:
+        """Segment two frames."""
+        segmenter = self.build(**more)
+        for image in painted()[0].frames(stop=EMPTY, step=4):
+            segmenter.segment(image)
+
     def segment(self) -> list[tuple[Mask, Mask]]:
         """Return the masks and shadows of every fourth frame, in order."""
         segmenter, pairs = self.build(), list[tuple[Mask, Mask]]()
@@ -177,6 +183,7 @@ RULES = [
     background,
     landmarks,
     global_randomness,
+    common.silence,
     common.nonsense_settings,
     speed,
 ]

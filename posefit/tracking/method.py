@@ -30,7 +30,6 @@ from posefit.motion import built_in, recorded
 from posefit.reading import quoted, suggestion
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
-from posefit.tracking.modes import WeighingTracker
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import GAP, RelocalisingTracker
 
@@ -172,8 +171,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
                 made = optimiser.factory(space, rng, **mine["optimiser"])
             return CheckedOptimiser(made, space, optimiser.label, limit, task.evaluations)
 
-        kind = WeighingTracker if prediction.modes else SynthesisTracker
-        return kind(task, learned, build, optimiser.next_frame, prediction, tilt)
+        return SynthesisTracker(task, learned, build, optimiser.next_frame, prediction, tilt)
 
     label = f"{optimiser.name}@{name}"
     return Method(label, learned, prediction.beta, mine, Audit(), prediction.relocalise_gap, make)

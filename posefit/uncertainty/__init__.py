@@ -14,8 +14,5 @@ A silhouette seldom determines one pose. What it leaves open is a `Posterior`: w
 |---|---|---|
 | weighted poses, clustered by their joints; exchanged sides | modes, clustering, mirror ambiguity | modes.py |
 | errors of joints and angles | credible intervals, of a mixture | intervals.py |
-| modes with weights from several searches of any optimiser | multimodal optimisation | searches.py |
-| proposals in one valley of the cost | hill-valley clustering, niching | hill_valley.py |
-| the share of each valley | tempered sequential Monte Carlo, waste-free | smc.py, landscape.py |
 | calibrated probabilities and intervals | conformal prediction, coverage, ECE | calibration.py |
 """

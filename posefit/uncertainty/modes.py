@@ -76,15 +76,15 @@ class Posterior:
         return cls(**arrays, coherent=stored["coherent"], recalibration=corrections)
 
 
-def modes_of(skeleton: Skeleton, posterior: Posterior, apart: float = APART) -> list[Mode]:
+def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     """Return the modes of a frame, the likeliest first: similar poses are one mode.
 
-    Poses are similar where they are at most `apart` metres from each other, see `poses_apart`. The pose of a mode is
-    its medoid; a mean might be no possible pose. Weights are shares of the poses' weight, raised to the sharpness of
+    Poses are similar where they are at most a tenth of a metre from each other, see `poses_apart`. The pose of a mode
+    is its medoid; a mean might be no possible pose. Weights are shares of the poses' weight, raised to the sharpness of
     the posterior's recalibration; they sum to 1, less its probability that no mode is right.
     """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
-    clusters = _clusters(distances, posterior.weights, apart)
+    clusters = _clusters(distances, posterior.weights, APART)
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
         share = (1.0 - posterior.recalibration.none) / sum(powers)

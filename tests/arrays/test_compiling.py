@@ -1,220 +1,102 @@
-"""One process compiles a function, others wait for it; none waits for ever, and none needs a cache."""
+"""What is compiled once is found by later processes; a damaged cache, and none at all, cost a compilation."""
 
 import os
-import shutil
 import subprocess
 import sys
-from collections import Counter
-from threading import Timer
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from posefit.arrays.compiling import in_turn
-
-DEEPER = """
-from numba.extending import overload
-from posefit.arrays import inlined
-FACTOR = 2.0
-
-@inlined
-def deep(x):
-    return x + 1.0
-
-def plain(x):
-    return x
-
-@overload(plain)
-def _compiled(x):
-    return lambda x: x
-"""
-MIDDLE = """
-from deeper import FACTOR, deep, plain
-"""
-# a loop that calls another, one that calls itself, one that calls another twice, one that no type fits, and one that
-# is to become part of others
 LOOPS = """
 from posefit.arrays import inlined, jit
-from middle import FACTOR, deep, plain
-
-@jit
-def changing(x):
-    return FACTOR * deep(plain(x))
-
-@jit
-def outer(values):
-    total = 0.0
-    for i in range(values.size):
-        total += inner(values, i)
-    return total
-
-@jit
-def inner(values, i):
-    return values[i] * values[i]
-
-@jit
-def halved(n):
-    return 0 if n < 2 else 1 + halved(n // 2)
-
-@jit
-def first(values):
-    one = 1
-    return picked(values, 0) + picked(values, values.size - 2 * one)
-
-@jit
-def picked(values, i):
-    return values[i]
-
-@jit
-def impossible(values):
-    return values + "words"
+from constants import FACTOR
 
 @inlined
 def doubled(x):
     return x + x
+
+@jit
+def scaled(values):
+    total = 0.0
+    for i in range(values.size):
+        total += FACTOR * doubled(values[i])
+    return total
 """
-# says what this process compiled, once a file tells it to begin
+# prints the functions that this process compiled
 RUN = """
-import os, time
 import numpy as np
 from numba.core import event
 
 class Listener(event.Listener):
     def on_start(self, one):
-        name = one.data["dispatcher"].py_func
-        if name.__module__ == "loops":
-            print("compiled", name.__name__, one.data["args"][0], flush=True)
+        print("compiled", one.data["dispatcher"].py_func.__name__, flush=True)
     def on_end(self, one):
         pass
 
-import loops
+from package.loops import scaled
 event.register("numba:compile", Listener())
-print("ready", flush=True)
-while not os.path.exists("go"):
-    time.sleep(0.001)
-"""
-ALL = """
-assert loops.outer(np.arange(4.0)) == 14.0
-assert loops.outer(np.arange(4)) == 14.0
-assert loops.halved(9) == 3
+print(scaled(np.arange(4.0)))
 """
 
 
 @pytest.fixture
-def start():
-    def started(script, tmp_path, deeper=DEEPER, **variables):
-        for name, text in (("loops", LOOPS), ("middle", MIDDLE), ("deeper", deeper)):
-            (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
-        variables["PYTHONDONTWRITEBYTECODE"] = "1"  # Python takes a file of the same second and size for the same
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0", **variables}
+def run(tmp_path: Path) -> Any:
+    """Return a function that runs a process and returns the sum that it prints, and what it compiled."""
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package/__init__.py").touch()
+    (tmp_path / "package/loops.py").write_text(LOOPS.replace("from constants", "from package.constants"))
+
+    def ran(factor: float = 1.0, before: str = "", **variables: str) -> tuple[float, list[str]]:
+        (tmp_path / "package/constants.py").write_text(f"FACTOR = {factor}\n")
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
         path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-        return subprocess.Popen(
-            [sys.executable, "-c", RUN + script],
-            cwd=tmp_path,
-            env={**environment, "PYTHONPATH": path},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        environment |= {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **variables}
+        command = [sys.executable, "-c", before + RUN]
+        lines = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split("\n")
+        return float(lines[-2]), [line.removeprefix("compiled ") for line in lines if line.startswith("compiled")]
 
-    return started
+    return ran
 
 
-def compiled(process):
-    output, errors = process.communicate(timeout=120)
-    assert process.returncode == 0, errors
-    return [line.removeprefix("compiled ") for line in output.splitlines() if line.startswith("compiled")]
+def test_a_second_process_compiles_nothing(run: Any) -> None:
+    assert run() == (12.0, ["scaled"])
+    assert run() == (12.0, [])
 
 
-ONCE = {
-    "outer array(float64, 1d, C)": 1,
-    "inner array(float64, 1d, C)": 1,
-    "outer array(int64, 1d, C)": 1,
-    "inner array(int64, 1d, C)": 1,
-    "halved int64": 1,
-}
+def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) -> None:
+    assert run() == (12.0, ["scaled"])
+    assert run(factor=2.0) == (24.0, ["scaled"])  # the file of the function itself stays
+    assert run() == (12.0, [])
 
 
-def test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all(start, tmp_path):
-    both = [start(ALL, tmp_path), start(ALL, tmp_path)]
-    for one in both:
-        assert one.stdout.readline() == "ready\n"
-    (tmp_path / "go").touch()
-    assert Counter(compiled(both[0]) + compiled(both[1])) == ONCE
-    # and nothing of it is lost: a third one finds both signatures of each
-    assert compiled(start(ALL, tmp_path)) == []
+def test_an_empty_or_cut_file_is_a_miss(run: Any, tmp_path: Path) -> None:
+    run()
+    for suffix, length in ((".nbi", 0), (".nbi", 20), (".nbc", 0), (".nbc", 20)):
+        files = list((tmp_path / "cache").rglob(f"*{suffix}"))
+        assert files
+        for file in files:
+            file.write_bytes(file.read_bytes()[:length])
+        assert run() == (12.0, ["scaled"])
+    assert run() == (12.0, [])
 
 
-EACH = """
-# two threads that need functions of each other
-from threading import Thread
-jobs = [Thread(target=loops.outer, args=(np.arange(4.0),)), Thread(target=loops.inner, args=(np.arange(4.0), 1))]
-for job in jobs: job.start()
-for job in jobs: job.join()
-# a function that cannot be compiled leaves no lock behind
-from numba.core.errors import TypingError
-for _ in range(2):
-    try:
-        loops.impossible(np.arange(4.0))
-        raise AssertionError
-    except TypingError:
-        pass
-from posefit.arrays.compiling import _held
-assert not _held
-# a number written out in a call is no signature of its own
-assert loops.first(np.arange(3.0, 6.0)) == 7.0
-# a function that is inlined is kept as well where Python calls it
-assert loops.doubled(2.0) == 4.0
-"""
-IMPOSSIBLE = ["impossible array(float64, 1d, C)"] * 2
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"])
+def test_without_a_place_for_the_cache_every_process_compiles(run: Any, tmp_path: Path, variable: str) -> None:
+    (tmp_path / "file").write_text("a file where the folder should be")
+    nowhere = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": "", variable: str(tmp_path / "file")}
+    assert run(**nowhere) == (12.0, ["scaled"])
+    assert not list((tmp_path / "package").rglob("*.nb*"))
 
 
-def test_each_function_is_compiled_once(start, tmp_path):
-    (tmp_path / "go").touch()
-    loops = ["doubled float64", *(f"{name} array(float64, 1d, C)" for name in ("first", "inner", "outer", "picked"))]
-    assert sorted(compiled(start(EACH, tmp_path))) == sorted([*loops, *IMPOSSIBLE])
-    assert compiled(start(EACH, tmp_path)) == IMPOSSIBLE
+def test_without_room_every_process_compiles(run: Any) -> None:
+    full = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
+    assert run(before=full) == (12.0, ["scaled"])
 
 
-def test_every_change_of_what_a_module_imports_compiles_it_again_once(start, tmp_path):
-    (tmp_path / "go").touch()
-    assert compiled(start("assert loops.changing(2.0) == 6.0", tmp_path)) == ["changing float64"]
-    for before, after, value in (
-        ("x + 1.0", "x + 2.0", 8.0),  # an inlined function
-        ("lambda x: x", "lambda x: x + 1.0", 8.0),  # what numba knows of a plain one
-        ("FACTOR = 2.0", "FACTOR = 3.0", 9.0),  # a constant
-    ):
-        assert before in DEEPER
-        changed = start(f"assert loops.changing(2.0) == {value}", tmp_path, DEEPER.replace(before, after))
-        assert compiled(changed) == ["changing float64"]
-    assert compiled(start("assert loops.changing(2.0) == 9.0", tmp_path, DEEPER.replace(before, after))) == []
+def test_two_processes_at_once_lose_nothing(run: Any) -> None:
+    from concurrent.futures import ThreadPoolExecutor
 
-
-def test_without_a_folder_or_room_for_the_cache_every_process_compiles(start, tmp_path):
-    (tmp_path / "go").touch()
-    script = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
-    assert Counter(compiled(start(script + ALL, tmp_path))) == ONCE
-    nowhere = {"HOME": str(tmp_path / "file"), "XDG_CACHE_HOME": str(tmp_path / "file")}
-    for name in ("file", "__pycache__"):
-        shutil.rmtree(tmp_path / name, ignore_errors=True)
-        (tmp_path / name).write_text("a file where the folder should be", encoding="utf-8")
-    for _ in range(2):
-        assert Counter(compiled(start(ALL, tmp_path, NUMBA_CACHE_DIR=nowhere["HOME"], **nowhere))) == ONCE
-
-
-HOLD = """
-import sys, time
-from pathlib import Path
-from posefit.arrays.compiling import in_turn
-with in_turn(Path(sys.argv[1])):
-    print("held", flush=True)
-    time.sleep(60)
-"""
-
-
-def test_a_lock_is_waited_for_until_its_holder_dies_and_never_ones_own(tmp_path):
-    path = tmp_path / "one.lock"
-    with subprocess.Popen([sys.executable, "-c", HOLD, str(path)], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "held\n"
-        Timer(0.2, process.kill).start()
-        with in_turn(path), in_turn(path):
-            assert process.wait(timeout=30) != 0
+    with ThreadPoolExecutor(2) as pool:
+        assert [total for total, _ in pool.map(lambda _: run(), range(2))] == [12.0, 12.0]
+    assert run() == (12.0, [])

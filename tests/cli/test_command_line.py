@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -238,7 +237,7 @@ def test_plugins_are_listed_with_their_origin_and_settings() -> None:
     assert (sapso["kind"], sapso["distribution"], sapso["next_frame"]) == ("optimiser", "posefit", "start")
     assert sapso["version"] == posefit.__version__
     assert {"name": "cooling", "type": "float", "default": 0.95} in sapso["settings"]
-    assert {"name": "cool", "type": "iteration | acceptance", "default": "iteration"} in sapso["settings"]
+    assert {"name": "limits", "type": "asf | training", "default": "asf"} in rows["full"]["settings"]
     text = run("plugins").stdout
     assert "optimiser sapso (posefit" in text
     assert "cooling: float = 0.95" in " ".join(text.split())
@@ -251,7 +250,7 @@ def test_one_plugin_is_shown_with_what_each_setting_means_whatever_its_kind() ->
     assert text.startswith("optimiser sapso (posefit")
     words = " ".join(text.split())
     assert "--set sapso.cooling: float = 0.95 (gamma) factor on the temperature" in words
-    assert "--set sapso.cool: iteration | acceptance = iteration" in words
+    assert "--set full.limits: asf | training = asf" in " ".join(run("plugins", "show", "full").stdout.split())
     assert "Settings:" not in text
     assert all(len(line) <= 120 for line in text.splitlines())
     assert "It has no settings." in run("plugins", "show", "masks").stdout
@@ -266,23 +265,18 @@ def test_the_doctor_says_what_works_and_what_does_not(monkeypatch: pytest.Monkey
     result = run("plugins", "doctor")
     assert result.exit_code == 0
     assert "offers optimiser sapso, optimiser pso, optimiser random" in result.stdout
-    orders = "offers claim 'the SAPSO paper' of particle@full, sapso@full, sapso@pca"
-    assert re.search(rf"^loaded    swarm-claims \(posefit .*\): {orders}$", result.stdout, re.MULTILINE)
+    offers = "offers optimiser sapso-letter, command reproduce, command bench"
+    assert re.search(rf"^loaded    reproduce \(posefit .*\): {offers}$", result.stdout, re.MULTILINE)
     cause, trace = "ImportError: no module named 'lost'", "Traceback ...\n  line 7, in bad"
     broken = registry.Plugin("bad", "posefit-bad", "1.0", "broken", cause, traceback=trace)
-    installed = registry.Registry((*registry.registry().plugins, broken))
-    bad = point("bad-claims", ImportError("no module named 'lost',\n  nor 'here'"))
-    monkeypatch.setattr(registry, "registry", lambda: installed)
-    real = registry.plugins_of
-
-    def plugins_of(what: registry.Registered, *own: Any) -> Any:
-        return registry.load("claims", [bad], {}) if what == "claims" else real(what, *own)
-
-    monkeypatch.setattr(registry, "plugins_of", plugins_of)
+    with pytest.warns(UserWarning, match="'worse' of posefit-worse 1.0 is left out"):
+        worse = registry.load([point("worse", ImportError("no module named 'lost',\n  nor 'here'"))], variables={})
+    installed = (*registry.registry().plugins, broken, *worse)
+    monkeypatch.setattr(registry, "plugins_of", lambda *_: installed)
     result = run("plugins", "doctor")
     assert result.exit_code == 1
     assert f"broken    bad (posefit-bad 1.0): {cause}\n" in result.stdout
-    assert f"broken    bad-claims (posefit-bad-claims 1.0): {cause}, nor 'here'\n" in result.stdout
+    assert f"broken    worse (posefit-worse 1.0): {cause}, nor 'here'\n" in result.stdout
     assert "line 7, in bad" not in result.stdout
     verbose = run("plugins", "doctor", "-v").stdout
     assert "no module named 'lost'\n          Traceback ...\n            line 7, in bad\n" in verbose
@@ -292,8 +286,8 @@ def test_the_doctor_says_what_registers_nothing_and_what_to_type_next(monkeypatc
     from posefit import registry
 
     def doctor(module: object) -> tuple[int, str]:
-        installed = registry.Registry(registry.load("methods", [point("mine", module)], {}))
-        monkeypatch.setattr(registry, "registry", lambda: installed)
+        installed = registry.load([point("mine", module)], variables={})
+        monkeypatch.setattr(registry, "plugins_of", lambda *_: installed)
         result = run("plugins", "doctor")
         return result.exit_code, result.stdout
 
@@ -322,7 +316,7 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
 def test_check_reports_every_rule_and_how_many_ran() -> None:
     result = run("check", "optimiser", "random")
     assert result.exit_code == 0, result.output
-    assert re.search(r"\d+ checks ran, 0 failed, 7 skipped", result.stdout)
+    assert re.search(r"\d+ checks ran, 0 failed, 5 skipped", result.stdout)
     assert "it is the baseline itself" in result.stdout
     report = json.loads(run("check", "prior", "pca", "--set", "components=4", "--json").stdout)
     passed = {"check": "ranges", "outcome": "passed", "detail": "4 latents", "traceback": ""}

@@ -50,7 +50,7 @@ def test_what_cannot_be_driven_is_named() -> None:
         drive(vector, "sapso")
     with pytest.raises(error.Error, match="evaluations must hold one population of 40, got 20"):
         drive_each(vector, "sapso", evaluations=20)
-    for other in (gym.make("posefit/Configure-v0"), gym.make("CartPole-v1"), gym.make_vec("posefit/Configure-v0", 2)):
+    for other in (gym.make("posefit/Race-v0"), gym.make("CartPole-v1"), gym.make_vec("posefit/Race-v0", 2)):
         with pytest.raises(error.Error, match="env must be posefit/FitImage-v0 or FitState-v0, got"):
             drive(other, "sapso")
 

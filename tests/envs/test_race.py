@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import error
 
 import posefit_envs  # noqa: F401, registers it
 from posefit_envs.policies import (
@@ -19,6 +20,7 @@ from posefit_envs.policies import (
     rollout,
     round_robin_policy,
 )
+from tests.cases import each
 
 NAME = "posefit/Race-v0"
 LOG_101 = math.log(101.0)
@@ -70,37 +72,34 @@ def test_another_search_begins_in_the_place_of_the_worst_and_the_best_is_kept() 
         assert after[worst, 3] == pytest.approx(1.0 / 20.0)
         assert common[0] <= before[:, 0].min()
     # the best of all outlives its search: both others are replaced until none is as good
-    swarms = env._vector._swarms
-    swarms.costs[0, :] = 90.0
+    env._vector._costs[0, :] = 90.0
     _, _, _, _, later = env.step(race_action(2, 2))
     assert later["best_cost"] <= info["best_cost"]
 
 
-def test_particles_move_as_the_formulas_say() -> None:
-    env = made(translation="searched")
+@each(("optimiser", "population_size"), [("pso", 8), ("sapso", 5), ("cma", 8), ("random", 4), ("scipy", 6)])
+def test_a_search_is_its_optimiser_by_ask_and_tell(optimiser: str, population_size: int) -> None:
+    env = made(optimiser=optimiser, population_size=population_size, generations=(6, 6), translation="searched")
     env.reset(seed=4)
+    expected = copy.deepcopy(env._vector._searches[0][1])
+    problem, best = env._vector.episodes[0].problem, env._vector._costs[0, 1]
     for _ in range(6):
-        env.step(race_action(1, 4))
-    twin = copy.deepcopy(env._vector)
-    env.step(race_action(1, 4))
-    swarms, space = twin._swarms, env.search_space
-    position, velocity = swarms.positions[0, 1], swarms.velocities[0, 1]
-    best, best_costs = swarms.bests[0, 1], swarms.best_costs[0, 1]
-    r1, r2 = twin._rngs[0].random((2, *position.shape))
-    chi = 2.0 / (4.1 - 2.0 + math.sqrt(4.1 * 4.1 - 4.0 * 4.1))  # CLERC2002: 2 / |2 - phi - sqrt(phi^2 - 4 phi)|
-    pulls = r1 * (best - position) + r2 * (best[best_costs.argmin()] - position)
-    moved = position + np.clip(chi * (velocity + 4.1 / 2.0 * pulls), -0.5, 0.5)
-    outside = np.abs(moved) > 1.0
-    moved = np.clip(moved, -1.0, 1.0)
-    works = space.feasible(moved)
-    own = env._vector._swarms
-    assert works.any()
-    np.testing.assert_allclose(own.positions[0, 1][works], moved[works], atol=1e-12)
-    assert (own.velocities[0, 1][outside] == 0.0).all()
-    assert (own.velocities[0, 1][~works] == 0.0).all()
+        asked = expected.ask()
+        assert asked.shape == (population_size, problem.space.dimensions)
+        costs = problem.evaluate(asked)
+        expected.tell(asked, costs)
+        best = min(best, costs.min())
+        observation, _, _, _, info = env.step(race_action(1, 4))
+        assert race_features(observation)[0][1, 0] == pytest.approx(math.log1p(best) / LOG_101)
+    assert info["evaluations"] == population_size * (4 + 6)
 
 
-def test_all_that_is_proposed_is_feasible_and_the_best_is_what_it_costs() -> None:
+def test_an_optimiser_with_populations_of_its_own_is_named() -> None:
+    with pytest.raises(error.Error, match="optimiser must propose 8 poses at a time, got .* of 'annealed'"):
+        made(optimiser="annealed").reset(seed=0)
+
+
+def test_the_bests_of_all_particles_are_feasible_and_the_best_is_what_it_costs() -> None:
     env = made(generations=(60, 60))
     env.reset(seed=1)
     env.action_space.seed(1)
@@ -108,8 +107,7 @@ def test_all_that_is_proposed_is_feasible_and_the_best_is_what_it_costs() -> Non
     for _ in range(60):
         _, reward, ended, _, info = env.step(env.action_space.sample())
         total += reward
-        positions = env._vector._swarms.positions[0]
-        assert env.search_space.feasible(positions.reshape(-1, 9)).all()
+        assert env.search_space.feasible(env._vector._bests.reshape(-1, 9)).all()
     assert ended
     problem = env._vector.episodes[0].problem
     assert info["best_cost"] == problem.evaluate(info["proposal"][None])[0]
@@ -123,14 +121,13 @@ def test_all_that_is_proposed_is_feasible_and_the_best_is_what_it_costs() -> Non
 def test_costs_slopes_and_spreads_are_observed_on_their_scales() -> None:
     env = made()
     env.reset(seed=2)
-    slope, cost = 0.1, env._vector._swarms.costs[0, 3]
+    slope, cost = 0.1, env._vector._costs[0, 3]
     for _ in range(5):
         observation, _, _, _, _ = env.step(race_action(3, 4))
-        swarms = env._vector._swarms
-        new = swarms.best_costs[0, 3].min()
+        new = env._vector._best_costs[0, 3].min()
         slope, cost = 0.8 * slope + 0.2 * math.log((1.0 + cost) / (1.0 + new)), new
         features, common = race_features(observation)
-        spread = swarms.bests[0, 3].std(axis=0).mean()
+        spread = env._vector._bests[0, 3].std(axis=0).mean()
         # the logarithm of 0.001 to 1 is three powers of ten
         expected = [math.log1p(cost) / LOG_101, min(slope / 0.1, 1.0), 1.0 + math.log10(spread) / 3.0]
         np.testing.assert_allclose(features[3, :3], expected, rtol=1e-6)

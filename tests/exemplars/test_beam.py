@@ -1,64 +1,62 @@
 """Steps from the states of one frame to those of the next, against twins that compare every pair."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit_exemplars.beam import (
-    FACINGS,
+    BEAM_SHARES,
+    CANDIDATE_TURN,
+    CLIP_SPEEDS,
+    FAST_TURN_COST,
+    JUMP_COST,
     MAX_EXCESS_COST,
-    MAX_SHARES,
-    SPEEDS,
-    SPIN_COST,
-    TURN,
+    YAW_SHARES,
     Beam,
-    Steps,
-    Transition,
-    bins_of,
+    Step,
     diverse_best,
     next_states,
     root_deviation_costs,
     squared_distances,
     transition_costs,
+    yaw_bins,
 )
 from posefit_exemplars.exemplars import Exemplars, about_vertical
 from tests.cases import each
 
-STEPS = Steps(0.03, np.radians(8.0), 12.0, 0.01, 0.03, 0.008)
 SECONDS = 1.0 / 30.0
+STEP = Step(SECONDS, 0.03, np.radians(8.0), 0.008)
 MOST = 4000
 
 
 def beam(states: list[int], yaws: list[float], totals: list[float] | None = None, places: Array | None = None) -> Beam:
     many = len(states)
     where = np.zeros((many, 3)) if places is None else places
-    return Beam(np.array(states), np.array(yaws), np.full(many, -1), np.array(totals or [0.0] * many), where)
+    return Beam(np.array(states), np.array(yaws), np.array(totals or [0.0] * many), where)
 
 
 def steps_to(
-    exemplars: Exemplars, before: Beam, beam: Beam, root: Array | None = None, fastest: float = np.inf
+    exemplars: Exemplars, before: Beam, beam: Beam, root: Array | None = None, max_turn: float = np.inf
 ) -> Array:
     """Return the costs (n, m) of steps between two beams, before a camera at x = 3."""
-    transition = Transition(exemplars, before, beam, SECONDS, root, np.array([3.0, 1.0, 0.0]))
-    return transition_costs(transition, steps=replace(STEPS, fastest=fastest))
+    camera = np.array([3.0, 1.0, 0.0])
+    return transition_costs(exemplars, before, beam, STEP._replace(max_turn=max_turn), root, camera)
 
 
 def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Array:
     """Return what a step from each state to each pose costs (n, K), pair by pair, without a turn."""
     costs = np.full((len(before), len(exemplars)), np.inf)
     for row, state in enumerate(before.states):
-        for speed in SPEEDS:
-            code, _, way = exemplars.after(np.array([state]), SECONDS * speed)
+        for speed in CLIP_SPEEDS:
+            code, _, way = exemplars.continuation(np.array([state]), SECONDS * speed)
             pace = 0.0
             if root is not None:
                 off = before.places[row] + about_vertical(way, before.yaws[row : row + 1])[0] - root
-                pace = np.log1p(off @ off / 2.0 / STEPS.pace**2)
+                pace = np.log1p(off @ off / 2.0 / STEP.known_root**2)
             for pose in range(len(exemplars)):
-                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (2.0 * STEPS.spread**2)
-                costs[row, pose] = min(costs[row, pose], away + min(pace, STEPS.jump))
+                away = ((code[0] - exemplars.codes[pose]) ** 2).sum() / (2.0 * STEP.pose**2)
+                costs[row, pose] = min(costs[row, pose], away + min(pace, JUMP_COST))
     return costs
 
 
@@ -66,47 +64,48 @@ def costs_of_steps(exemplars: Exemplars, before: Beam, root: Array | None) -> Ar
 def test_next_states_are_those_of_the_slow_twin(small: Exemplars, root: Array | None) -> None:
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 5.0]]) if root is None else None
     before = beam([3, 11, 25], [0.1, 0.1, 2.0], [0.0, 2.5, 1.0], places)
-    beams = next_states(small, before, SECONDS, STEPS, MOST, root)
+    beams = next_states(small, before, STEP, MOST, root)
     steps = costs_of_steps(small, before, root) + before.totals[:, None]
-    codes, turned, ways = small.after(before.states, SECONDS)
+    codes, turned, ways = small.continuation(before.states, SECONDS)
     twin: dict[tuple[int, int], float] = {}
     for row in range(3):
         for state in range(len(small)):
-            for turn in (-TURN, 0.0, TURN):
+            for turn in (-CANDIDATE_TURN, 0.0, CANDIDATE_TURN):
                 facing = np.array([before.yaws[row] + turned[row] + turn])
-                key = state, int(bins_of(facing)[0])
-                twin[key] = min(twin.get(key, np.inf), steps[row, state] + 0.5 * (turn / STEPS.turning) ** 2)
-    keys = zip(beams.states.tolist(), bins_of(beams.yaws).tolist(), strict=True)
+                key = state, int(yaw_bins(facing)[0])
+                twin[key] = min(twin.get(key, np.inf), steps[row, state] + 0.5 * (turn / STEP.turn) ** 2)
+    keys = zip(beams.states.tolist(), yaw_bins(beams.yaws).tolist(), strict=True)
     totals = dict(zip(keys, beams.totals, strict=True))
     assert len(totals) == len(beams)
     for key, total in totals.items():
         assert total == pytest.approx(twin[key], rel=1e-4, abs=1e-3)
     assert min(totals.values()) == pytest.approx(min(twin.values()), abs=1e-3)
-    highest = before.totals.min() + STEPS.jump + MAX_EXCESS_COST + 0.5 * (TURN / STEPS.turning) ** 2
+    highest = before.totals.min() + JUMP_COST + MAX_EXCESS_COST + 0.5 * (CANDIDATE_TURN / STEP.turn) ** 2
     assert beams.totals.max() < highest
     for row in range(3):  # the next pose of each clip is among them
         assert int(squared_distances(codes[row : row + 1], small.codes).argmin()) in beams.states
     expected = before.places + about_vertical(ways, before.yaws)
-    np.testing.assert_allclose(beams.places, expected[beams.parents])
-    turns = wrapped(beams.yaws - (before.yaws + turned)[beams.parents])
-    np.testing.assert_allclose(np.abs(turns)[np.abs(turns) > 1e-9], TURN)
+    turns = np.array([-CANDIDATE_TURN, 0.0, CANDIDATE_TURN])
+    yaws_off = np.abs(wrapped(beams.yaws[:, None, None] - (before.yaws + turned)[:, None] - turns))
+    places_off = np.linalg.norm(beams.places[:, None] - expected, axis=2)[:, :, None]
+    np.testing.assert_allclose((yaws_off + places_off).min(axis=(1, 2)), 0.0, atol=1e-9)  # both of the same parent
 
 
 def test_a_beam_is_limited_and_each_yaw_has_its_share(small: Exemplars) -> None:
     before = beam([3, 3, 3], [0.0, 2.0, 4.0])
-    every, few = (next_states(small, before, SECONDS, STEPS, most) for most in (MOST, 8))
+    every, few = (next_states(small, before, STEP, most) for most in (MOST, 8))
     assert len(few) <= 8 < len(every)
-    for yaw in (0.0, 2.0, 4.0):  # 8 / FACINGS poses, each with three yaws
+    for yaw in (0.0, 2.0, 4.0):  # 8 / YAW_SHARES poses, each with three yaws
         share = int((np.abs(wrapped(few.yaws - yaw)) < 0.5).sum())
-        assert 0 < share <= 3 * (8 // FACINGS)
+        assert 0 < share <= 3 * (8 // YAW_SHARES)
     assert few.totals.min() == pytest.approx(every.totals.min())
 
 
 def test_only_the_best_few_of_similar_states_are_kept(small: Exemplars) -> None:
     rng = np.random.default_rng(1)
     many = beam(rng.integers(0, len(small), 300).tolist(), rng.uniform(-4.0, 4.0, 300).tolist())
-    totals, most = rng.random(300), 2 * MAX_SHARES
-    kinds = list(zip(small.kinds[many.states].tolist(), bins_of(many.yaws).tolist(), strict=True))
+    totals, most = rng.random(300), 2 * BEAM_SHARES
+    kinds = list(zip(small.coarse_groups[many.states].tolist(), yaw_bins(many.yaws).tolist(), strict=True))
     twin, counts = [], dict.fromkeys(kinds, 0)
     for row in np.argsort(totals):
         counts[kinds[row]] += 1
@@ -116,34 +115,34 @@ def test_only_the_best_few_of_similar_states_are_kept(small: Exemplars) -> None:
 
 
 def test_a_root_strays_more_easily_along_the_line_of_sight() -> None:
-    eye, place = np.zeros(3), np.array([[0.0, 0.0, 5.0]])
+    camera, place = np.zeros(3), np.array([[0.0, 0.0, 5.0]])
     along, across = np.array([[0.0, 0.0, 5.03]]), np.array([[0.01, 0.0, 5.0]])
     # a standard deviation either way costs log(1 + 1 / 2); without a line of sight the first is 3 of them
     expected = np.stack([along, across, place])
-    costs = root_deviation_costs(place, expected, eye, STEPS)[:, 0]
+    costs = root_deviation_costs(place, expected, camera)[:, 0]
     np.testing.assert_allclose(costs, [np.log(1.5), np.log(1.5), 0.0], rtol=1e-6)
-    assert root_deviation_costs(place, along, None, STEPS)[0] == pytest.approx(np.log(1.0 + 4.5))
+    assert root_deviation_costs(place, along, None)[0] == pytest.approx(np.log(1.0 + 4.5))
 
 
 @each("root", [None, np.array([0.0, 0.01, 0.04])])
 def test_steps_between_beams_cost_what_the_twin_says_and_a_jump_at_most(small: Exemplars, root: Array | None) -> None:
     before = beam([3, 11, 25], [0.1, 6.2, 2.0], [0.0, 2.5, 1.0])
     after = beam([4, 12, 26, 3], [0.15, -0.1, 2.1, 0.1], places=np.full((4, 3), 0.02))
-    _, turned, ways = small.after(before.states, SECONDS)
+    _, turned, ways = small.continuation(before.states, SECONDS)
     twin = costs_of_steps(small, before, root)[:, after.states]
     for i in range(3):
         for j in range(4):
-            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEPS.turning) ** 2
+            twin[i, j] += 0.5 * (wrapped(after.yaws[j] - before.yaws[i] - turned[i]) / STEP.turn) ** 2
             if root is None:
                 place = before.places[i] + about_vertical(ways[i : i + 1], before.yaws[i : i + 1])
-                eye = np.array([3.0, 1.0, 0.0])
-                twin[i, j] += root_deviation_costs(after.places[j : j + 1], place, eye, STEPS)[0]
+                camera = np.array([3.0, 1.0, 0.0])
+                twin[i, j] += root_deviation_costs(after.places[j : j + 1], place, camera)[0]
     costs = steps_to(small, before, after, root)
-    np.testing.assert_allclose(costs, np.minimum(twin, STEPS.jump), rtol=1e-3, atol=1e-3)
-    assert costs[0, 0] < 8.0 < STEPS.jump == costs.max()
+    np.testing.assert_allclose(costs, np.minimum(twin, JUMP_COST), rtol=1e-3, atol=1e-3)
+    assert costs[0, 0] < 8.0 < JUMP_COST == costs.max()
 
 
 def test_turns_beyond_the_fastest_cost_more_than_a_jump(small: Exemplars) -> None:
-    costs = steps_to(small, beam([3], [0.0]), beam([30] * 4, [0.0, 0.2, 0.3, np.pi + 0.1]), fastest=0.25)[0]
+    costs = steps_to(small, beam([3], [0.0]), beam([30] * 4, [0.0, 0.2, 0.3, np.pi + 0.1]), max_turn=0.25)[0]
     excess = np.array([0.0, 0.0, 0.05, np.pi - 0.35])
-    np.testing.assert_allclose(costs, STEPS.jump + SPIN_COST * excess, rtol=1e-9)
+    np.testing.assert_allclose(costs, JUMP_COST + FAST_TURN_COST * excess, rtol=1e-9)

@@ -9,7 +9,7 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.tracking.smoothing.contours import MaskContours
-from posefit_exemplars.contours import SPACING, FrameContours, precisions
+from posefit_exemplars.contours import POINT_SPACING, FrameContours, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
@@ -32,7 +32,7 @@ def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, rea
     for number, camera in enumerate(walk.task.cameras):
         view = MaskContours.of(camera, number, [walk.observations[k]], place[None])
         numbers = moved_bodies(walk.task.body, view.camera, pose, place)
-        curves, slopes = pull_of_view(view, 0, *numbers, reach, round(SPACING * view.metres[0] / view.step))
+        curves, slopes = pull_of_view(view, 0, *numbers, reach, round(POINT_SPACING * view.metres[0] / view.step))
         curve += curves
         slope += slopes
     free = np.append([True] * 3, walk.motion.skeleton.free)
@@ -56,12 +56,12 @@ def test_a_step_is_that_of_a_slow_twin(views: tuple[float, ...]) -> None:
 @each("views", [(45.0,), (0.0, 45.0, 90.0, 135.0)])
 def test_fitted_poses_cost_less_and_the_true_one_stays(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=3), views)
-    look = FrameCosts(walk.task, walk.observations[2])
+    frame_costs = FrameCosts(walk.task, walk.observations[2])
     poses, places = off(walk, 2, 0.1)
     poses[0] = walk.motion.poses[2]
-    frame = look.contours(places[0])
+    frame = frame_costs.contours(places[0])
     moved, _ = frame.fitted(walk.task, poses, places, poses, LOOSE, REACHES)
-    before, after = look.full(poses, places), look.full(moved, places)
+    before, after = frame_costs.full(poses, places), frame_costs.full(moved, places)
     assert after[1:].sum() < 0.6 * before[1:].sum()
     joints = walk.motion.skeleton.joints
     assert np.linalg.norm(joints(moved[0]) - joints(poses[0]), axis=1).mean() < 0.01

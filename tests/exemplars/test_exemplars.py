@@ -9,7 +9,7 @@ from posefit.geometry.skeleton import MIRROR
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
 from posefit_exemplars.exemplars import (
-    SAME,
+    MIN_FRAME_DISTANCE,
     Coding,
     Exemplars,
     Tiles,
@@ -17,9 +17,8 @@ from posefit_exemplars.exemplars import (
     exemplars_of,
     facing_joints,
     mirror_image,
-    thinned_frames,
 )
-from posefit_exemplars.kernels import DIMENSIONS
+from posefit_exemplars.kernels import DIMENSIONS, frames_apart, nearest_codes
 from tests.cases import each
 
 SKELETON = average_skeleton()
@@ -29,7 +28,7 @@ def test_distances_of_codes_are_those_of_joints_and_never_greater() -> None:
     coding = Coding.of(SKELETON, [facing_joints(SKELETON, built_in.motion("walk-a", frames=30).poses)])
     for name, least in (("walk-a", 0.005), ("walk-b", 0.02)):  # the training clip, and another one
         poses = built_in.motion(name, frames=30).poses
-        codes = coding.coded(poses)
+        codes = coding.of_poses(poses)
         assert codes.shape == (30, DIMENSIONS)
         joints = facing_joints(SKELETON, poses).reshape(30, 27, 3)
         for i, j in ((0, 1), (0, 15), (7, 22)):
@@ -38,17 +37,17 @@ def test_distances_of_codes_are_those_of_joints_and_never_greater() -> None:
 
 
 def test_similar_frames_are_kept_once_and_ends_of_clips_always() -> None:
-    codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32) * SAME
-    assert thinned_frames(codes).tolist() == [0, 3, 4, 6]
-    assert thinned_frames(codes[:2]).tolist() == [0, 1]
+    codes = np.array([[0.0], [0.5], [0.9], [1.1], [5.0], [5.1], [5.2]], dtype=np.float32)
+    assert frames_apart(codes, np.float32(1.0)).tolist() == [0, 3, 4, 6]
+    assert frames_apart(codes[:2], np.float32(1.0)).tolist() == [0, 1]
 
 
 def test_every_pose_is_in_the_group_of_its_nearest_centre(two: Exemplars) -> None:
     assert sorted(two.members.tolist()) == list(range(len(two)))
     away = np.linalg.norm(two.codes[:, None] - two.codes[two.centres], axis=-1)
-    np.testing.assert_allclose(away[np.arange(len(two)), two.owners], away.min(axis=1), atol=1e-6)
+    np.testing.assert_allclose(away[np.arange(len(two)), two.groups], away.min(axis=1), atol=1e-6)
     for group in range(len(two.centres)):
-        assert (two.owners[two.group_members(group)] == group).all()
+        assert (two.groups[two.members[two.starts[group] : two.starts[group + 1]]] == group).all()
 
 
 def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
@@ -57,7 +56,7 @@ def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
     members, bounds = rng.permutation(200), np.array([0, 3, 100, 100, 200])  # one group is small, and one empty
     tiles, some = Tiles.of(codes, members, bounds), codes[:5] + np.float32(0.1)
     for groups, looked_at in (([1, 3], members[3:]), ([2, 0], members[:3])):
-        states, squares = tiles.nearest(some, np.tile(groups, (5, 1)), 4)
+        states, squares = nearest_codes(some, np.tile(groups, (5, 1)), tiles, 4)
         away = ((some[:, None] - codes[looked_at]) ** 2).sum(axis=2)
         order = np.argsort(away, axis=1)[:, :4]
         near = order.shape[1]
@@ -69,25 +68,27 @@ def test_nearest_codes_are_those_of_all_in_the_groups_looked_at() -> None:
 @each("backwards", [False, True])
 def test_a_pose_goes_on_as_its_clip_and_stops_at_its_end(two: Exemplars, backwards: bool) -> None:
     walk = built_in.motion("walk-a", frames=40)
-    walk, begin, end = (walk.reversed(), two.lasts[0], 0) if backwards else (walk, 0, two.lasts[0])
+    walk, begin, end = (walk.reversed(), two.last_states[0], 0) if backwards else (walk, 0, two.last_states[0])
     for seconds in (1.0 / 30.0, 0.5, 1.0):
-        codes, turns, ways = two.after(np.array([begin]), -seconds if backwards else seconds)
+        codes, turns, ways = two.continuation(np.array([begin]), -seconds if backwards else seconds)
         k = round(30.0 * seconds)
-        assert np.linalg.norm(codes - two.coding.coded(walk.poses[k : k + 1])) < SAME
+        assert np.linalg.norm(codes - two.coding.of_poses(walk.poses[k : k + 1])) < MIN_FRAME_DISTANCE
         assert turns[0] == pytest.approx(walk.poses[k, 0] - walk.poses[0, 0], abs=0.01)
         displacement = about_vertical(ways, walk.poses[:1, 0])[0]
         np.testing.assert_allclose(displacement, walk.translations[k] - walk.translations[0], atol=0.02)
-    last, *_ = two.after(np.array([begin]), -99.0 if backwards else 99.0)
+    last, *_ = two.continuation(np.array([begin]), -99.0 if backwards else 99.0)
     np.testing.assert_allclose(last[0], two.codes[end], atol=1e-6)
 
 
 def test_states_are_interpolated_between_frames_and_not_between_clips(two: Exemplars) -> None:
-    ends = two.lasts
-    codes, turns, ways = two.after(ends, 0.1)  # of both clips
+    ends = two.last_states
+    codes, turns, ways = two.continuation(ends, 0.1)  # of both clips
     np.testing.assert_allclose(codes, two.codes[ends], atol=1e-6)
     assert np.abs(turns).max() == np.abs(ways).max() == 0.0
     half = 0.5 * (two.times[1] - two.times[0])
-    np.testing.assert_allclose(two.after(np.array([0]), half)[0][0], 0.5 * (two.codes[0] + two.codes[1]), atol=1e-6)
+    np.testing.assert_allclose(
+        two.continuation(np.array([0]), half)[0][0], 0.5 * (two.codes[0] + two.codes[1]), atol=1e-6
+    )
 
 
 def test_a_mirror_image_is_the_reflection_of_every_joint() -> None:
@@ -106,8 +107,7 @@ def test_a_mirror_image_is_the_reflection_of_every_joint() -> None:
 
 def test_poses_are_drawn_by_the_square_root_of_the_size_of_their_group(two: Exemplars) -> None:
     # three groups, of 1, 4 and 16 poses: drawn as 1 to 2 to 4, all poses of a group as often
-    owners = np.repeat([0, 1, 2], [1, 4, 16])
-    made = replace(two, owners=owners, members=np.arange(21)[::-1], bounds=np.array([0, 16, 20, 21]))
+    made = replace(two, members=np.arange(21)[::-1], starts=np.array([0, 16, 20, 21]))
     drawn = made.draw(70_000, np.random.default_rng(0))
     counts = np.bincount(drawn, minlength=21)
     assert counts[0] == pytest.approx(10_000, rel=0.05)

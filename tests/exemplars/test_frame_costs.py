@@ -1,4 +1,4 @@
-"""The costs of a frame, and the posterior and twins that a frame reports."""
+"""The costs of a frame, and the posterior and mirror costs that a frame reports."""
 
 import math
 from dataclasses import replace
@@ -30,8 +30,8 @@ def samples(spread: float) -> Posterior:
 
 
 def recalibration(cost: float, usable: bool = True) -> Recalibration:
-    look: Any = SimpleNamespace(skeleton=SKELETON, cameras=1, usable=usable)
-    corrections = recalibrated(samples(0.1), STILL, cost, look).recalibration
+    frame_costs: Any = SimpleNamespace(skeleton=SKELETON, camera_count=1, usable=usable)
+    corrections = recalibrated(samples(0.1), STILL, cost, frame_costs).recalibration
     assert corrections is not None
     return corrections
 
@@ -52,37 +52,41 @@ def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_noth
 
 
 @each("views", [(45.0,), (45.0, 135.0)])
-def test_twins_cost_what_the_mirrored_and_each_reflected_pose_costs(views: tuple[float, ...]) -> None:
+def test_mirror_costs_are_those_of_the_mirrored_and_each_reflected_pose(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1), views)
-    look, pose, place = FrameCosts(walk.task, walk.observations[0]), walk.motion.poses[0], walk.motion.translations[0]
+    frame_costs, pose, place = (
+        FrameCosts(walk.task, walk.observations[0]),
+        walk.motion.poses[0],
+        walk.motion.translations[0],
+    )
     skeleton = walk.motion.skeleton
     reflected = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
-    twins = [mirrored_poses(skeleton, pose[None]), *reflected]
-    expected = [look.measured(twin[0], place)[0] for twin in twins]
-    np.testing.assert_allclose(look.twins(pose, place), expected)
+    images = [mirrored_poses(skeleton, pose[None]), *reflected]
+    expected = [frame_costs.cost_and_areas(image[0], place)[0] for image in images]
+    np.testing.assert_allclose(frame_costs.mirror_costs(pose, place), expected)
 
 
-def test_a_twin_of_an_aligned_pose_is_aligned_too() -> None:
+def test_a_mirror_image_of_an_aligned_pose_is_aligned_too() -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1)).aligned()
-    look, pose = FrameCosts(walk.task, walk.observations[0]), walk.motion.poses[0]
+    frame_costs, pose = FrameCosts(walk.task, walk.observations[0]), walk.motion.poses[0]
     place = walk.motion.translations[0] + [0.02, -0.01, 0.0]  # as if smoothing had moved it
     poses = np.concatenate([pose[None], mirrored_poses(walk.motion.skeleton, pose[None])])
-    placed = look.placed(poses, np.repeat(place[None], 2, axis=0))
+    placed = frame_costs.aligned(poses, np.repeat(place[None], 2, axis=0))
     moved = placed[1] + place - placed[0]
-    assert look.twins(pose, place)[0] == pytest.approx(look.measured(poses[1], moved)[0])
+    assert frame_costs.mirror_costs(pose, place)[0] == pytest.approx(frame_costs.cost_and_areas(poses[1], moved)[0])
 
 
-def test_frames_report_their_twins_and_recalibration_and_count_the_evaluations(walker: Walk) -> None:
+def test_frames_report_their_mirror_costs_and_recalibration_and_count_the_evaluations(walker: Walk) -> None:
     observations = [*walker.observations[:2], Observation(EMPTY, None, usable=False)]
     walk = replace(walker, observations=observations)
     sampled, plain = walk.track(samples=4), walk.track(samples=0)
     for frame, other, observation in zip(sampled[:2], plain, observations, strict=False):
         np.testing.assert_array_equal(frame.pose, other.pose)
         assert frame.evaluations == other.evaluations + 2
-        twins = FrameCosts(walk.task, observation).twins(frame.pose, frame.translation)
-        np.testing.assert_allclose(frame.details["twins"], twins, atol=1e-9)
-        assert "twins" not in other.details
-    assert len(sampled[2].details["twins"]) == 0
+        expected = FrameCosts(walk.task, observation).mirror_costs(frame.pose, frame.translation)
+        np.testing.assert_allclose(frame.details["mirror_costs"], expected, atol=1e-9)
+        assert "mirror_costs" not in other.details
+    assert len(sampled[2].details["mirror_costs"]) == 0
     assert sampled[2].evaluations == 1
     for frame in sampled:
         assert frame.posterior is not None
@@ -94,11 +98,13 @@ def test_the_depth_is_unknown_where_one_camera_alone_shows_the_person() -> None:
     walk = walk_of(built_in.motion("walk", frames=3), (0.0, 90.0))
     (first, second), shown = walk.task.cameras, walk.observations[0].silhouettes
     unknown = Silhouette.of(np.zeros((120, 160), dtype=bool), np.zeros((120, 160), dtype=bool))
-    for cameras, silhouettes, eye in (
+    for cameras, silhouettes, position in (
         ((first, second), shown, None),
         ((first, second), [unknown, unknown], None),
         ((first, second), [unknown, shown[1]], second.position),
         ((first,), shown[:1], first.position),
     ):
-        look = FrameCosts(replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes))
-        np.testing.assert_array_equal(look.eye, eye)
+        frame_costs = FrameCosts(
+            replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes)
+        )
+        np.testing.assert_array_equal(frame_costs.camera_position, position)

@@ -10,7 +10,7 @@ from posefit.geometry.skeleton import JOINTS, LIMBS, turns_of
 from posefit.geometry.symmetry import turned_poses
 from posefit.motion import built_in
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.hypotheses import HIGHEST, PARTS, Hypotheses, step_costs
+from posefit_exemplars.hypotheses import MAX_PART_COST, PARTS, Hypotheses, step_costs
 from posefit_exemplars.smoothing import Estimate
 from posefit_exemplars.tracker import ExemplarTracker
 from tests.exemplars.conftest import Walk, walk_of
@@ -23,7 +23,7 @@ def one(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
     joints, rates = np.zeros((2, 1, len(JOINTS), 3))
     joints[0, JOINTS.index(joint), 1], rates[0, JOINTS.index(joint), 1] = np.sqrt(len(JOINTS)) * np.array([code, rate])
     still, nothing = np.zeros((1, 66)), np.zeros((1, 3))
-    return Hypotheses(still, nothing, joints, still, nothing, rates, np.zeros((1, 3)), np.array([-1]), np.zeros(1))
+    return Hypotheses(still, nothing, joints, still, nothing, rates)
 
 
 def test_every_joint_is_in_one_part() -> None:
@@ -43,12 +43,12 @@ def test_what_steps_cost_by_hand() -> None:
     # at rest, then at a spread's rate: 0.015 off and the rates a spread apart, an eighth and a half; at speed 0.5,
     # 0.0075 off and half the rates, 1/32 and 1/8, and 0.1
     np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5)
-    assert cost(0.0, 0.0, 1.0, 0.0) == HIGHEST
+    assert cost(0.0, 0.0, 1.0, 0.0) == MAX_PART_COST
     # two parts that are far off cost twice as much as one
-    assert float(step_costs(0.03, one(0.0, 0.0), one(1.0, 0.0))[0, 0]) == HIGHEST
+    assert float(step_costs(0.03, one(0.0, 0.0), one(1.0, 0.0))[0, 0]) == MAX_PART_COST
     both = one(1.0, 0.0)
     both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
-    assert float(step_costs(0.03, one(0.0, 0.0), both)[0, 0]) == 2.0 * HIGHEST
+    assert float(step_costs(0.03, one(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
@@ -76,8 +76,8 @@ def estimates(walk: Walk, poses: Array, others: Array) -> Iterator[Estimate]:
     for observation, pose, other, place in zip(
         walk.observations, poses, others, walk.motion.translations, strict=False
     ):
-        look = FrameCosts(walk.task, observation)
-        yield Estimate(pose, place, look, 0.0, 0.0, 0.0, others=(other[None], place[None]))
+        frame_costs = FrameCosts(walk.task, observation)
+        yield Estimate(pose, place, frame_costs, np.zeros(3), alternatives=(other[None], place[None]))
 
 
 def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turned_round(walker: Walk) -> None:
@@ -97,22 +97,7 @@ def test_hypotheses_are_as_many_as_the_budget_allows(walker: Walk) -> None:
     few, many = (ExemplarTracker(replace(walker.task, evaluations=evaluations)) for evaluations in (2440, BUDGET))
     assert few.hypotheses is not None
     assert many.hypotheses is not None
-    assert few.hypotheses.unlike(1) < many.hypotheses.unlike(1)
-    assert many.hypotheses.unlike(4) < many.hypotheses.unlike(1)  # several cameras leave less open
+    assert few.hypotheses.diverse_count(1) < many.hypotheses.diverse_count(1)
+    assert many.hypotheses.diverse_count(4) < many.hypotheses.diverse_count(1)  # several cameras leave less open
     assert ExemplarTracker(replace(walker.task, evaluations=600)).hypotheses is None  # too few: the path alone
     assert ExemplarTracker(walker.task, fitted=False).hypotheses is None
-
-
-def test_hypotheses_may_begin_with_the_poses_of_another_method(walker: Walk) -> None:
-    tracker = ExemplarTracker(replace(walker.task, evaluations=BUDGET), path="cma@pca")
-    assert tracker.proposer is not None
-    task, costs = replace(walker.task, evaluations=int(tracker.evaluations)), []
-    for seed in range(3):
-        shown = walker.observations[:6]
-        frames = list(tracker.track(shown, np.random.default_rng(seed)))
-        alone = list(tracker.proposer.follow(task, shown, np.random.default_rng(seed)))
-        assert len(frames) == 6
-        assert all(frame.evaluations <= BUDGET for frame in frames)
-        costs.append([np.mean([frame.cost for frame in some]) for some in (frames, alone)])
-    fitted, begun = np.sum(costs, axis=0)
-    assert fitted < 0.9 * begun

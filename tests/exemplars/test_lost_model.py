@@ -14,8 +14,8 @@ from posefit.uncertainty.modes import Posterior, unknown_sides
 from posefit_exemplars.lost_model import (
     EVIDENCE,
     MAX_SPEED,
+    MEAN_SECONDS,
     NAMES,
-    REACHES,
     EvidenceMeans,
     FailureClassifier,
     LogisticModel,
@@ -35,7 +35,7 @@ def frame_of(walker: Walk, usable: bool = True) -> Frame:
     pose = walker.motion.poses[0]
     mirrored = mirrored_poses(walker.motion.skeleton, pose[None])[0]
     posterior = Posterior(np.array([pose, mirrored]), np.zeros((2, 3)), np.array([0.75, 0.25]))
-    details = {"usable": usable, "twins": np.array([7.0, 9.0, 6.0]) if usable else np.empty(0)}
+    details = {"usable": usable, "mirror_costs": np.array([7.0, 9.0, 6.0]) if usable else np.empty(0)}
     areas = np.array([[30, 10, 70]])
     return Frame(pose, np.zeros(3), 4.0, areas, 1, 0.0, np.empty(0), posterior=posterior, details=details)
 
@@ -47,7 +47,7 @@ def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() 
     assert first[rows].tolist() == [1.0, 1.0, 1.0]
     memory.features({"speed": 0.0})
     third = memory.features({})
-    shares = [math.exp(-1.0 / (30.0 * seconds)) for seconds in REACHES.values()]
+    shares = [math.exp(-1.0 / (30.0 * seconds)) for seconds in MEAN_SECONDS.values()]
     means = [share**2 / (1.0 + share + share**2) for share in shares]  # older frames count less
     assert third[rows] == pytest.approx([0.0, *means])
     assert first[[*EVIDENCE].index("cost")] == pytest.approx(math.log(1.0))  # the default
@@ -56,7 +56,7 @@ def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() 
 def test_evidence_of_a_frame(walker: Walk) -> None:
     skeleton = walker.motion.skeleton
     evidence = evidence_of(skeleton, frame_of(walker), walker.task.cameras)
-    # of the twins the cheapest reflected and the mirrored one: (6 + 1) / (4 + 1) and (7 + 1) / (4 + 1)
+    # the cheapest reflected and the mirrored one: (6 + 1) / (4 + 1) and (7 + 1) / (4 + 1)
     expected = {"cost": 4.0, "reflected": 1.4, "mirrored": 1.6, "second": 0.25, "views": 1.0}
     assert {name: evidence[name] for name in expected} == pytest.approx(expected)
     pose, mirrored = skeleton.joints(frame_of(walker).posterior.poses)  # type: ignore[union-attr]

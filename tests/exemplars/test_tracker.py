@@ -16,9 +16,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
 from posefit.testing import run_checks, tracker_checks
-from posefit_exemplars import beam
-from posefit_exemplars.beam import Transition
-from posefit_exemplars.tracker import AWAY, MIN_EVALUATIONS, ExemplarTracker, yaw_costs
+from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 
@@ -89,13 +87,7 @@ def test_an_interrupted_track_is_continued(walker: Walk, seed: int) -> None:
     [
         ("spread=0", "spread must be above 0, got 0"),
         ("temperature=nan", "temperature must be above 0, got nan"),
-        ("jump=-1", "jump must be at least 0, got -1"),
-        (
-            "transitions=none.such:costs",
-            "transitions must be clips or MODULE:FUNCTION that can be imported, got none.such:costs",
-        ),
-        ("path=nothing@pca", "optimiser must be one of annealed"),
-        ("transitions=math:tau", "transitions must name a function, got math:tau, which is a float"),
+        ("lag=-1", "lag must be at least 0, got -1"),
     ],
 )
 def test_a_wrong_setting_is_refused_in_one_line(setting: str, message: str) -> None:
@@ -108,34 +100,9 @@ def test_a_wrong_setting_is_refused_in_one_line(setting: str, message: str) -> N
 
 def test_a_yaw_away_from_the_known_one_costs_more() -> None:
     yaws = np.radians([10.0, 55.0, 77.5, 100.0, -170.0, 370.0])
-    expected = AWAY * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
+    expected = WRONG_YAW_COST * np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.0])
     np.testing.assert_allclose(yaw_costs(yaws, np.radians(10.0)), expected, atol=1e-12)
     np.testing.assert_array_equal(yaw_costs(yaws, None), np.zeros(6))
-
-
-def clip_costs(transition: Transition) -> Array:
-    steps = beam.Steps(0.03, np.radians(4.0), 12.0, 0.01, 0.03, 0.008)
-    return beam.transition_costs(transition, steps=steps)
-
-
-def too_few_costs(transition: Transition) -> Array:
-    return np.zeros(len(transition.beam))
-
-
-def nan_costs(transition: Transition) -> Array:
-    return np.full((len(transition.before), len(transition.beam)), np.nan)
-
-
-def test_an_own_model_of_transitions_is_used_and_checked(walker: Walk) -> None:
-    settings: dict[str, Any] = {"evaluations": 300, "lag": 2}
-    own, clips = (
-        [frame.pose for frame in walker.track(0, 4, transitions=transitions, **settings)]
-        for transitions in (f"{__name__}:clip_costs", "clips")
-    )
-    np.testing.assert_array_equal(own, clips)
-    for name in ("too_few_costs", "nan_costs"):
-        with pytest.raises(ValueError, match=r"transitions must return finite costs of shape \(\d+, \d+\), got shape"):
-            walker.track(0, 4, transitions=f"{__name__}:{name}", **settings)
 
 
 @each("lag", [0, 2, 15, 40])

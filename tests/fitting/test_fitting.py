@@ -16,7 +16,6 @@ from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.drawn import PoseCount
 from posefit_priors.pca import PCA
-from posefit_swarm.sapso import SAPSO
 from tests.cases import each
 
 WALK = built_in.motion("walk", frames=8)
@@ -184,25 +183,6 @@ def test_the_loop_tells_the_costs_of_a_population_before_it_asks_for_the_next() 
     for (proposals, costs), pair in zip(walker.evaluated, pairs, strict=True):
         assert proposals is pair[0]
         assert costs is pair[1]
-
-
-def test_a_compiled_search_counts_its_poses_and_a_subclass_learns_in_python(problem: PoseProblem) -> None:
-    sizes: list[int] = []
-    problem = replace(problem, cameras=problem.cameras[:1], silhouettes=problem.silhouettes[:1])
-
-    class Watched(SAPSO):
-        def tell(self, proposals: Array, costs: Array) -> None:
-            sizes.append(len(costs))
-            super().tell(proposals, costs)
-
-    best = []
-    for kind in (SAPSO, Watched):
-        drawn, swarm = PoseCount(), kind(problem.space, np.random.default_rng(0), population_size=6, iterations=3)
-        with drawn.counting():
-            best.append(minimise(problem.evaluate, swarm, 24))
-        assert drawn.poses == 24
-    assert sizes == [6] * 4
-    np.testing.assert_array_equal(best[0].history, best[1].history)
 
 
 def test_nan_is_never_the_best_cost() -> None:

@@ -86,8 +86,7 @@ def test_a_turn_over_in_training_may_be_repeated() -> None:
 def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
     rng = np.random.default_rng(0)
     rolling = bending(np.zeros(500), rng.uniform(-1.0, 1.0, 500))
-    prediction = Prediction(tilt_share=1.0, tilt_margin_degrees=0.0)
-    follower = Follower(task_of(rolling), Line(), prediction)
+    follower = Follower(task_of(rolling), Line(), Prediction(), Tilt.of(Line(), [rolling], 1.0, 0.0))
     space = follower.space(NOTHING)
     tilt = space.tilt
     assert tilt is not None
@@ -149,9 +148,7 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     ("setting", "error"),
     [
         ({"tilt": "upright"}, "tilt must be one of learned, box, got 'upright'"),
-        ({"tilt_share": 0.0}, "tilt_share must be above 0, got 0.0"),
-        ({"tilt_share": 1.5}, "tilt_share must lie in 0 to 1, got 1.5"),
-        ({"tilt_margin_degrees": -1.0}, "tilt_margin_degrees must be at least 0, got -1.0"),
+        ({"beta": 1.5}, "beta must lie in 0 to 1, got 1.5"),
         ({"root_range_degrees": (9.0, np.inf, 9.0)}, "root_range_degrees must be at least 0, got inf"),
     ],
 )

@@ -398,9 +398,9 @@ def test_a_scene_has_the_yaws_that_a_segmenter_reports(
 
 @pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")
 def test_mediapipe_reports_the_facing_of_shoulders_and_hips() -> None:
-    from posefit_mediapipe import LEFT as LEFTS
-    from posefit_mediapipe import RIGHT as RIGHTS
-    from posefit_mediapipe import _facing
+    from posefit_mediapipe.segmenter import LEFT as LEFTS
+    from posefit_mediapipe.segmenter import RIGHT as RIGHTS
+    from posefit_mediapipe.segmenter import _facing
 
     def landmarks(x: float, z: float) -> Any:
         left, right = SimpleNamespace(x=x, z=z), SimpleNamespace(x=-x, z=-z)

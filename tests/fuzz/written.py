@@ -34,7 +34,6 @@ def written(folder: Path) -> dict[str, bytes]:
     logs = [b"".join(encoded(row["key"], {**row, "joints": [0, 0, 0]}) for row in rows) for rows in (tracks, searches)]
     lost = {**{name: tracks[0][name] for name in ("key", "spec")}, "status": "quarantined", "reasons": ["it had to"]}
     lease = {"driver": "20260101T000000-00000000", "process": 1, "host": "h", "rows": 0, "failed": "so", "own": True}
-    plan = json.dumps({"cells": 1, "begun": 1.0, "settled": 0}).encode() + b"\n" + b"01234567"
     frame = Frame(
         np.zeros(66), np.zeros(3), 1.0, np.ones((2, 3)), 40, 0.1, np.ones(2), np.ones(9), np.array([20, 40]),
         {"a": np.ones(2), "b": "text"}, 0.1, Posterior(np.zeros((2, 66)), np.zeros((2, 3)), np.ones(2)), (), 0.5, "walk",
@@ -47,7 +46,7 @@ def written(folder: Path) -> dict[str, bytes]:
     content, mark = ((unfinished / name).read_bytes() for name in ("frames.jsonl", "unfinished.json"))
     return {
         "rows": logs[0], "searches": logs[1], "quarantine": json.dumps(lost).encode(), "lease": json.dumps(lease).encode(),
-        "begun": plan, "frames": content, "mark": mark,
+        "frames": content, "mark": mark,
     }  # fmt: skip
 
 
@@ -64,7 +63,6 @@ def mended(content: bytes) -> bytes:
 
 def readers() -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of content; all messages must be clean."""
-    from posefit.report.live import progress_of
     from posefit.report.write import leaderboard_lines, write_report
     from posefit.sweep.driver import Driver
     from posefit.sweep.ledger import Ledger, create
@@ -89,8 +87,7 @@ def readers() -> dict[str, Callable[[Path], object]]:
             os.replace(path, folder / place.format(cell.key))
             with Driver(folder, checked_message) as driver:
                 driver.ledger.quarantined()
-                driver.lease(cell)
-                return progress_of(driver.ledger)
+                return driver.lease(cell)
 
         return read
 
@@ -113,7 +110,6 @@ def readers() -> dict[str, Callable[[Path], object]]:
         "searches": in_ledger("rows/a.jsonl"),
         "quarantine": in_ledger(f"quarantine/{cells(1)[0].key}.json"),
         "lease": in_sweep("leases/{}.1"),
-        "begun": in_sweep("plans/a.cells"),
         "frames": resumed("frames.jsonl"),
         "mark": resumed("unfinished.json"),
     }

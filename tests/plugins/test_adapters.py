@@ -7,12 +7,10 @@ import warnings
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 
-import numpy as np
 import pytest
 
 import posefit
-from posefit.registry import Registry, load, registry
-from posefit.testing.toy import Toy
+from posefit.registry import Registry, load
 from tests.cases import each
 
 LIBRARIES = {
@@ -27,7 +25,7 @@ LIBRARIES = {
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
     for name, library in LIBRARIES.items():
-        (plugin,) = load("methods", [EntryPoint(name, f"posefit_{name}", "posefit")])
+        (plugin,) = load([EntryPoint(name, f"posefit_{name}", "posefit")])
         assert [offer.needs for offer in plugin.offers] == [(library, f"posefit[{name}]")]
         absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{name}]")) for offer in plugin.offers)
         kind = plugin.offers[0].kind
@@ -64,21 +62,6 @@ def test_an_unknown_variant_is_named() -> None:
         ("nevergrad:Best", "variant must be one of [0-9]+ names such as TwoPointsDE, CMA, PSO, got 'Best'"),
         ("scipy:minimize", "variant must be one of differential_evolution, dual_annealing, got 'minimize'"),
         ("pso:fast", "optimiser must be pso, which has no variants, got 'pso:fast'"),
-        ("sapso:fast", "variant must be one of default, paper, got 'fast'"),
     ):
         with pytest.raises(ValueError, match=message):
             posefit.track("walk", method=name, frames=(0, 1), size=(60, 45), evaluations=100)
-
-
-def test_ribs_separates_two_minima() -> None:
-    space, centres = Toy(2), np.array([[-0.5, -0.5], [0.5, 0.4]])
-    optimiser = registry().optimiser("ribs")(space, np.random.default_rng(0))
-
-    def costs(proposals: np.ndarray) -> np.ndarray:
-        return 50.0 * ((proposals[:, None] - centres) ** 2).sum(axis=-1).min(axis=1)
-
-    for _ in range(150):
-        proposals = optimiser.ask()
-        optimiser.tell(proposals, costs(proposals))
-    modes = optimiser.modes()
-    assert np.linalg.norm(modes[:, None] - centres, axis=-1).min(axis=0).max() < 0.1

@@ -12,8 +12,8 @@ import pytest
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
-from posefit_nevergrad import GlobalRandom
-from posefit_scipy import Bridged
+from posefit_nevergrad.adapter import GlobalRandom
+from posefit_scipy.adapter import Bridged
 from tests.cases import each
 
 

@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 from posefit import hookimpl
-from posefit.hooks import ClaimedOrder
-from posefit.registry import Offer, Registry, load, plugins_of, registry
+from posefit.registry import COMMAND, KINDS, Offer, Registry, load, registry
 from posefit.version import source_digest
 from posefit_priors.pca import PCA
 from tests.cases import each
 
 
-def point(name: str, module: Any) -> Any:
+def point(name: str, module: Any, group: str = "posefit") -> Any:
     """Return what stands for an entry point of a distribution that is not installed."""
 
     def load() -> Any:
@@ -27,7 +26,8 @@ def point(name: str, module: Any) -> Any:
             raise module
         return module() if callable(module) else module
 
-    return SimpleNamespace(name=name, dist=SimpleNamespace(name=f"posefit-{name}", version="1.0"), load=load)
+    distribution = SimpleNamespace(name=f"posefit-{name}", version="1.0")
+    return SimpleNamespace(name=name, group=group, dist=distribution, load=load)
 
 
 def registering(*offers: Any, hook: str = "optimisers", **more: Any) -> Any:
@@ -40,22 +40,12 @@ def registering(*offers: Any, hook: str = "optimisers", **more: Any) -> Any:
     return SimpleNamespace(**{f"posefit_register_{hook}": hookimpl(register_all)})
 
 
-def patches() -> Any:
-    np.dot = np.linalg.norm = np.cross
-    sys.setrecursionlimit(900)
-    return offering("patched")
-
-
 def offering(name: str) -> Any:
     return registering((name, PCA))
 
 
 def commands(*offers: Any) -> Any:
     return registering(*((offer,) for offer in offers), hook="commands")
-
-
-def claims(*offers: Any) -> Any:
-    return registering(*((offer,) for offer in offers), hook="claims")
 
 
 def test_the_built_ins_are_registered_like_a_third_partys() -> None:
@@ -67,75 +57,83 @@ def test_the_built_ins_are_registered_like_a_third_partys() -> None:
     assert {next_frames[name] for name in ("sapso", "pso", "cma", "scipy")} == {"start"}
     assert {next_frames[name] for name in ("particle", "annealed")} == {"carry"}
     assert next_frames["random"] == "forget"
-    assert Registry(load("methods", [point("mine", offering("mine"))])).optimiser("mine") is PCA
-    # section 4 of the paper: a particle filter, SAPSO in the full space, SAPSO in the compact one
-    orders = [claim.methods for plugin in plugins_of("claims") for claim in plugin.offers]
-    assert orders == [("particle@full", "sapso@full", "sapso@pca")]
+    assert Registry(load([point("mine", offering("mine"))])).optimiser("mine") is PCA
 
 
 BROKEN = {
-    "methods": [
+    KINDS: [
         (ImportError("no module named 'lost'"), "ImportError: no module named 'lost'"),
         (SystemExit(3), "SystemExit: 3"),
-        (patches, "got another numpy.dot, another numpy.linalg.norm, another recursion limit"),
-        (registering(hook="optimizers"), "posefit_register_optimizers"),
+        (registering(hook="optimizers"), "did you mean 'posefit_register_optimisers'?"),
         (registering(("a", PCA), hook="priors", colour="red"), "TypeError"),
         (registering(("a.b", PCA)), "a name must be letters, digits"),
         (registering(("a:b", PCA)), "a name must be letters, digits"),
         (registering((3, PCA)), "a name must be letters, digits"),
         (registering(("a", "PCA")), "optimiser 'a' must be a factory that can be called, got 'PCA'"),
         (registering(("a", PCA), next_frame="stay"), "next_frame must be one of start, carry, forget, got 'stay'"),
-        (commands(click.Command("a")), "posefit_register_commands must end in -commands, got 'bad'"),
     ],
-    "commands": [
+    (COMMAND,): [
         (commands(click.Command("track")), "command 'track' is already registered by posefit"),
         (commands(click.Command("a"), click.Command("a")), "command 'a' is already registered by posefit-bad"),
         (commands(print), "a command must be a click.Command with a name, got <built-in function print>"),
         (commands(click.Command(None)), "a command must be a click.Command with a name"),
-        (offering("a"), "'bad-commands' must register commands alone, got posefit_register_optimisers"),
+        (ImportError("no module named 'lost'"), "ImportError: no module named 'lost'"),
+        (registering(hook="command"), "posefit_register_command"),
     ],
-    "claims": [(claims(3), "a claim must be a ClaimedOrder, got 3")],
 }
-GOOD = {"methods": offering("good"), "commands": commands(click.Command("greet")), "claims": claims()}
+GOOD = {KINDS: offering("good"), (COMMAND,): commands(click.Command("greet"))}
 
 
-@each("what", BROKEN)
-def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(what: Any) -> None:
-    end = "" if what == "methods" else f"-{what}"
-    for module, cause in BROKEN[what]:
-        points = [point(f"bad{end}", module), point(f"good{end}", GOOD[what])]
-        with pytest.warns(UserWarning, match=f"plugin 'bad{end}' of posefit-bad{end} 1.0 is left out: ") as caught:
-            bad, good = load(what, points, {"POSEFIT_STRICT_PLUGINS": "0"}, ["track"])
+@each("kinds", BROKEN)
+def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(kinds: Any) -> None:
+    for module, cause in BROKEN[kinds]:
+        points = [point("bad", module), point("good", GOOD[kinds])]
+        with pytest.warns(UserWarning, match="plugin 'bad' of posefit-bad 1.0 is left out: ") as caught:
+            bad, good = load(points, kinds, {"POSEFIT_STRICT_PLUGINS": "0"}, ["track"])
         assert len(caught) == 1
         assert cause in str(caught[0].message)
         assert (bad.state, good.state) == ("broken", "loaded")
         assert bad.traceback
-        with pytest.raises(ValueError, match=f"plugin 'bad{end}' of posefit-bad{end} 1.0 is left out: "):
-            load(what, points, {"POSEFIT_STRICT_PLUGINS": "1"}, ["track"])
+        with pytest.raises(ValueError, match="plugin 'bad' of posefit-bad 1.0 is left out: "):
+            load(points, kinds, {"POSEFIT_STRICT_PLUGINS": "1"}, ["track"])
 
 
-def test_what_a_plugin_changes_when_it_is_loaded_is_undone() -> None:
-    before = np.dot, np.linalg.norm, sys.getrecursionlimit()
-    with pytest.warns(UserWarning, match="to load it must leave NumPy and Python as they are"):
-        Registry(load("methods", [point("bad", patches)]))
-    assert (np.dot, np.linalg.norm, sys.getrecursionlimit()) == before
+def test_an_entry_point_of_a_group_that_is_nearly_right_is_broken() -> None:
+    with pytest.warns(UserWarning, match="must be in the group 'posefit', got 'posefit.plugins'"):
+        (plugin,) = load([point("mine", offering("mine"), "posefit.plugins")])
+    assert plugin.state == "broken"
 
 
-def test_commands_and_claims_are_those_that_were_registered() -> None:
-    (plugin,) = load("commands", [point("hello-commands", commands(click.Command("greet"), click.Group("part")))])
-    assert [command.name for command in plugin.offers] == ["greet", "part"]
-    orders = [ClaimedOrder("a paper", "b beats a", ("a", "b")), ClaimedOrder("another", "a beats b", ("b", "a"))]
-    (plugin_with_claims,) = load("claims", [point("mine-claims", claims(*orders))])
-    assert list(plugin_with_claims.offers) == orders
-    for methods in (("a",), (), ("a", "a")):
-        with pytest.raises(ValueError, match="methods must be at least two that differ, got"):
-            ClaimedOrder("a paper", "nothing", methods)
+@each(
+    ("name", "hint"),
+    [
+        ("sapos", "; did you mean 'sapso'\\?"),
+        ("mixture", "; its kind is segmenter"),
+        ("xyzzy", "; posefit plugins doctor says whether"),
+    ],
+)
+def test_an_unknown_name_gets_the_nearest_its_kind_or_the_doctor(name: str, hint: str) -> None:
+    with pytest.raises(ValueError, match=hint):
+        registry().offer("optimiser", name)
+
+
+def test_one_module_registers_methods_and_commands_and_only_the_hooks_of_the_kinds_asked_for_are_called() -> None:
+    greet, part = click.Command("greet"), click.Group("part")
+    module = SimpleNamespace(**vars(offering("mine")), **vars(commands(greet, part)))
+    for kinds, names, found in (
+        (KINDS, ["mine"], ()),
+        ((COMMAND,), [], (greet, part)),
+        ((*KINDS, COMMAND), ["mine"], (greet, part)),
+    ):
+        (plugin,) = load([point("hello", module)], kinds)
+        assert [offer.name for offer in plugin.offers] == names
+        assert plugin.commands == found
 
 
 def test_a_taken_name_is_refused_and_its_plugin_left_out_whole() -> None:
     points = [point("a", offering("one")), point("b", registering(("new", PCA), ("one", PCA)))]
     with pytest.warns(UserWarning, match="'one' is already registered by posefit-a"):
-        offers = Registry(load("methods", points)).offers["optimiser"]
+        offers = Registry(load(points)).offers["optimiser"]
     assert {name: offer.distribution for name, offer in offers.items()} == {"one": "posefit-a"}
 
 
@@ -149,7 +147,7 @@ def test_variables_choose_what_is_loaded() -> None:
         ({"POSEFIT_BLOCK_PLUGINS": "Posefit-A,b"}, set()),
         ({"POSEFIT_LOAD_PLUGINS": "a,b", "POSEFIT_BLOCK_PLUGINS": "a"}, {"posefit-b"}),
     ):
-        methods = Registry(load("methods", [point("a", offering("one")), point("b", offering("two"))], variables))
+        methods = Registry(load([point("a", offering("one")), point("b", offering("two"))], variables=variables))
         assert {plugin.distribution for plugin in methods.plugins if plugin.state == "loaded"} == loaded, variables
         assert {offer.distribution for offer in methods.offers["optimiser"].values()} == loaded, variables
         left_out = [plugin.cause for plugin in methods.plugins if plugin.state != "loaded"]

@@ -15,7 +15,9 @@ CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=
 
 @pytest.fixture(scope="module")
 def row():
-    return run_cell(replace(CELL, settings={"tracker.modes": 4})).row  # of searches, which make a posterior
+    """Return the row of a method that has a posterior, with the floor of a prior, which it has not."""
+    row = run_cell(replace(CELL, method="exemplars", evaluations=300)).row
+    return {**row, "prior_floor_degrees": run_cell(CELL).row["prior_floor_degrees"]}
 
 
 def test_every_figure_has_its_place_in_a_row(row):

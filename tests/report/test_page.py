@@ -31,7 +31,7 @@ def written(made: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def tracks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a page with every section: failures, gaps, warnings, uncertainty, a selector."""
+    """Return a page with every section: failures, gaps, warnings, uncertainty."""
     made = []
     modes = {0: [[8, 0.55, 0.5], [32, 0.98, 0.9]], 1: [[40, 0.7, 0.2]]}
     for m, i, s in product(range(METHODS), range(9), range(2)):
@@ -117,11 +117,11 @@ def test_the_first_screen_has_the_leader_the_figure_three_tracks_and_failures(ch
             assert text in page.inner_text("#trouble")
         assert page.inner_text("#moving") == "Play"  # less motion is preferred
         links = page.locator("#sections a").all_inner_texts()
-        assert links == ["Leaderboard", "Comparison", "Who wins where", "Curves", "Joints", "Uncertainty", "Gallery",
+        assert links == ["Leaderboard", "Comparison", "Curves", "Joints", "Uncertainty", "Gallery",
                          "One method against all others", "All runs", "Failures"]  # fmt: skip
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         page.emulate_media(media="print")
-        for part in ("#headline", "#standing svg", "#facts", "#trouble", "#leaders table", "#selection-text"):
+        for part in ("#headline", "#standing svg", "#facts", "#trouble", "#leaders table"):
             assert page.locator(part).is_visible(), part
         for part in ("#moving", "nav", "#rows"):
             assert page.locator(part).is_hidden(), part
@@ -273,17 +273,6 @@ def test_single_searches_have_curves_and_running_times(chromium: Any, searches: 
         assert "–" in rows.last.inner_text()
         page.locator("#lost button").last.click()
         assert 'suite = "posefit-2026.3"' in page.inner_text("#command")
-
-
-def test_a_leaderboard_opens_and_names_what_is_not_ranked(chromium: Any, tmp_path: Path) -> None:
-    (tmp_path / "broken.zip").write_bytes(b"PK")
-    done = run("suite", "board", tmp_path / "broken.zip", "--out", tmp_path / "board.html")
-    assert done.exit_code == 0, done.stderr
-    with shown(chromium, tmp_path / "board.html") as page:
-        assert page.inner_text("h1").startswith("Leaderboard of posefit-")
-        assert "broken.zip: expected a bundle of runs" in page.inner_text("#trouble")
-        assert page.locator("#leaders tbody tr").count() == 6
-        assert page.locator("#charts .band").count() == 4 * page.locator("#charts figure").count()
 
 
 def test_pages_of_one_run_or_of_failures_alone_open(chromium: Any, tmp_path: Path) -> None:

@@ -20,7 +20,6 @@ from tests.commands import error_of, run
 from tests.report.browser import data_in, ledger, result
 from tests.report.contests import FIRST, contest_in, sentence
 from tests.report.searched import cell, problems, search_result, searched
-from tests.report.test_live import page_of
 
 LOST = (cell("pso", instance=10_001, settings={"population_size": 20}, seed=3), ["ValueError: it had to"])
 
@@ -122,8 +121,6 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     assert [row["name"] for row in printed["leaderboard"]] == ["cma", "random"]
     assert printed["times"][0]["times"][0] == 50.0
     assert printed["answer"].startswith("cma leads")
-    status, text = page_of(results)  # of a sweep that is still running
-    assert (status, data_in(text)["live"]["done"]) == (200, 12)
     for name, message in (("figures", "got one of single searches"), ("iohprofiler", "posefit suite table ")):
         mistake = error_of("report", results, f"--{name}", tmp_path / "new")
         assert f"--{name} must be given with a sweep of tracks" in mistake

@@ -3,11 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
-from posefit.hooks import ClaimedOrder
 from posefit.report.contest import leaderboard
-from posefit.report.summary import not_worse, others_clause, published_claims, three_tracks, unpaired_sentence
+from posefit.report.summary import not_worse, others_clause, three_tracks, unpaired_sentence
 from tests.report.browser import result
 from tests.report.contests import (
     FIRST,
@@ -17,8 +14,6 @@ from tests.report.contests import (
     sentence,
     three_methods,
 )
-
-ORDER = ClaimedOrder("a paper", "c beats b, and b beats a", ("a", "b", "c"))
 
 
 def test_the_leader_and_methods_not_shown_to_be_worse_are_one_sentence(tmp_path: Path) -> None:
@@ -103,18 +98,6 @@ def test_the_best_the_median_and_the_worst_track_are_examples(tmp_path: Path) ->
         contest = contest_of_errors(tmp_path / str(len(errors)), runs)
         error = contest.runs.figures["error"]
         assert [(name, error[row]) for name, row in three_tracks(contest, 0)] == examples
-
-
-def test_a_claimed_order_is_tested_step_by_step(tmp_path: Path) -> None:
-    contest = contest_of_errors(tmp_path, full({"a": 3.0, "b": 2.0, "c": 1.0, "d": 0.5}, instances=3, seeds=2))
-    (claim,) = published_claims(contest, [ORDER])
-    step = {"difference": 1.0, "p": 2 / 2**6, "adjusted": 4 / 2**6, "by_instance": 4 / 2**3, "confirmed": False}
-    assert claim["steps"] == [pytest.approx(step)] * 2  # Holm's, of two
-    assert claim["errors"] == pytest.approx([3.105, 2.105, 1.105])
-    assert (claim["source"], claim["said"]) == ("a paper", "c beats b, and b beats a")
-    assert published_claims(contest_of_errors(tmp_path / "two", full({"a": 1.0, "b": 2.0})), [ORDER]) == []
-    worse = contest_of_errors(tmp_path / "worse", full({"a": 2.0, "b": 1.0, "c": 3.0}, instances=6))
-    assert [step["confirmed"] for step in published_claims(worse, [ORDER])[0]["steps"]] == [True, False]
 
 
 def test_runs_without_a_pair_are_counted(tmp_path: Path) -> None:

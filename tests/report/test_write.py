@@ -156,12 +156,7 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
 MISTAKES = [
     ("NONE", "expected a ledger, a folder that posefit sweep wrote, got none"),
     ("EMPTY --out OUT.html", "expected a ledger with finished rows, got one with none"),
-    ("results --out OUT.html --port 1", "--port must be given with --serve, got it without"),
-    ("results --serve --out OUT.html", "--serve must be given without --out, which it does not write"),
-    ("results --serve --json", "--serve must be given without --json, which it does not write"),
-    ("NONE --serve", "expected a ledger, a folder that posefit sweep wrote, got none"),
-    ("results --serve --port 70000", "--port must be 0 to 65535, got 70000"),
-    ("OTHER.html --serve", "OTHER.html: expected a ledger, a folder that posefit sweep wrote, got a file"),
+    ("OTHER.html", "OTHER.html: expected a ledger, a folder that posefit sweep wrote, got a file"),
     ("results --out OUT.txt", "--out must be a file that ends in .html, got "),
     ("results --out OTHER.html", "expected a new name or an earlier report, got something else"),
     ("results --out DIR.html", "expected a new name or an earlier report, got something else"),
@@ -172,10 +167,7 @@ MISTAKES = [
 ]
 
 
-def test_mistakes_are_one_line_and_write_nothing(
-    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("posefit.report.live.LEDGER_TIMEOUT_SECONDS", 0.0)
+def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) -> None:
     ledger(tmp_path / "EMPTY", [])
     (tmp_path / "OTHER.html").write_text("<p>mine</p>")
     (tmp_path / "DIR.html").mkdir()

@@ -76,7 +76,7 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {"sapso", "pso", "random", "cma", "particle", "scipy:dual_annealing"} <= set(figures["optimisers"])
     for group in ("many", "optimisers", "optimisers_28"):
         assert all(us > 0.0 for us in figures[group].values()), group
-    cases = {"fit_shared", "track_each", "configure_each", "race_each", "fit_learning", "race_learning"}
+    cases = {"fit_shared", "track_each", "race_each", "race_all_threads", "fit_learning", "race_learning"}
     assert cases <= set(figures["vector_env"])
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0

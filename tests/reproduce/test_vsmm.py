@@ -86,7 +86,7 @@ def test_reproduce_prints_both_presets() -> None:
 def states(film: activities.Film, probability: float = 0.9) -> list[State]:
     """Return the states of a tracker that is always right and has one group an activity."""
     groups = {one.label: tuple(sorted(one.models)) for one in activities.ACTIVITIES}
-    counts = {"lost": False, "repairs": 0, "restarts": 0, "filter_seconds": 0.001, "detection_seconds": 0.002}
+    counts = {"lost": False, "filter_seconds": 0.001, "detection_seconds": 0.002}
     every = []
     for label in film.labels:
         name = activities.ACTIVITIES[label].label

@@ -9,9 +9,9 @@ import pytest
 from posefit.arrays import Array
 from posefit.motion import built_in
 from posefit.motion.built_in import average_skeleton
-from posefit_exemplars.beam import Beam, Steps, Transition, transition_costs
-from posefit_exemplars.exemplars import Exemplars, groups
-from posefit_exemplars.window import FrameStates, frame_states, state_weights, viterbi_state
+from posefit_exemplars.beam import Beam, Step, transition_costs
+from posefit_exemplars.exemplars import Exemplars, farthest_first
+from posefit_exemplars.markov import FrameStates, frame_states, state_weights, viterbi_state
 
 SIZES = (3, 4, 2, 3, 4)  # states of each frame: 288 ways
 
@@ -30,9 +30,7 @@ def model(seed: int) -> Model:
     steps = [rng.uniform(0.0, 3.0, sizes) for sizes in pairwise(SIZES)]
     frames: list[FrameStates] = []
     for k, fit in enumerate(fits):
-        many = len(fit)
-        beam = Beam(np.arange(many), np.zeros(many), np.full(many, -1), np.zeros(many), np.zeros((many, 3)))
-        frames.append(frame_states(beam, fit, frames[-1] if k else None, steps[k - 1] if k else None))
+        frames.append(frame_states(fit, frames[-1] if k else None, steps[k - 1] if k else None))
     return Model(fits, steps, frames)
 
 
@@ -78,25 +76,24 @@ def test_the_way_that_is_told_is_the_cheapest_of_all() -> None:  # RABINER1989 (
             best = min(costs, key=lambda way: costs[way])
             assert [viterbi_state(one.frames[k:count]) for k in range(count)] == list(best)
             each = [min(cost for way, cost in costs.items() if way[-1] == row) for row in range(SIZES[count - 1])]
-            np.testing.assert_allclose(one.frames[count - 1].beam.totals, np.array(each) - min(each), atol=1e-12)
+            np.testing.assert_allclose(one.frames[count - 1].totals, np.array(each) - min(each), atol=1e-12)
 
 
 def test_exemplars_are_poses_of_the_clips_that_lie_apart() -> None:  # TOYAMA2001 (exemplars)
     # on a line: after 0 the farthest is 9, after both it is 4 (4 from 0, 5 from 9), then 6
     line = np.array([[0.0], [4.0], [1.0], [9.0], [6.0]], dtype=np.float32)
-    assert line[groups(line, 4)[0]].ravel().tolist() == [0.0, 9.0, 4.0, 6.0]
+    assert line[farthest_first(line, 4)[0]].ravel().tolist() == [0.0, 9.0, 4.0, 6.0]
     rng = np.random.default_rng(0)
     codes = rng.normal(size=(200, 4)).astype(np.float32)
-    centres, _ = groups(codes, 12)
+    centres, _ = farthest_first(codes, 12)
     for count in range(1, 12):  # the slow twin
         away = np.linalg.norm(codes[:, None] - codes[centres[:count]], axis=-1).min(axis=1)
         assert centres[count] == away.argmax()
 
 
 def test_likelihood_is_an_exponential_of_the_distance_over_a_temperature() -> None:  # TOYAMA2001 (likelihood)
-    beam = Beam(np.arange(3), np.zeros(3), np.full(3, -1), np.zeros(3), np.zeros((3, 3)))
     # distances of 6, 6 + 2 ln 2 and 6 + 2 ln 4 over a temperature of 2: likelihoods as 4 : 2 : 1
-    found = frame_states(beam, (6.0 + 2.0 * np.log([1.0, 2.0, 4.0])) / 2.0, None, None)
+    found = frame_states((6.0 + 2.0 * np.log([1.0, 2.0, 4.0])) / 2.0)
     np.testing.assert_allclose(found.likelihoods, [1.0, 0.5, 0.25])
     np.testing.assert_allclose(found.forward, [4 / 7, 2 / 7, 1 / 7])
 
@@ -105,18 +102,13 @@ def test_a_step_is_as_likely_as_the_clips_have_gone_on_so() -> None:  # TOYAMA20
     # a clip of 30 frames a second: who does what it did next pays nothing, who is 3 cm off half a unit
     walk = built_in.motion("walk-a", frames=20)
     clips = Exemplars.of([walk], average_skeleton())
-    steps = Steps(0.03, np.radians(8.0), 12.0, 0.01, 0.03, 0.008)
-    after = int(clips.lasts[0])
+    after = int(clips.last_states[0])
     for state in range(after):
         seconds = float(clips.times[state + 1] - clips.times[state])
         yaws = clips.poses[[state, state + 1], 0]
-        before = Beam(np.array([state]), yaws[:1], np.array([-1]), np.zeros(1), clips.paths[[state]])
-        beams = Beam(
-            np.array([state + 1, after]), np.repeat(yaws[1:], 2), np.zeros(2, int), np.zeros(2), np.zeros((2, 3))
-        )
-        following, last = transition_costs(
-            Transition(clips, before, beams, seconds, clips.paths[state + 1], None), steps=steps
-        )[0]
+        before = Beam(np.array([state]), yaws[:1], np.zeros(1), clips.places[[state]])
+        beams = Beam(np.array([state + 1, after]), np.repeat(yaws[1:], 2), np.zeros(2), np.zeros((2, 3)))
+        following, last = transition_costs(clips, before, beams, Step(seconds, 0.03), clips.places[state + 1])[0]
         assert following == pytest.approx(0.0, abs=1e-4)
         off = float(((clips.codes[state + 1] - clips.codes[after]) ** 2).sum())
         assert last <= min(0.5 * off / 0.03**2, 12.0) + 1e-4  # or less, at another speed

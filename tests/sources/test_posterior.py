@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from posefit_exemplars.window import backward_messages, sample_states
+from posefit_exemplars.markov import Sampling, backward_messages, sample_states
 from tests.sources.test_exemplars_steps import SIZES, Model, model, ways
 
 POWERS = (1.0, 0.4)
@@ -31,7 +31,7 @@ def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (s
         one, count, rng = model(1), 40_000, np.random.default_rng(0)
         rows, drawn = None, []
         for k in range(len(SIZES)):
-            rows = sample_states(one.frames[k:], rows, count, power, rng)
+            rows = sample_states(one.frames[k:], rows, Sampling(count, power), rng)
             drawn.append(rows)
         costs = ways(tempered(one, power), len(SIZES))
         total = sum(np.exp(-cost) for cost in costs.values())
@@ -45,5 +45,5 @@ def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (s
 
 def test_a_way_begins_anew_where_nothing_came_before() -> None:
     one, rng = model(2), np.random.default_rng(0)
-    first = sample_states(one.frames[:1], None, 50_000, 1.0, rng)
+    first = sample_states(one.frames[:1], None, Sampling(50_000, 1.0), rng)
     np.testing.assert_allclose(np.bincount(first) / 50_000, one.frames[0].forward, atol=0.01)

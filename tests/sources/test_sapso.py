@@ -12,18 +12,20 @@ from posefit import SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.box import draw_population
-from posefit.fitting.tracker import Prediction, SynthesisTracker
+from posefit.fitting.tracker import Follower, Prediction, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
 from posefit.geometry.skeleton import ANGLES, ENDS, INNER, JOINTS
 from posefit.motion import built_in
+from posefit.settings import settings_of
 from posefit.silhouette.cost import areas, mismatch, project
 from posefit.testing.problem import pose_problem
+from posefit.testing.toy import Toy
 from posefit.testing.tracker_rules import scene
 from posefit_priors.pca import PCA
-from posefit_swarm import kernels, sapso, swarm
-from posefit_swarm.sapso import SAPSO
+from posefit_reproduce.sapso.letter import LetterSAPSO, velocity_limits
+from posefit_swarm.sapso import SAPSO, fly, inertia_at, limited
 
 
 class Line:
@@ -56,14 +58,14 @@ def line_space(gap: tuple[float, float] | None = None, start: Start | None = Non
 
 
 class Fixed(np.random.Generator):
-    """A generator whose rand() is always the same number; its other draws are as usual."""
+    """A generator whose rand() is always the same numbers, in the shape asked for; its other draws are as usual."""
 
-    def __init__(self, value: float) -> None:
+    def __init__(self, *values: float) -> None:
         super().__init__(np.random.PCG64(0))
-        self.value = value
+        self.values = np.array(values)
 
     def random(self, size: Any = None, *_: Any, **__: Any) -> Any:
-        return np.full(size, self.value) if size is not None else self.value
+        return np.resize(self.values, size)
 
 
 @pytest.fixture(scope="module")
@@ -151,84 +153,75 @@ def test_2_2_chi_is_the_99th_percentile_of_the_training_distances(walk: Array) -
 
 
 def test_2_2_velocities_keep_within_alpha_of_the_half_range() -> None:  # SAPSO 2.2 velocity
-    low, high = swarm.speed_limits(line_space(), 0.15, "symmetric")
-    np.testing.assert_allclose([low[3], high[3]], [-0.15, 0.15])
+    np.testing.assert_allclose(limited(np.array([[-0.3, -0.1, 0.2]]), 0.15), [[-0.15, -0.1, 0.15]])
 
 
-def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None:
+def test_2_2_literal_velocity_limits_are_alpha_times_the_ranges_ends() -> None:  # Interpretation S9
     prior = Line()
     prior.low, prior.high = np.array([2.0]), np.array([6.0])  # half-range 2: alpha 2 / 2 and alpha 6 / 2
     space = SearchSpace(prior, np.zeros(3), np.ones(3), np.zeros(3))
-    low, high = swarm.speed_limits(space, 0.15, "literal")
+    low, high = velocity_limits(space)
     np.testing.assert_allclose([low[3], high[3]], [0.15, 0.45])
+    assert (np.isinf(low[:3]) & np.isinf(high[:3])).all()  # they are those of x_s, and not of the root
 
 
 # Section 3
 
 
-def flown(**changed: Any) -> tuple[float, float]:
-    given: dict[str, Any] = {
-        "r1": 0.25,
-        "r2": 0.5,
-        "omega": 0.5,
-        "acceleration": 2.0,
-        "x": 0.1,
-        "v": 0.2,
-        "best": 0.3,
-        "swarm_best": -0.1,
-        "low": -9.0,
-        "high": 9.0,
-        "periodic": False,
-        "clamped": True,
-    }
-    velocity, position, _ = kernels.step(*{**given, **changed}.values())
-    return velocity, position
+def moved(
+    *, r1: float = 0.25, r2: float = 0.5, omega: float = 0.5, x: float = 0.1, v: float = 0.2, **changed: Any
+) -> tuple[float, float]:
+    """Return velocity and position of one coordinate after a move, with the personal best 0.3 and the swarm's -0.1."""
+    how = {"pbest": 0.3, "gbest": -0.1, "alpha": 0.9, "wrapping": 0} | changed
+    space = Toy(1, wrapping=how["wrapping"])
+    swarm = SAPSO(space, np.random.default_rng(0), population_size=2, inertia=omega, alpha=how["alpha"])
+    swarm.x[:], swarm.v[:] = x, v
+    swarm.pbest[:, 0], swarm.pbest_cost[:], swarm.rng = [how["pbest"], how["gbest"]], [2.0, 1.0], Fixed(r1, r2)
+    velocity, position = swarm.step(np.array([0]))
+    return float(velocity[0, 0]), float(position[0, 0])
 
 
 def test_eq_1_by_hand() -> None:  # SAPSO (1)
     # 0.5 * 0.2 + 2 * 0.25 * (0.3 - 0.1) + 2 * 0.5 * (-0.1 - 0.1) = 0.1 + 0.1 - 0.2
-    assert flown()[0] == pytest.approx(0.0)
-    assert flown(omega=1.0)[0] == pytest.approx(0.1)
-    assert flown(omega=1.0, high=0.05)[0] == 0.05
+    assert moved()[0] == pytest.approx(0.0)
+    assert moved(omega=1.0)[0] == pytest.approx(0.1)
+    assert moved(omega=1.0, alpha=0.05)[0] == 0.05
 
 
 def test_eq_2_by_hand() -> None:  # SAPSO (2)
-    assert flown(omega=1.0)[1] == pytest.approx(0.1 + 0.1)
+    assert moved(omega=1.0)[1] == pytest.approx(0.1 + 0.1)
 
 
-def test_a_periodic_coordinate_flies_the_short_way_round() -> None:
+def test_a_periodic_coordinate_moves_the_short_way_round() -> None:
     # from 0.9 to -0.9 it is 0.2 ahead, over the seam
-    velocity, position = flown(omega=0.0, r1=0.0, r2=0.5, x=0.9, swarm_best=-0.9, periodic=True)
+    velocity, position = moved(v=0.0, r1=0.0, r2=0.5, x=0.9, gbest=-0.9, wrapping=1)
     assert velocity == pytest.approx(0.2)
     assert position == pytest.approx(-0.9)
 
 
-def test_every_particle_flies_with_draws_of_its_own() -> None:
+def test_every_particle_and_dimension_has_draws_of_its_own() -> None:  # Interpretation S8
     # the draws are in the order they are asked for: all of the pulls to personal bests, then all to the swarm's
     position, velocity, best = (np.array([[0.1, 0.0], [0.2, -0.1]]) * scale for scale in (1.0, 0.5, 2.0))
-    known = position, np.zeros(2), best, np.zeros(2), velocity
-    swarm = *known, np.full(2, -1.0), np.full(2, 1.0), np.zeros(2, dtype=bool), True
-    rand, target, rows = np.arange(0.1, 0.9, 0.1), np.array([0.3, 0.3]), np.array([1, 0])
-    moved, stuck = np.empty((2, 2, 2)), np.ones(2, dtype=bool)
-    done = kernels.move(rows, 0, rand, np.empty(0), 0, 0, 0.5, 2.0, target, swarm, *moved, stuck)
-    assert done == (2, 0)
-    assert stuck.tolist() == [False, False]
+    swarm = SAPSO(Toy(2), np.random.default_rng(0), population_size=2, inertia=0.5, alpha=1.0)
+    swarm.x, swarm.v, swarm.pbest, swarm.pbest_cost = position, velocity, best, np.array([1.0, 2.0])
+    rand, rows = np.arange(0.1, 0.9, 0.1), np.array([1, 0])
+    swarm.rng = Fixed(*rand)
     r1, r2 = rand.reshape(2, 2, 2)
-    expected = 0.5 * velocity[rows] + 2.0 * r1 * (best - position)[rows] + 2.0 * r2 * (target - position[rows])
-    np.testing.assert_allclose(moved, [expected, position[rows] + expected])
+    expected = 0.5 * velocity[rows] + 2.0 * r1 * (best - position)[rows] + 2.0 * r2 * (best[0] - position[rows])
+    np.testing.assert_allclose(swarm.step(rows), [expected, position[rows] + expected])
 
 
 def test_c1_and_c2_are_2_and_section_5_sets_the_rest() -> None:
-    assert swarm.ACCELERATION == 2.0
-    assert swarm.ALPHA == 0.15
-    assert (sapso.POPULATION_SIZE, sapso.ITERATIONS, sapso.TEMPERATURE, sapso.COOLING) == (40, 60, 1.0, 0.95)
+    defaults = {setting.name: setting.default for setting in settings_of(SAPSO)}
+    paper = {"population_size": 40, "iterations": 60, "temperature": 1.0, "cooling": 0.95}
+    assert defaults == paper | {"acceleration": 2.0, "alpha": 0.15} | {"stop_temperature": 0.0, "inertia": 0.9}
 
 
 def test_inertia_falls_from_a_to_a_tenth() -> None:  # SAPSO inertia
-    assert swarm.inertia(0, 60, 0.9) == pytest.approx(0.9)
-    assert swarm.inertia(60, 60, 0.9) == pytest.approx(0.1)
+    assert inertia_at(0, 60, 0.9) == pytest.approx(0.9)
+    assert inertia_at(60, 60, 0.9) == pytest.approx(0.1)
     # c = ln(9) / 2 half-way: 0.9 / 3
-    assert swarm.inertia(30, 60, 0.9) == pytest.approx(0.3)
+    assert inertia_at(30, 60, 0.9) == pytest.approx(0.3)
 
 
 @pytest.mark.pure
@@ -269,7 +262,7 @@ def test_a1_1_the_first_particles_meet_both_constraints() -> None:  # SAPSO A1.1
     assert (np.abs(first[:, 3]) >= 0.8).all()
 
 
-def run(optimiser: SAPSO, cost: Callable[[Array], Array]) -> list[Array]:
+def run(optimiser: SAPSO | LetterSAPSO, cost: Callable[[Array], Array]) -> list[Array]:
     populations = []
     while len(proposals := optimiser.ask()):
         populations.append(proposals)
@@ -282,9 +275,8 @@ def bowl(proposals: Array) -> Array:
 
 
 def test_a1_2_there_are_c_moves_and_n_times_c_plus_1_evaluations() -> None:  # Interpretation S10
-    for last, evaluations in (("evaluated", 7 * (5 + 1)), ("skipped", 7 * 5)):  # to the letter it is not evaluated
-        settings: dict[str, Any] = {"population_size": 7, "iterations": 5, "last_generation": last}
-        populations = run(SAPSO(line_space(), np.random.default_rng(0), **settings), bowl)
+    for factory, evaluations in ((SAPSO, 7 * (5 + 1)), (LetterSAPSO, 7 * 5)):  # to the letter the last is not evaluated
+        populations = run(factory(line_space(), np.random.default_rng(0), population_size=7, iterations=5), bowl)
         assert sum(map(len, populations)) == evaluations
 
 
@@ -306,17 +298,10 @@ def test_s3_the_papers_root_angles_are_about_x_then_y_then_z() -> None:
     np.testing.assert_allclose(rotation_from_root_angles(pose[:3]), about, atol=1e-12)
 
 
-def test_the_papers_variant_is_the_letter_of_every_interpretation() -> None:
-    letter = {"cool": "acceptance", "rand": "scalar", "velocity_limits": "literal"}
-    letter |= {"velocity_check": "redrawn", "last_generation": "skipped"}
-    paper, ours, literal = (
-        np.concatenate(run(SAPSO(line_space(), np.random.default_rng(0), **settings), bowl))
-        for settings in ({"variant": "paper"}, {}, letter)
-    )
-    np.testing.assert_array_equal(paper, literal)
-    assert not np.array_equal(paper[: len(ours)], ours[: len(paper)])
-    prediction = Prediction(variant="paper")
-    assert (prediction.prediction, prediction.tilt, prediction.root_order) == ("literal", "box", "xyz")
+def test_the_papers_variant_of_the_tracker_is_the_letter_of_every_interpretation() -> None:
+    task, _, observations = scene()
+    space = Follower(task, Line(), Prediction(variant="paper")).space(observations[0])
+    assert (space.tilt, space.root_order) == (None, "xyz")  # Interpretations S16, S3
 
 
 def test_a1_2_the_loop_ends_at_the_stop_temperature() -> None:  # SAPSO A1.2
@@ -325,110 +310,91 @@ def test_a1_2_the_loop_ends_at_the_stop_temperature() -> None:  # SAPSO A1.2
     assert len(run(optimiser, bowl)) == 1 + 14
 
 
-def settled(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool, float, float]:
-    position, best, velocity = np.array([[0.1]]), np.array([[0.5]]), np.array([[0.0]])
-    limits = np.array([-9.0]), np.array([9.0]), np.array([False]), True
-    swarm = position, np.array([2.0]), best, np.array([1.5]), velocity, *limits
-    accepted, moved = np.empty(1, dtype=bool), np.array([[0.7]])
-    kernels.accept(moved, np.array([cost]), np.array([chance]), temperature, 1.0, swarm, accepted)
-    return bool(accepted[0]), float(position[0, 0]), float(best[0, 0])
+def judged(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool, float, float]:
+    """Return whether a move from 0.1, cost 2, to 0.7 is accepted, then position and personal best, which was 0.5."""
+    swarm = SAPSO(Toy(1), Fixed(chance), population_size=1, temperature=temperature)
+    swarm.x, swarm.cost, swarm.moved = np.array([[0.1]]), np.array([2.0]), np.array([[0.7]])
+    swarm.pbest, swarm.pbest_cost = np.array([[0.5]]), np.array([1.5])
+    swarm.tell(swarm.ask(), np.array([cost]))
+    return bool(swarm.x[0, 0] == 0.7), float(swarm.x[0, 0]), float(swarm.pbest[0, 0])
 
 
 def test_a1_2b_a_personal_best_changes_only_for_a_lower_cost() -> None:  # SAPSO A1.2b
-    assert settled(1.0, 0.5)[2] == 0.7
-    assert settled(1.8, 0.5)[2] == 0.5
+    assert judged(1.0, 0.5)[2] == 0.7
+    assert judged(1.8, 0.5)[2] == 0.5
 
 
 def test_a1_2d_a_rise_is_accepted_with_chance_exp_minus_de_over_t() -> None:  # SAPSO A1.2d
     # dE = 1, T = 1: exp(-1) = 0.3679
-    assert settled(3.0, 0.367)[:2] == (True, 0.7)
-    assert settled(3.0, 0.368)[:2] == (False, 0.1)
+    assert judged(3.0, 0.367)[:2] == (True, 0.7)
+    assert judged(3.0, 0.368)[:2] == (False, 0.1)
     # T = 0.5: exp(-2) = 0.1353
-    assert settled(3.0, 0.135, 0.5)[0]
-    assert not settled(3.0, 0.136, 0.5)[0]
+    assert judged(3.0, 0.135, 0.5)[0]
+    assert not judged(3.0, 0.136, 0.5)[0]
     # dE <= 0 always
-    assert settled(2.0, 0.9999)[0]
-    assert settled(1.0, 0.9999)[0]
-    assert not settled(np.nan, 0.0)[0]
+    assert judged(2.0, 0.9999)[0]
+    assert judged(1.0, 0.9999)[0]
+    assert not judged(np.nan, 0.0)[0]
 
 
 def test_a1_2c_a_particle_never_leaves_the_constraints() -> None:  # SAPSO A1.2c
     space = line_space(gap=(-0.5, 0.5))
-    redrawn = {"velocity_check": "redrawn"}
-    for settings in (
-        {},
-        {"redraws": 0},
-        {"rand": "scalar"},
-        {"velocity_limits": "literal"},
-        redrawn,
-        {"rand": "scalar", **redrawn},
-        {"variant": "paper"},
-    ):
-        for proposals in run(SAPSO(space, np.random.default_rng(1), population_size=30, **settings), bowl):
+    for factory in (SAPSO, LetterSAPSO):
+        for proposals in run(factory(space, np.random.default_rng(1), population_size=30), bowl):
             assert space.feasible(proposals).all()
 
 
-def test_a1_2c_a_velocity_beyond_its_limits_is_redrawn_and_not_moved_to_them() -> None:  # Interpretation S7
+def test_a1_2c_to_the_letter_a_velocity_beyond_its_limits_is_redrawn_and_not_moved_to_them() -> (
+    None
+):  # Interpretation S7
     # from 0, a pull of 2 rand() 0.2 towards the swarm's best: uniform on 0 to 0.4, of which the limit 0.15 leaves 3/8
-    for rand in ("dimension", "scalar"):
-        velocities = {}
-        for check in ("clamped", "redrawn"):
-            optimiser = SAPSO(
-                line_space(), np.random.default_rng(0), population_size=2000, rand=rand, velocity_check=check
-            )
-            state = optimiser._swarm
-            state.position[:], state.best[:], state.velocity[:] = 0.0, 0.0, 0.0
-            state.move(0.9, 2.0, np.array([0.2, 0.0, 0.0, 0.0]))
-            velocities[check] = state.velocity[:, 0]
-        assert (velocities["clamped"] == 0.15).mean() == pytest.approx(5 / 8, abs=0.05)
-        assert velocities["redrawn"].max() < 0.15
-        assert velocities["redrawn"].mean() == pytest.approx(0.075, abs=0.005)
+    velocities = []
+    for factory in (SAPSO, LetterSAPSO):
+        swarm = factory(line_space(), np.random.default_rng(0), population_size=2000)
+        swarm.x[:], swarm.pbest[:], swarm.v[:] = 0.0, 0.0, 0.0
+        swarm.pbest[0, 3], swarm.pbest_cost[0] = 0.2, 0.0
+        swarm.tell(swarm.ask(), np.full(2000, np.nan))  # which no particle accepts
+        velocities.append(swarm.v[1:, 3])
+    clamped, redrawn = velocities
+    assert (clamped == 0.15).mean() == pytest.approx(5 / 8, abs=0.05)
+    assert redrawn.max() < 0.15
+    assert redrawn.mean() == pytest.approx(0.075, abs=0.005)
 
 
-def test_a1_2c_without_redraws_a_particle_is_stopped_at_the_border() -> None:  # Interpretation S7
-    for rand in ["dimension", "scalar"]:
-        space = line_space()
-        optimiser = SAPSO(space, Fixed(1.0), population_size=2, redraws=0, alpha=1.0, rand=rand)
-        optimiser._swarm.position[:], optimiser._swarm.best[:] = 0.9, 0.9
-        optimiser._swarm.velocity[:] = 0.5
-        optimiser._swarm.move(0.9, 2.0, np.full(4, 0.9))
-        np.testing.assert_array_equal(optimiser._swarm.moved, 1.0)
-        np.testing.assert_array_equal(optimiser._swarm.velocity, 0.0)
+def test_a_wall_of_the_box_stops_a_coordinate_there_and_no_other() -> None:  # Interpretation S7
+    velocity, position = fly(Toy(3), np.array([[0.9, -0.9, 0.5]]), np.array([[0.2, -0.05, 0.1]]))
+    np.testing.assert_allclose(velocity, [[0.0, -0.05, 0.1]])
+    np.testing.assert_allclose(position, [[1.0, -0.95, 0.6]])
 
 
 def test_a1_2e_cools_once_an_iteration_or_once_an_acceptance() -> None:  # SAPSO A1.2e
-    for cool, expected in [("iteration", 0.95**3), ("acceptance", 0.95 ** (3 * 4))]:
-        optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=4, iterations=9, cool=cool)
+    for factory, expected in ((SAPSO, 0.95**3), (LetterSAPSO, 0.95 ** (3 * 4))):
+        swarm = factory(line_space(), np.random.default_rng(0), population_size=4, iterations=9)
         for _ in range(4):  # a flat cost: every move is accepted
-            optimiser.tell(optimiser.ask(), np.zeros(4))
-        assert optimiser._temperature == pytest.approx(expected)
+            swarm.tell(swarm.ask(), np.zeros(4))
+        assert pytest.approx(expected) == swarm.T
 
 
 def test_a1_2e_read_literally_the_swarm_freezes_in_3_to_5_iterations() -> None:  # Interpretation S6
-    optimiser = SAPSO(line_space(), np.random.default_rng(0), cool="acceptance", stop_temperature=0.01)
+    optimiser = LetterSAPSO(line_space(), np.random.default_rng(0), stop_temperature=0.01)
     assert 3 <= len(run(optimiser, bowl)) - 1 <= 5
 
 
 def test_s8_a_scalar_rand_moves_all_coordinates_alike() -> None:
-    space = line_space()
-    for kind, alike in (("scalar", True), ("dimension", False)):
-        optimiser = SAPSO(space, np.random.default_rng(0), population_size=1, rand=kind, alpha=9.0)  # type: ignore[arg-type]
-        optimiser._swarm.position[:], optimiser._swarm.best[:], optimiser._swarm.velocity[:] = 0.0, 0.1, 0.0
-        optimiser._swarm.move(0.9, 2.0, np.full(4, 0.1))
-        assert (np.ptp(optimiser._swarm.moved) < 1e-12) == alike
+    for factory, alike in ((LetterSAPSO, True), (SAPSO, False)):
+        swarm = factory(Toy(4), np.random.default_rng(0), population_size=1)
+        swarm.x[:], swarm.pbest[:], swarm.v[:] = 0.0, 0.03, 0.0
+        assert (np.ptp(swarm.step(np.array([0]))[1]) < 1e-12) == alike
 
 
-def test_s11_a_refused_move_keeps_or_loses_its_velocity() -> None:
-    for kind in ["kept", "zeroed"]:
-        optimiser = SAPSO(
-            line_space(), Fixed(1.0), population_size=1, iterations=2, rejected_velocity=kind, acceleration=0.0
-        )
-        optimiser.tell(optimiser.ask(), np.array([0.0]))
-        before = optimiser._swarm.velocity.copy()
-        optimiser._swarm.position[:] = 0.0
-        optimiser.tell(optimiser.ask(), np.array([50.0]))
-        omega = swarm.inertia(1, 2, 0.9)
-        np.testing.assert_allclose(optimiser._swarm.velocity, omega * before if kind == "kept" else 0.0)
+def test_s11_a_refused_move_keeps_its_velocity() -> None:
+    swarm = SAPSO(Toy(4), Fixed(1.0), population_size=1, iterations=2, acceleration=0.0)
+    swarm.x[:] = swarm.moved[:] = 0.0
+    swarm.tell(swarm.ask(), np.array([0.0]))
+    before = swarm.v.copy()
+    swarm.tell(swarm.ask(), np.array([50.0]))
+    np.testing.assert_array_equal(swarm.x, 0.0)
+    np.testing.assert_allclose(swarm.v, inertia_at(1, 2, 0.9) * before)
 
 
 # Section 4
@@ -438,7 +404,7 @@ def test_eq_7_velocities_of_the_first_population_keep_within_the_limits() -> Non
     # v_pred of 3, -3 and 0.1: drawn from U(0, 3) no more than a twentieth lies below the limit 0.15; the rest is
     # clipped to it. U(0, 0.1) needs no clipping.
     start = Start(np.zeros(4), np.full(4, 0.1), np.array([3.0, -3.0, 0.1, 0.0]))
-    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=400)._swarm.velocity
+    velocity = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=400).v
     assert velocity.max(axis=0)[[0, 2]].tolist() == [0.15, pytest.approx(0.1, abs=0.005)]
     assert velocity.min(axis=0)[1] == -0.15
     assert (np.abs(velocity) <= 0.15).all()
@@ -472,8 +438,7 @@ def test_eq_6_the_first_population_is_normal_around_the_last_best() -> None:  # 
 def test_eq_7_first_velocities_are_uniform_from_zero_to_the_predicted_one() -> None:  # SAPSO (7)
     velocity = np.array([0.1, -0.1, 0.0, 0.05])  # Interpretation S12: a negative bound is sorted, not refused
     start = Start(np.zeros(4), np.full(4, 0.01), velocity)
-    optimiser = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=4000)
-    drawn = optimiser._swarm.velocity
+    drawn = SAPSO(line_space(start=start), np.random.default_rng(0), population_size=4000).v
     np.testing.assert_allclose(drawn.min(axis=0), np.minimum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.max(axis=0), np.maximum(0.0, velocity), atol=2e-3)
     np.testing.assert_allclose(drawn.mean(axis=0), velocity / 2.0, atol=2e-3)
@@ -494,9 +459,9 @@ class Scripted:
         pass
 
 
-@pytest.mark.parametrize(("prediction", "steps"), [("latest", [0.0, 0.2, -0.1]), ("literal", [0.0, 0.0, 0.2])])
+@pytest.mark.parametrize(("variant", "steps"), [("default", [0.0, 0.2, -0.1]), ("paper", [0.0, 0.0, 0.2])])
 def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
-    prediction: Any, steps: list[float]
+    variant: Any, steps: list[float]
 ) -> None:  # Interpretation S12
     latents = [0.1, 0.3, 0.2, 0.2]
     made: list[Scripted] = []
@@ -506,7 +471,7 @@ def test_v_pred_is_the_last_step_and_zero_on_the_second_frame(
         return made[-1]
 
     task, _, observations = scene()
-    how = Prediction(prediction=prediction, spread=2.0, floor=0.05)
+    how = Prediction(variant=variant, spread=2.0, floor=0.05)
     tracker = SynthesisTracker(task, Line(), make, prediction=how)
     list(tracker.track(observations[:4], np.random.default_rng(0)))
     assert made[0].space.start is None  # frame 1 is an estimation

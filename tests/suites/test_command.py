@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.suites.running import run_on, suite_scores
+from posefit.errors import InputError
+from posefit.suites.running import run_of, run_on, suite_scores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan, search_cells
@@ -90,6 +91,33 @@ def test_scores_follow_from_the_traces() -> None:
     used, count = sum(hit.sum() if len(hit) else 100 for hit in hits), sum(map(len, hits))
     assert score.running_times[16.0] == (pytest.approx(used / count) if count else None)
     assert list(score.shares) == [1, 3, 10]
+
+
+@each("infeasible", ["repair", "reject", "penalise"])
+def test_any_loop_makes_a_run_whose_improvements_cost_the_same_again(infeasible: Any) -> None:
+    problem = posefit.suite(function=1, instance=10_000, budget=200, infeasible=infeasible)
+    rng = np.random.default_rng(5)
+    proposals = rng.uniform(-1.2, 1.2, (100, 9)) * rng.uniform(0.2, 1.0, (100, 1))
+    costs = problem(proposals)
+    falls = [k for k in range(100) if costs[k] < min([np.inf, *costs[:k]])]
+    run = run_of(problem, "my own", {"width": 1.2}, seed=7)
+    assert np.array_equal(run.evaluations, [*(k + 1.0 for k in falls), 100.0][: len(run.evaluations)])
+    assert np.array_equal(run.costs[: len(falls)], costs[falls])
+    assert problem.points.shape == (len(falls), 9)
+    assert np.array_equal(
+        posefit.suite(function=1, instance=10_000, infeasible=infeasible)(problem.points), costs[falls]
+    )
+    expected = proposals[falls] if infeasible == "penalise" else problem.repaired(proposals[falls])
+    assert np.array_equal(problem.points, expected)
+    assert np.array_equal(problem.best, problem.repaired(proposals[falls[-1:]])[0])
+
+
+def test_a_run_without_a_budget_or_beyond_it_is_no_run() -> None:
+    problem = posefit.suite(function=1, instance=10_000)
+    problem(np.zeros((3, 9)))
+    for budget, reason in ((None, "budget must be known"), (2, "evaluations must be at most 2, the budget, got 3")):
+        with pytest.raises(InputError, match=reason):
+            run_of(problem, "my own", budget=budget)
 
 
 def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_witho
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import suite_instance
 from posefit.suites.problem import BudgetSpentError, Problem
+from posefit_bridges import ioh_problem
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
@@ -339,7 +340,7 @@ def test_iohexperimenter_logs_the_same_trace_of_each_run(traces, tmp_path: Path)
     ioh = pytest.importorskip("ioh", reason="it has no wheels for every Python")
     logger = ioh.logger.Analyzer(root=str(tmp_path), folder_name="swarm", algorithm_name="PSO")
     for problem, expected in zip(problems(), traces, strict=True):
-        wrapped = problem.ioh()
+        wrapped = ioh_problem(problem)
         meta = wrapped.meta_data
         assert (meta.problem_id, meta.instance) == (26_300 + problem.id_function, problem.instance)
         assert meta.n_variables == problem.dimension
@@ -370,7 +371,7 @@ def test_iohexperimenter_logs_the_same_trace_of_each_run(traces, tmp_path: Path)
 
 def test_iohexperimenter_finds_the_optimum_and_keeps_a_budget() -> None:
     pytest.importorskip("ioh", reason="it has no wheels for every Python")
-    wrapped = problem(budget=1).ioh()
+    wrapped = ioh_problem(problem(budget=1))
     wrapped(wrapped.optimum.x)
     assert wrapped.state.final_target_found
     with pytest.raises(BudgetSpentError):

@@ -15,7 +15,6 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "fit_shared": ("FitImage-v0", ENDLESS | {"instance": 3}),
     "fit_each": ("FitImage-v0", ENDLESS),
     "track_each": ("Track-v0", {"frames": 2, "evaluations_per_frame": 10**9}),
-    "configure_each": ("Configure-v0", {"iterations": 10**9}),
     "race_each": ("Race-v0", {"generations": (10**9, 10**9)}),
 }
 LEARNING: dict[str, tuple[str, dict[str, Any]]] = {
@@ -28,12 +27,12 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     """Return what a step of 40 environments takes a proposal, in microseconds: natively, and one by one.
 
     In `fit_shared` all have one instance, elsewhere each has its own. `kernel_us` is the cost of as many proposals
-    through the library. In `configure_all_threads` so many `threads` draw. `fit_learning` and `race_learning` are what
+    through the library. In `race_all_threads` so many `threads` draw. `fit_learning` and `race_learning` are what
     a learner has: random instances, episodes of 40 steps, and their resets, in steps a second. The environments are
     found by name, as by users.
     """
     vectors = {name: _pair(*case) for name, case in CASES.items()}
-    vectors["configure_all_threads"] = _pair(*CASES["configure_each"], threads)
+    vectors["race_all_threads"] = _pair(*CASES["race_each"], threads)
     vectors |= {name: _pair(*case) for name, case in LEARNING.items()}
     problem = vectors["fit_each"]["native"].unwrapped.problems[0]
     proposals = np.random.default_rng(0).uniform(-1.0, 1.0, (ENVIRONMENTS, problem.space.dimensions))
@@ -46,7 +45,7 @@ def vector_env(threads: int) -> dict[str, dict[str, float]]:
     for name, envs in vectors.items():
         native, sync = (seconds[f"{name} {kind}"] for kind in envs)
         env = envs["native"].unwrapped
-        evaluations = ENVIRONMENTS * int(getattr(env, "population_size", 1)) * int(getattr(env, "every", 1))
+        evaluations = ENVIRONMENTS * int(getattr(env, "population_size", 1))
         if name in LEARNING:
             steps = ENVIRONMENTS * EPISODE
             figures[name] = {"steps_per_second": steps / native, "sync_steps_per_second": steps / sync}

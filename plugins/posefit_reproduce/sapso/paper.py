@@ -60,7 +60,7 @@ VARIANCE = 0.95  # share that the components keep at least, section 2.1
 SHOWN_ITERATIONS, SHOWN_PARTICLES = (0, 10, 40, 60), 100  # figure 5
 
 DRIVEN: dict[str, Any] = {"tracker.tilt": "box"}  # Interpretation S16: the paper learns nothing of the root
-OURS, LETTER = "sapso@pca", "sapso:paper@pca"  # the two variants that are run side by side
+OURS, LETTER = "sapso@pca", "sapso-letter@pca"  # the two variants that are run side by side
 OCCLUDER = 0.5  # strength of the occluder that hides a part of the silhouette, as in figure 8
 FirstYaw = Literal["known", "unknown"]
 WORKERS = 2  # tracks at once: what a frame takes depends on it
@@ -80,7 +80,7 @@ METHODS = {
     "particle@full": PaperMethod("PF", "particle", *_FULL),
     "sapso@full": PaperMethod("SAPSO", "sapso", *_FULL),
     OURS: PaperMethod("PCA + SAPSO", "sapso", "pca", {}),
-    LETTER: PaperMethod("PCA + SAPSO, paper", "sapso:paper", "pca", {}),
+    LETTER: PaperMethod("PCA + SAPSO, paper", "sapso-letter", "pca", {}),
     "pso@pca": PaperMethod("PCA + PSO", "pso", "pca", {}),
     "particle@pca": PaperMethod("PCA + PF", "particle", "pca", {}),
 }

@@ -29,7 +29,6 @@ _FIGURES = (
     ("activations", "activations", 1),
     ("wrong_activations", "wrong activations", 1),
     ("wrong_terminations", "wrong terminations", 1),
-    ("restarts", "restarts of all models", 1),
     ("activity_accuracy", "right activity label", 2),
     ("chance", "by chance", 2),
     ("filter_ms", "filter, ms", 2),

@@ -5,9 +5,9 @@
 | the sections, empty, and how they look | report.html, report.css |
 | colours and marks of methods, the legend whose buttons show and hide them | methods.js |
 | charts: curves over evaluations, errors of joints, calibration | curves.js |
-| the first screen: all methods, three tracks of the leader, failures, progress of a running sweep | first.js |
+| the first screen: all methods, three tracks of the leader, failures | first.js |
 | the tables: leaderboard, all runs, running times, failures; the command that runs a cell again | tables.js |
-| ranks, paired tests, published claims, selection, one method against all others | compare.js |
+| ranks, paired tests, one method against all others | compare.js |
 | cards and the window that plays a track | gallery.js |
 | the order in which everything is drawn | main.js |
 

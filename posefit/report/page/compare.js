@@ -1,4 +1,4 @@
-// Methods compared: ranks and paired tests, published claims, selection by instance, one method against all others.
+// Methods compared: ranks and paired tests, one method against all others.
 const probability = (p) => (!given(p) ? "–" : p < 0.001 ? "< 0.001" : p.toFixed(3));
 const stated = (p) => `p ${p < 0.001 ? "" : "= "}${probability(p)}`; // in a sentence
 const degrees = (value) => `${number(value, 2)}°`;
@@ -95,81 +95,10 @@ function comparison() {
   chooseMethod($("against"), names, D.leaderboard[0].method, show);
 }
 
-// The results of orders of methods that publications claim.
-function claims() {
-  for (const C of D.claims ?? []) {
-    const names = C.methods.map((m) => METHODS[m]);
-    const errors = names.map((name, k) => `${name} ${k ? "" : "has "}${degrees(C.errors[k])}`);
-    const parts = C.steps.map(({ difference, adjusted, by_instance }, k) => {
-      const how = difference < 0 ? "worse" : difference > 0 ? "better" : "the same";
-      return (
-        `${names[k + 1]} is ${how} by a median of ${degrees(Math.abs(difference))} than ${names[k]} (paired Wilcoxon, ` +
-        `Holm over all steps, ${C.blocks} pairs: ${stated(adjusted)}; over ${C.instances} instances alone: ` +
-        `${stated(by_instance)})`
-      );
-    });
-    const confirmed = C.steps.flatMap((one, k) => (one.confirmed ? [`from ${names[k]} to ${names[k + 1]}`] : []));
-    const which = confirmed.length === C.steps.length ? "All of it is" : `Only the step ${confirmed.join(" and ")} is`;
-    const result = `${confirmed.length ? which : "It is not"} confirmed here, at 5 %.`;
-    const text = `: ${C.said}. Here ${errors.join(", ")}. ${parts.join("; ")}. ${result}`;
-    $("claims").append(make("div", { class: "note claim" }, make("strong", {}, `The claim of ${C.source}`), text));
-  }
-}
-
 // A select of methods, which shows the chosen one.
 function chooseMethod(select, names, first, show) {
   choose(select, names, String(first), () => show(+select.value));
   show(first);
-}
-
-// Who wins where, and what choosing a method by its instance would gain.
-function selection() {
-  const S = D.selection;
-  const [best, leader] = [METHODS[S.best], METHODS[D.leaderboard[0].method]];
-  const gap = S.single - S.oracle;
-  const closed = (share) => (share < 0 ? "worse than the single best" : percents(share));
-  const pays =
-    S.closed >= 0.05
-      ? "pays here"
-      : given(S.oracle_apart) && S.oracle_apart >= S.single
-        ? "does not pay here"
-        : "might pay, but no selector here knows how";
-  const listed = (words) => [words.slice(0, -1).join(", "), words.at(-1)].filter(Boolean).join(" and ");
-  const other = best === leader ? "" : `, the lowest plain mean (${leader} has the lowest interquartile mean),`;
-  const apart = given(S.oracle_apart) ? `, or ${degrees(S.oracle_apart)} if it is picked on other seeds` : "";
-  const share = given(S.closed) ? `, ${closed(S.closed)}${S.closed < 0 ? "" : " of the gap between them"}` : "";
-  const learnt = given(S.selector)
-    ? `, and a selector that knows ${listed(S.features)} ${degrees(S.selector)}${share}`
-    : "";
-  $("selection-text").textContent =
-    `Choosing a method by its instance ${pays}: ${best} alone has a mean error of ${degrees(S.single)}${other} over ` +
-    `${counted(S.instances, "instance")}, the best method of each ${degrees(S.oracle)} in hindsight${apart}${learnt}.` +
-    (S.why ? ` There is no selector: ${S.why}.` : "");
-  const ways = [
-    [`single best, by the plain mean: ${best}`, S.single],
-    ["selector, on instances it was not trained on", S.selector],
-    ["oracle, scored on seeds it was not picked on", S.oracle_apart],
-    ["oracle", S.oracle],
-  ].filter(([, error]) => given(error));
-  const plain = (title, show, more) => ({ title, show, ...more });
-  const text = { text: true };
-  const error = plain("mean error °", (row) => twoDigits(row.error ?? row[1]));
-  const part = plain("gap closed", (row) => (gap > 0 ? closed((S.single - row[1]) / gap) : "–"));
-  const choice = plain("choice of a method", ([name]) => name, text);
-  table($("choosing"), [choice, error, part], ways, { name: "Ways of choosing" });
-  const won = column("instances won", "1", whole, { down: true });
-  const taken = column("chosen by the selector", "2", whole, { down: true });
-  const wins = [methodColumn("0"), won, ...(given(S.selector) ? [taken] : [])];
-  table($("wins"), wins, S.wins, { name: "Instances won" });
-  if (!S.where.length) return $("where").remove();
-  const where = [
-    plain("where", (row) => row.part, text),
-    plain("instances", (row) => whole(row.instances)),
-    plain("best there", (row) => [swatch(row.method), METHODS[row.method]], text),
-    error,
-    plain(`${shortened(best, 20)} behind by °`, (row) => twoDigits(row.behind)),
-  ];
-  table($("where"), where, S.where, { name: "Who wins where" });
 }
 
 // One method against all others, instance by instance.

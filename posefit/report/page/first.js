@@ -1,4 +1,4 @@
-// The first screen: all methods with their intervals, three tracks of the leader, failures, progress of a sweep.
+// The first screen: all methods with their intervals, three tracks of the leader, failures.
 const MAX_METHODS = 20; // of the figure
 const MAX_MISSING = 20; // instances that a note names
 const MAX_WARNINGS = 5; // that it names
@@ -146,7 +146,6 @@ function trouble() {
     const reasons = H.reasons.map(([reason, count]) => `${whole(count)} × ${reason}`);
     note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
   }
-  if (H.unranked?.length) note("warn", ["Not ranked, with the reason:"], H.unranked);
   if (H.dropped.length) {
     const why = (gap) => (gap.missing.length ? `no run of ${gap.missing.join("; ")}` : "no seed in common");
     const missing = H.dropped.map((gap) => `${gap.instance}: ${why(gap)}`);
@@ -159,32 +158,4 @@ function trouble() {
   const warned = Object.keys(D.warned).length;
   if (warned)
     note("", [`${counted(warned, "run")} with a warning, marked ⚠ below:`], D.warnings.slice(0, MAX_WARNINGS));
-}
-
-// The progress of a running sweep, whose page loads itself again.
-function live() {
-  const L = D.live;
-  if (!L) return $("live").remove();
-  const [size, unit] = L.seconds >= 5400 ? [3600, "hours"] : L.seconds >= 90 ? [60, "minutes"] : [1, "seconds"];
-  const time = given(L.seconds) ? `about ${number(L.seconds / size, size === 1 ? 0 : 1)} ${unit}` : "some time";
-  const running = L.running ? `${whole(L.running)} running, ${time} left` : "no process works on it now";
-  const again = L.failed ? `, ${counted(L.failed, "failed attempt")} to be repeated` : "";
-  const sums = `${whole(L.done)} done, ${whole(L.quarantined)} quarantined${again}`;
-  const settled = L.done + L.quarantined;
-  if (given(L.cells)) {
-    $("live-text").textContent =
-      `${whole(settled)} of ${whole(L.cells)} cells: ${sums}; ${L.left ? running : "finished"}.`;
-    $("live-bar").max = L.cells;
-    $("live-bar").value = settled;
-    if (!L.left) return $("live-reload").remove();
-  } else {
-    $("live-text").textContent = `Cells: ${sums}. No plan is known, nor how many cells are left.`;
-    $("live-bar").remove();
-  }
-  const box = $("live-stop");
-  box.checked = sessionStorage.getItem("posefit-stop") === "1";
-  box.onchange = () => sessionStorage.setItem("posefit-stop", box.checked ? "1" : "0");
-  setInterval(() => {
-    if (!box.checked && !document.querySelector("dialog[open]")) location.reload();
-  }, 1000 * L.reload);
 }

@@ -1,11 +1,7 @@
 // Puts the page together.
 const SECTIONS = {
-  leaderboard: () => {
-    leaderboard();
-    claims();
-  },
+  leaderboard,
   comparison,
-  selection,
   curves,
   "by-function": functionShares,
   joints,
@@ -20,13 +16,12 @@ const SECTIONS = {
 document.title = `posefit: ${D.title}`;
 $("title").textContent = D.title;
 $("made").textContent = D.made;
-const [claim, ...because] = D.headline.split("; ");
-$("headline").textContent = because.length ? `${claim}.` : claim;
+const [first, ...because] = D.headline.split("; ");
+$("headline").textContent = because.length ? `${first}.` : first;
 $("whole").textContent = D.headline;
 if (!because.length) $("verdict-whole").remove();
 $("summary").textContent = D.header.summary;
 details(D.header);
-live();
 trouble();
 if (D.leaderboard) firstScreen();
 else $("overview").remove();

@@ -1,0 +1,151 @@
+"""A hidden Markov model over the frames of the lag window: the likeliest path, weights of states, and sampled paths.
+
+A frame has states, which cost what their silhouettes do over a temperature, and steps from those of the frame before.
+The path is Viterbi's, and the weights are those of the forward-backward algorithm over the window. Paths are drawn from
+the posterior of the whole clip: the backward messages of the later frames weigh the states that a step may reach.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.geometry.rotation import wrapped
+from posefit.geometry.skeleton import Skeleton, joint_distances
+from posefit.uncertainty.modes import Posterior
+from posefit_exemplars.exemplars import Rows
+
+MODE_DISTANCE = 0.12  # metres, root mean square over joints: samples that are nearer are of the reported pose's mode
+MAX_KERNEL_COST = 80.0  # of a step: beyond it the likelihood would be 0, and so the sum of all might be
+
+T = TypeVar("T")
+
+
+class FrameStates(NamedTuple):
+    """The costs, parents and weights of a frame's states, by the frames so far."""
+
+    totals: Array  # (n,) costs of the likeliest path to each
+    parents: Rows  # (n,) the state of the frame before on that path, or -1
+    likelihoods: Array  # (n,) of the silhouettes, the greatest 1
+    kernel: NDArray[np.float32] | None  # (m, n) likelihoods of steps from the frame before
+    forward: Array  # (n,) weights, which sum to 1
+
+
+def frame_states(costs: Array, before: FrameStates | None = None, steps: Array | None = None) -> FrameStates:
+    """Return a frame whose states cost (n,), to which steps from the frame before cost (m, n)."""
+    likelihoods = np.exp(costs.min() - costs)  # TOYAMA2001 (likelihood)
+    if before is None or steps is None:
+        forward = likelihoods / likelihoods.sum()
+        return FrameStates(costs - costs.min(), np.full(len(costs), -1), likelihoods, None, forward)
+    ways = before.totals[:, None] + steps
+    parents = ways.argmin(axis=0)
+    totals = ways[parents, np.arange(len(costs))] + costs  # RABINER1989 (Viterbi)
+    kernel = np.exp(-np.minimum(steps, MAX_KERNEL_COST)).astype(np.float32)
+    forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
+    return FrameStates(totals - totals.min(), parents, likelihoods, kernel, forward / forward.sum())
+
+
+def windows(frames: Iterable[T], delay: int) -> Iterator[Sequence[T]]:
+    """Yield each frame with up to `delay` later ones, as soon as these are there; the sequence is only for now."""
+    waiting: deque[T] = deque()
+    for frame in frames:
+        waiting.append(frame)
+        if len(waiting) > delay:
+            yield waiting
+            waiting.popleft()
+    while waiting:
+        yield waiting
+        waiting.popleft()
+
+
+def viterbi_state(window: Sequence[FrameStates]) -> int:
+    """Return the state of the first frame on the likeliest path to the last one."""
+    row = int(window[-1].totals.argmin())
+    for frame in window[:0:-1]:
+        row = int(frame.parents[row])
+    return row
+
+
+def state_weights(window: Sequence[FrameStates]) -> Array:
+    """Return the weights (n,) of the states of the first frame, given all frames up to the last; they sum to 1."""
+    backward = np.ones(len(window[-1].totals))
+    for frame in window[:0:-1]:
+        assert frame.kernel is not None
+        backward = frame.kernel @ (backward * frame.likelihoods)  # RABINER1989 (backward)
+        backward /= backward.max()
+    products = window[0].forward * backward
+    return np.asarray(products / products.sum())
+
+
+def mean_near(row: int, weights: Array, squares: Array, poses: Array, places: Array) -> tuple[Array, Array]:
+    """Return the mean pose (66,) and place (3,) of the states similar to one of them, by weights (n,).
+
+    `squares` (n,) are their squared distances from it, in standard deviations. The mean of all would be between a
+    stride and its mirrored half-cycle where both are likely.
+    """
+    shares = weights * np.exp(-0.5 * squares)
+    shares[row] += np.finfo(np.float64).tiny
+    shares /= shares.sum()
+    return poses[row] + shares @ wrapped(poses - poses[row]), places[row] + shares @ (places - places[row])
+
+
+def backward_messages(window: Sequence[FrameStates], power: float) -> Array:
+    """Return the likelihood (n,) of the later frames given each state of the first, up to a factor.
+
+    `power` is what the likelihoods of silhouettes are raised to: below 1, the posterior is wider.
+    """
+    backward = np.ones(len(window[-1].totals), dtype=np.float32)
+    for frame in window[:0:-1]:
+        assert frame.kernel is not None
+        likelihoods = backward * frame.likelihoods**power
+        backward = frame.kernel @ (likelihoods / likelihoods.max()).astype(np.float32)  # GODSILL2004 (messages)
+    return np.asarray(backward, dtype=np.float64)
+
+
+class Sampling(NamedTuple):
+    """The number of paths that are drawn, and the power that likelihoods of silhouettes are raised to."""
+
+    paths: int
+    power: float
+
+
+def sample_states(
+    window: Sequence[FrameStates], rows: Rows | None, sampling: Sampling, rng: np.random.Generator
+) -> Rows:
+    """Return states (K,) of the first frame, drawn given the states `rows` (K,) of the frame before it.
+
+    Without `rows` paths begin there, independently.
+    """
+    first, (paths, power) = window[0], sampling
+    weights = np.broadcast_to(first.likelihoods**power * backward_messages(window, power), (paths, len(first.totals)))
+    if rows is not None and first.kernel is not None:
+        weights = first.kernel[rows] * weights  # GODSILL2004 (step)
+    ends = weights.cumsum(axis=1)
+    drawn = ends[:, -1:] * rng.random((paths, 1))
+    return np.asarray((ends <= drawn).sum(axis=1), dtype=np.int64)
+
+
+class SampledPaths(NamedTuple):
+    """The poses of sampled paths in one frame."""
+
+    poses: Array  # (K, 66)
+    places: Array  # (K, 3) metres
+    similar: NDArray[np.bool_]  # (K,) which are of the reported pose's mode
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, poses: Array, places: Array, reported: Array) -> Self:
+        """Return sampled poses (K, 66) at places (K, 3), and which of them are similar to the reported one (66,)."""
+        distances = joint_distances(skeleton.joints(poses), skeleton.joints(reported))
+        return cls(poses, places, (distances**2).mean(axis=1) <= MODE_DISTANCE**2)
+
+    def about(self, pose: Array, place: Array) -> Posterior:
+        """Return the posterior in which the mean of the paths similar to the likeliest is the reported pose."""
+        poses, places = self.poses.copy(), self.places.copy()
+        if self.similar.any():
+            differences = wrapped(poses[self.similar] - pose)
+            poses[self.similar] = pose + differences - differences.mean(axis=0)
+            places[self.similar] += place - places[self.similar].mean(axis=0)
+        return Posterior(poses, places, np.ones(len(poses)), coherent=True)

@@ -1,0 +1,100 @@
+"""SAPSO to the letter of the paper's Algorithm 1, where `posefit_swarm.sapso` reads it otherwise.
+
+| interpretation | here | `posefit_swarm.sapso` |
+|---|---|---|
+| S6 | cools at each acceptance, with one shared temperature | once an iteration |
+| S7 | draws the whole particle again, for velocities beyond their limits too | for constraint 2; clamps velocities |
+| S8 | one rand() for a pull of a particle | one for each coordinate |
+| S9 | alpha min and alpha max limit the velocities of latents, nothing those of the root | plus and minus alpha |
+| S10 | the last move is not evaluated: N C evaluations | N (C + 1) |
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.fitting.space import SearchSpace
+from posefit.plugin import Array, Space, at_least, between, displacement, draw_population, wrap
+from posefit_swarm.sapso import Rows, first_velocities, inertia_at, redrawn
+
+TEMPERATURE, COOLING = 1.0, 0.95  # T and gamma, section 5.2
+ACCELERATION = 2.0  # c1 = c2, section 3.1
+ALPHA = 0.15  # section 2.2
+REDRAWS = 100  # ours: then the particle stays where it is, at rest. Interpretation S7
+
+
+class LetterSAPSO:
+    """Algorithm 1 as the paper has it. Positions and velocities are those of the unit box.
+
+    Settings:
+        population_size (N): of the swarm, 1 or more. Section 5.2.
+        iterations (C): populations that are evaluated, 1 or more. Section 5.2, Interpretation S10.
+        stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
+        inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Interpretation S5.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        population_size: int = 40,
+        iterations: int = 60,
+        stop_temperature: float = 0.0,
+        inertia: float = 0.9,
+    ) -> None:
+        at_least("population_size", population_size, 1)
+        at_least("iterations", iterations, 1)
+        at_least("stop_temperature", stop_temperature, 0.0)
+        between("inertia", inertia, 0.1, math.inf, ends=False)
+        self.space, self.rng, self.c, self.C = space, rng, 0, iterations
+        self.T, self.T0, self.A = TEMPERATURE, stop_temperature, inertia
+        self.low, self.high = velocity_limits(space)
+        self.moved = draw_population(space, rng, population_size)
+        self.x, self.cost = self.moved.copy(), np.full(population_size, np.inf)
+        self.pbest, self.pbest_cost = self.x.copy(), self.cost.copy()
+        self.v = np.clip(first_velocities(space, rng, population_size, ALPHA), self.low, self.high)
+
+    def ask(self) -> Array:
+        """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
+        return self.moved.copy() if self.c < self.C and self.T > self.T0 else self.moved[:0]
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Accept or refuse the moves by their costs (N,), cool, remember the bests, and move on."""
+        with np.errstate(invalid="ignore", over="ignore"):  # infinity less infinity; nan is never accepted
+            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))
+        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))
+        self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
+        if self.c > 0:
+            self.T *= COOLING ** int(accepted.sum())
+        better = self.cost < self.pbest_cost
+        self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
+        self.v, self.moved = redrawn(self.x, self.step, self.allowed, REDRAWS)
+        self.c += 1
+
+    def step(self, rows: Rows) -> tuple[Array, Array]:
+        """Return velocities and positions (k, d) of some particles (k,) after a move by (1) and (2)."""
+        x, gbest = self.x[rows], self.pbest[self.pbest_cost.argmin()]
+        phi1, phi2 = ACCELERATION * self.rng.random((2, len(rows), 1))
+        to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
+        v = inertia_at(self.c, self.C, self.A) * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest
+        return v, wrap(self.space, x + v)
+
+    def allowed(self, v: Array, x: Array) -> NDArray[np.bool_]:
+        """Return which velocities and positions (k, d) meet constraints 1 and 2 (k,)."""
+        return np.asarray(((self.low <= v) & (v <= self.high)).all(axis=1) & self.space.feasible(x))
+
+
+def velocity_limits(space: Space) -> tuple[Array, Array]:
+    """Return the lowest and highest velocity (d,) of the unit box: alpha times the latents' own limits.
+
+    The root's are infinite. A space without latents has the limits plus and minus alpha.
+    """
+    if not isinstance(space, SearchSpace):
+        return np.full(space.dimensions, -ALPHA), np.full(space.dimensions, ALPHA)
+    low, high = np.full(space.dimensions, -np.inf), np.full(space.dimensions, np.inf)
+    m = len(space.prior.low)
+    half = np.where(space.half[-m:] > 0.0, space.half[-m:], 1.0)
+    low[-m:], high[-m:] = ALPHA * space.prior.low / half, ALPHA * space.prior.high / half
+    return low, high

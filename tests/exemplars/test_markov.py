@@ -1,0 +1,131 @@
+"""The frames of the lag window, joined as the tracker joins them, and the filter of estimates over time."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.arrays import Array
+from posefit_exemplars.markov import FrameStates, SampledPaths, frame_states, mean_near, state_weights
+from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
+from posefit_exemplars.tracker import SIMILAR_DISTANCE, state_distances
+from tests.cases import each
+
+
+def window(costs: list[list[float]], steps: list[Array]) -> list[FrameStates]:
+    """Return frames whose states cost so much, joined by these costs of steps."""
+    frames: list[FrameStates] = []
+    for k, of_frame in enumerate(costs):
+        frames.append(frame_states(np.array(of_frame), frames[-1] if k else None, steps[k - 1] if k else None))
+    return frames
+
+
+def test_weights_are_finite_where_a_jump_costs_a_thousand() -> None:
+    frames = window([[0.0, 2000.0], [2000.0, 0.0], [0.0, 2000.0]], [np.full((2, 2), 1000.0)] * 2)
+    for count in (1, 2, 3):
+        weights = state_weights(frames[:count])
+        assert np.isfinite(weights).all()
+        assert weights.sum() == pytest.approx(1.0)
+
+
+def test_the_mean_is_of_states_similar_to_the_path() -> None:
+    poses = np.zeros((3, 66))
+    poses[:, 5] = [0.0, 0.1, 2.0]
+    places = np.array([[0.0, 1.0, 0.0], [0.3, 1.0, 0.0], [9.0, 9.0, 9.0]])
+    codes = np.array([[0.0], [SIMILAR_DISTANCE], [100.0]], dtype=np.float32)
+    pose, place = mean_near(0, np.array([0.2, 0.4, 0.4]), state_distances(codes, codes[0], np.zeros(3)), poses, places)
+    share = 0.4 * np.exp(-0.5) / (0.2 + 0.4 * np.exp(-0.5))
+    assert pose[5] == pytest.approx(0.1 * share)
+    np.testing.assert_allclose(place, [0.3 * share, 1.0, 0.0])
+    # a state on the path counts even where it has no weight
+    pose, place = mean_near(2, np.array([0.5, 0.5, 0.0]), state_distances(codes, codes[2], np.zeros(3)), poses, places)
+    np.testing.assert_allclose([*pose, *place], [*poses[2], *places[2]])
+
+
+def test_a_mean_of_yaws_goes_the_short_way_round() -> None:
+    poses = np.zeros((2, 66))
+    poses[:, 0] = np.radians([179.0, -179.0])
+    codes, places = np.zeros((2, 1), dtype=np.float32), np.zeros((2, 3))
+    squares = state_distances(codes, codes[0], poses[:, 0] - poses[0, 0])
+    pose, _ = mean_near(0, np.array([0.5, 0.5]), squares, poses, places)
+    other = np.exp(-0.5 * 0.1**2)  # two degrees away, a tenth of a standard deviation
+    assert np.degrees(pose[0]) == pytest.approx(179.0 + 2.0 * other / (1.0 + other))
+
+
+def test_sampled_paths_similar_to_the_likeliest_are_moved_to_the_reported_pose() -> None:
+    poses, places = np.zeros((3, 66)), np.arange(9.0).reshape(3, 3)
+    poses[:, 0] = [0.1, 0.3, 3.0]
+    pose, place = np.full(66, 0.5), np.array([1.0, 1.0, 1.0])
+    posterior = SampledPaths(poses, places, np.array([True, True, False])).about(pose, place)
+    np.testing.assert_allclose(posterior.poses[:2].mean(axis=0), pose)
+    assert posterior.poses[1, 0] - posterior.poses[0, 0] == pytest.approx(0.2)
+    np.testing.assert_allclose(posterior.translations[:2], [[-0.5, -0.5, -0.5], [2.5, 2.5, 2.5]])
+    np.testing.assert_array_equal(posterior.poses[2], poses[2])
+    np.testing.assert_array_equal(posterior.translations[2], places[2])
+    assert posterior.coherent
+    far = SampledPaths(poses, places, np.zeros(3, dtype=bool)).about(pose, place)
+    np.testing.assert_array_equal(far.poses, poses)
+
+
+class Costs:
+    """A frame whose cost is where the pose is, for nothing."""
+
+    usable = True
+
+    def __init__(self, root: Array | None = None) -> None:
+        self.root = root
+
+    def cost_and_areas(self, pose: Array, place: Array) -> tuple[float, Array]:
+        return float(place[0]), np.zeros((1, 3), dtype=np.int64)
+
+
+def estimate(pose: Array, place: Array, frame_costs: Any = None) -> Estimate:
+    return Estimate(pose, place, frame_costs or Costs(), np.array([10.4, 0.5, 0.25]))
+
+
+def steady(k: float) -> Estimate:
+    """Return frame k of a steady movement."""
+    return estimate(np.full(66, 0.05 * k), np.array([0.1 * k, 1.0, -k]))
+
+
+@each("ahead", [0, 1, 3, 6])
+def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
+    frames = list(smoothed((steady(k) for k in range(15)), 2.0, ahead))
+    assert len(frames) == 15
+    for k, frame in enumerate(frames):
+        np.testing.assert_allclose(frame.pose, 0.05 * k, atol=1e-12)
+        np.testing.assert_allclose(frame.translation, [0.1 * k, 1.0, -k], atol=1e-12)
+        assert frame.seconds >= 0.5
+        assert frame.cpu_seconds is not None
+        assert frame.evaluations == 12  # 10.4 rounded up, and the reported one
+        assert frame.cost == pytest.approx(0.1 * k)  # of the smoothed pose
+
+
+def test_a_turn_past_the_half_circle_stays_steady() -> None:
+    turns = np.radians(np.arange(170.0, 200.0, 5.0))
+    poses = np.zeros((len(turns), 66))
+    poses[:, 0] = (turns + np.pi) % (2.0 * np.pi) - np.pi
+    pose, _ = smoothed_pose(poses, np.zeros((len(turns), 3)), 3, 1.5)
+    assert np.cos(pose[0] - turns[3]) == pytest.approx(1.0)
+
+
+def test_the_weights_are_gaussian() -> None:
+    poses, places = np.zeros((5, 66)), np.eye(5, 3)
+    poses[2] = 1.0
+    share = np.exp(-0.5 * (np.arange(-2, 3) / 1.5) ** 2)
+    pose, place = smoothed_pose(poses, places, 2, 1.5)
+    assert pose[0] == pytest.approx(share[2] / share.sum())
+    np.testing.assert_allclose(place, share[:3] / share.sum())
+    # at an end as few frames count on the other side
+    np.testing.assert_array_equal(smoothed_pose(poses, places, 0, 1.5)[0], poses[0])
+    np.testing.assert_array_equal(smoothed_pose(poses, places, 2, 0.0)[0], poses[2])
+
+
+def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_always() -> None:
+    rng = np.random.default_rng(0)
+    rough = [estimate(rng.normal(size=66), rng.normal(size=3), Costs(np.zeros(3))) for _ in range(6)]
+    for spread, ahead in ((2.0, 0), (0.0, 3), (2.0, 2)):
+        for before, frame in zip(rough, smoothed(rough, spread, ahead), strict=True):
+            np.testing.assert_array_equal(frame.translation, before.place)
+            if spread * ahead == 0.0:
+                np.testing.assert_array_equal(frame.pose, before.pose)
