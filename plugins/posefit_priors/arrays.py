@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from posefit.archive import read_arrays
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.check import at_least
 
 LARGEST = 250_000_000  # bytes of a file, and of its arrays as float64; a space learned from 200,000 poses has 100 MB
 Shape = tuple[str | int, ...]
@@ -39,14 +38,6 @@ class Stored:
         for name in cls.SHAPES:
             setattr(prior, name, arrays[prefix + name])
         return prior
-
-
-def check_clustering(clusters: int, quantile: float, seed: int) -> None:
-    """Return nothing. Raises ValueError where a setting of the clusters makes no sense."""
-    at_least("clusters", clusters, 1)
-    if not 0.0 < quantile <= 1.0:
-        raise InputError(f"quantile must lie in 0 to 1, got {quantile}")
-    at_least("seed", seed, 0)
 
 
 def angles_of(angles: Array, least: int) -> Array:

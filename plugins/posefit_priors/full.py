@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.check import at_least, choices
+from posefit.fitting.check import choices
 from posefit.geometry.skeleton import Skeleton
 from posefit_priors.arrays import Shape, Stored, angles_of, indices_of
 
@@ -22,7 +22,6 @@ class Full(Stored):
 
     Settings:
         limits: "asf", the joint limits that the skeleton's file states, or "training", the range of training poses.
-        margin: share of the training range by which it is widened to either side, 0 or more. Ours.
     """
 
     SHAPES: ClassVar[Mapping[str, Shape]] = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
@@ -31,10 +30,9 @@ class Full(Stored):
     angles: NDArray[np.intp]  # (m,) the free ones
     rest: Array  # (63,) radians: the mean, where the others stay
 
-    def __init__(self, *, limits: Literal["asf", "training"] = "asf", margin: float = 0.0) -> None:
+    def __init__(self, *, limits: Literal["asf", "training"] = "asf") -> None:
         choices(Full.__init__, locals())
-        at_least("margin", margin, 0.0)
-        self._limits, self._margin = limits, margin
+        self._limits = limits
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Take the limits from the skeleton, or the range of joint angles (T, 63).
@@ -43,8 +41,6 @@ class Full(Stored):
         """
         angles = angles_of(angles, 1)
         low, high = angles.min(axis=0), angles.max(axis=0)
-        reach = self._margin * (high - low)
-        low, high = low - reach, high + reach
         if self._limits == "asf":
             if skeleton is None or skeleton.limits is None:
                 name = "no skeleton" if skeleton is None else f"{skeleton.name}, whose file states none"

@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
+from posefit.fitting.kernels import add_components
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
 from posefit_priors.arrays import Shape, Stored, indices_of
-from posefit_priors.kernels import near_within_limits, recover_loose
-from posefit_priors.pca import CLUSTERS, PCA, QUANTILE
+from posefit_priors.pca import PCA, distances
 
 COMPONENTS = 12
 ARMS_DEGREES = 45.0
 LEGS_DEGREES = 15.0
 SLACK = 1.5  # times chi: the distance of a pose from the nearest cluster, at most
+ROUNDING = 1e-9  # radians by which a joint may pass its limit
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
 
 
@@ -33,9 +34,6 @@ class Loose(Stored):
         arms_degrees: how far shoulders and elbows may leave the components to either side, 0 or more. Ours.
         legs_degrees: how far hips and knees may leave them to either side, 0 or more. Ours.
         slack: times chi, the distance of a pose from the clusters, at most; above 0. Ours.
-        clusters (K): centres that K-means finds among the training poses, 1 or more. As `pca`.
-        quantile: chi is this quantile of the training distances, above 0 and at most 1. As `pca`.
-        seed: of the clustering, 0 or more.
     """
 
     SHAPES: ClassVar[Mapping[str, Shape]] = {
@@ -58,16 +56,13 @@ class Loose(Stored):
         arms_degrees: float = ARMS_DEGREES,
         legs_degrees: float = LEGS_DEGREES,
         slack: float = SLACK,
-        clusters: int = CLUSTERS,
-        quantile: float = QUANTILE,
-        seed: int = 0,
     ) -> None:
         positive("slack", slack)
         at_least("arms_degrees", arms_degrees, 0.0)
         at_least("legs_degrees", legs_degrees, 0.0)
         self._reach = np.radians([arms_degrees, legs_degrees])
         self._slack = slack
-        self._pca = PCA(components=components, clusters=clusters, quantile=quantile, seed=seed)
+        self._pca = PCA(components=components)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
@@ -104,8 +99,9 @@ class Loose(Stored):
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, d)."""
-        angles = np.empty((len(latents), len(self._pca.mean)))
-        recover_loose(writeable(latents), self._pca.components, self._pca.mean, self.loose, angles)
+        latents, m = np.asarray(latents), len(self._pca.low)
+        angles = self._pca.inverse_transform(latents[:, :m])
+        angles[:, self.loose] += latents[:, m:]
         return angles
 
     @property
@@ -115,9 +111,11 @@ class Loose(Stored):
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
-        pca, limits = self._pca, (self.angles_low, self.angles_high)
-        pose = writeable(latents), pca.components, pca.mean, self.loose
-        return np.asarray(near_within_limits(*pose, *limits, pca.centres, pca.reach))
+        m = len(self._pca.low)
+        angles = self._pca.mean[self.loose] + latents[:, m:]
+        add_components(writeable(latents[:, :m]), writeable(self._pca.components[:, self.loose]), angles)
+        within = (angles >= self.angles_low - ROUNDING) & (angles <= self.angles_high + ROUNDING)
+        return np.asarray(within.all(axis=1) & (distances(writeable(latents), self._pca.centres) < self._pca.reach))
 
     def arrays(self) -> dict[str, Any]:
         """Return the learned arrays by name."""

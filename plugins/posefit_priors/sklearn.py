@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, one_of
+from posefit.fitting.kernels import add_components
 from posefit.geometry.skeleton import Skeleton
 from posefit.limits import timed
 from posefit.reading import cut, parsed_json, quoted
-from posefit_priors.arrays import angles_of, check_clustering, load_arrays
-from posefit_priors.clusters import clustered
-from posefit_priors.kernels import near, recover
-from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, reach_of
+from posefit_priors.arrays import angles_of, load_arrays
+from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clusters_of, distances
 
 # of `sklearn.decomposition`, those that have an inverse or are linear: a file may name no other class
 VARIANTS = (
@@ -39,9 +38,6 @@ class Transformed:
         variant: the class, such as KernelPCA; `sklearn:NAME` sets it.
         components (m): its `n_components`, 1 or more.
         options: its other parameters, a JSON object.
-        clusters (K): centres that K-means finds among the training poses, 1 or more. As `pca`.
-        quantile: chi is this quantile of the training distances, above 0 and at most 1. As `pca`.
-        seed: of the clustering, and of the class where it takes one, 0 or more.
     """
 
     low: Array  # (m,)
@@ -50,30 +46,17 @@ class Transformed:
     reach: Array  # ()
     _limit: float | None = None  # seconds that the class may take to learn
 
-    def __init__(
-        self,
-        *,
-        variant: str = "KernelPCA",
-        components: int = COMPONENTS,
-        options: str = "{}",
-        clusters: int = CLUSTERS,
-        quantile: float = QUANTILE,
-        seed: int = 0,
-    ) -> None:
+    def __init__(self, *, variant: str = "KernelPCA", components: int = COMPONENTS, options: str = "{}") -> None:
         at_least("components", components, 1)
-        check_clustering(clusters, quantile, seed)
-        # in the order of a file
-        self._settings = [variant, components, options, clusters, quantile, seed]
-        self._transformer = variant, components, options, seed
-        self._components, self._clusters, self._quantile, self._seed = components, clusters, quantile, seed
-        _built(*self._transformer)
+        self._settings: list[Any] = [variant, components, options]  # in the order of a file
+        _built(variant, components, options)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
-        self._angles = angles_of(angles, max(self._clusters, self._components + 1))
-        if self._transformer[0] == "KernelPCA" and len(self._angles) > KERNEL_POSES:
+        self._angles = angles_of(angles, max(CLUSTERS, self._settings[1] + 1))
+        if self._settings[0] == "KernelPCA" and len(self._angles) > KERNEL_POSES:
             raise InputError(f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(self._angles)}")
-        self._model = _built(*self._transformer)
+        self._model = _built(*self._settings)
         with timed(self._limit):
             self._model.fit(self._angles)
         latents = self.transform(self._angles)
@@ -82,8 +65,7 @@ class Transformed:
             raise InputError(f"variant must give finite latents (n, m), got {latents.shape} from {name}")
         self._linear = _linear(self._model, latents.shape[1])
         self.low, self.high = latents.min(axis=0), latents.max(axis=0)
-        self.centres = clustered(latents, self._clusters, self._seed)[0]
-        self.reach = reach_of(self.centres, latents, self._quantile)
+        self.centres, self.reach = clusters_of(latents, CLUSTERS, QUANTILE)
         return self
 
     def transform(self, angles: Array) -> Array:
@@ -94,10 +76,12 @@ class Transformed:
         """Return the joint angles (n, 63) of latents (n, m)."""
         from sklearn import config_context
 
-        angles = np.empty((len(latents), 63))
         if self._linear is not None:
-            recover(writeable(latents), *self._linear, angles)
+            components, mean = self._linear
+            angles = np.repeat(mean[None], len(latents), axis=0)
+            add_components(writeable(latents), components, angles)
             return angles
+        angles = np.empty((len(latents), 63))
         with config_context(assume_finite=True, skip_parameter_validation=True):
             for row, latent in enumerate(np.asarray(latents)):
                 angles[row] = self._model.inverse_transform(latent[None])[0]
@@ -105,9 +89,7 @@ class Transformed:
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
-        allowed = np.empty(len(latents), dtype=bool)
-        near(writeable(latents), self.centres, self.reach, allowed)
-        return allowed
+        return np.asarray(distances(writeable(latents), self.centres) < self.reach)
 
     def save(self, path: str | Path) -> None:
         """Write what the space was learned from to an .npz file; `load` learns it again."""
@@ -118,7 +100,7 @@ class Transformed:
     def load(cls, path: str | Path) -> "Transformed":
         """Return the space that `save` wrote. Raises ValueError where the file is not one."""
         arrays = load_arrays(path, {"angles": ("n", 63), "words": ("k",)})
-        names = ("variant", "components", "options", "clusters", "quantile", "seed")
+        names = ("variant", "components", "options")
         letters = arrays["words"]
         if ((letters < 0) | (letters > 255)).any():
             raise InputError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
@@ -134,7 +116,7 @@ class Transformed:
             raise InputError(f"{path}: expected the settings of a prior, got {came}") from None
 
 
-def _built(variant: str, components: int, options: str, seed: int) -> Any:
+def _built(variant: str, components: int, options: str) -> Any:
     """Return the transformer. Raises ValueError where there is none of that name, or its parameters are others."""
     one_of("variant", variant, VARIANTS)
     kind = getattr(importlib.import_module("sklearn.decomposition"), variant)
@@ -145,7 +127,7 @@ def _built(variant: str, components: int, options: str, seed: int) -> Any:
     except (ValueError, TypeError) as error:
         raise InputError(f"options must be a JSON object, got {quoted(options)} ({error})") from None
     known = kind().get_params()
-    defaults = {"n_components": components, "random_state": seed, **DEFAULTS.get(variant, {})}
+    defaults = {"n_components": components, "random_state": 0, **DEFAULTS.get(variant, {})}
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(f"options of {variant} must be of {', '.join(sorted(known))}, got {', '.join(unknown)}")
     return kind(**{name: value for name, value in defaults.items() if name in known} | parameters)

@@ -70,7 +70,7 @@ def corpus(folder: Path) -> list[Seed]:
         prior().fit(angles, motion.skeleton).save(path)
         seeds.append(Seed(prior.__name__, ".npz", path.read_bytes()))
     for variant in ("PCA", "KernelPCA", "FactorAnalysis"):
-        Transformed(variant=variant, clusters=5).fit(angles[:40]).save(path)
+        Transformed(variant=variant).fit(angles[:40]).save(path)
         seeds.append(Seed("Transformed", ".npz", path.read_bytes()))
     pictures = [np.where(mask, 255, 0).astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
     for suffix in (".mp4", ".avi"):

@@ -13,7 +13,7 @@ from posefit.motion import built_in
 from posefit_priors import sklearn
 from posefit_priors.full import Full
 from posefit_priors.loose import Loose
-from posefit_priors.pca import PCA
+from posefit_priors.pca import PCA, clusters_of
 from posefit_priors.sklearn import Transformed
 from tests.cases import each
 from tests.files import arrays
@@ -46,17 +46,17 @@ def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
     assert len(prior.low) == np.count_nonzero(skeleton.limits[:, 1] > skeleton.limits[:, 0])
 
 
-def test_limits_widen_where_a_training_pose_passes_them_or_are_the_training_range_with_a_margin() -> None:
+def test_limits_widen_where_a_training_pose_passes_them_or_are_the_training_range() -> None:
     poses = angles("run-a")
     prior = Full().fit(poses, built_in.average_skeleton())
     latents = prior.transform(poses)
     assert ((latents >= prior.low) & (latents <= prior.high)).all()
     np.testing.assert_allclose(prior.inverse_transform(latents), poses, atol=1e-12)
-    prior = Full(limits="training", margin=0.1).fit(poses)
+    prior = Full(limits="training").fit(poses)
     low, high = poses.min(axis=0), poses.max(axis=0)
     moving = high > low
-    np.testing.assert_allclose(prior.low, (low - 0.1 * (high - low))[moving])
-    np.testing.assert_allclose(prior.high, (high + 0.1 * (high - low))[moving])
+    np.testing.assert_array_equal(prior.low, low[moving])
+    np.testing.assert_array_equal(prior.high, high[moving])
 
 
 def test_a_skeleton_without_limits_is_named() -> None:
@@ -78,6 +78,16 @@ def test_last_digits_of_a_library_of_linear_algebra_change_nothing_of_a_prior() 
     one, other = PCA().fit(walk).arrays(), PCA().fit(walk * noise).arrays()
     for name, value in one.items():
         np.testing.assert_array_equal(value, other[name], err_msg=name)
+
+
+def test_the_same_poses_have_the_same_clusters_and_fewer_than_asked_are_centres_each() -> None:
+    poses = angles("walk-a")
+    centres, _ = clusters_of(poses, 5, 0.99)
+    assert centres.shape == (5, 63)
+    np.testing.assert_array_equal(clusters_of(poses, 5, 0.99)[0], centres)
+    centres, reach = clusters_of(np.repeat([[0.0, 0.0], [1.0, 0.0], [0.0, 2.0]], 4, axis=0), 5, 1.0)
+    assert {tuple(centre) for centre in centres} == {(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)}
+    assert reach == 0.0
 
 
 def test_a_linear_transformer_is_inverted_as_scikit_learn_does_it() -> None:
@@ -136,7 +146,7 @@ def test_a_loose_angle_reaches_as_far_as_every_training_pose_may_still_go() -> N
     # may go down by 140 at least, so the setting's 15 degrees bound that side, and up by no more than 20 - 10 = 10.
     poses, thigh = np.zeros((200, 63)), 3
     poses[:, thigh] = np.radians(np.linspace(-20.0, 10.0, 200))
-    prior = Loose(components=1, clusters=1, legs_degrees=15.0).fit(poses, built_in.average_skeleton())
+    prior = Loose(components=1, legs_degrees=15.0).fit(poses, built_in.average_skeleton())
     assert prior.loose.tolist() == [thigh]
     assert np.degrees([prior.low[1], prior.high[1]]) == pytest.approx([-15.0, 10.0])
 
