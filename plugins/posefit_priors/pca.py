@@ -1,11 +1,11 @@
 """The compact pose space: principal components, a range, and clusters that mark where poses are. SAPSO section 2."""
 
+import warnings
 from collections.abc import Mapping
 from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from posefit.arrays import Array, jit, writeable
 from posefit.errors import InputError
@@ -17,8 +17,9 @@ from posefit_priors.arrays import Shape, Stored, angles_of
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
 QUANTILE = 0.99  # Interpretation S5: chi is this quantile of the training distances
-CLUSTERING_STARTS = 10  # of K-means, of which the best counts
+CLUSTERING_STARTS = 30  # of K-means, of which the best counts
 CLUSTERING_SEED = 0
+CLUSTERING_ROUNDS = 100  # of Lloyd's algorithm
 DECIMALS = 7  # of what is learned, in radians and shares
 
 
@@ -105,12 +106,14 @@ def distances(latents: Array, centres: Array) -> Array:
 
 def clusters_of(latents: Array, clusters: int, quantile: float) -> tuple[Array, Array]:
     """Return the centres (K, m) that K-means finds among training latents (n, m), and chi (), how far one reaches."""
-    from sklearn.cluster import KMeans
+    from scipy.cluster.vq import kmeans2  # the same as scikit-learn's, whose import takes two seconds
 
-    count = min(clusters, len(np.unique(latents, axis=0)))
-    with threadpool_limits(1):  # poses are few; and more threads sum up in another order
-        means = KMeans(count, n_init=CLUSTERING_STARTS, random_state=CLUSTERING_SEED).fit(latents)
-    centres = rounded(means.cluster_centers_)
+    count, rng = min(clusters, len(np.unique(latents, axis=0))), np.random.default_rng(CLUSTERING_SEED)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a run in which a cluster has lost its poses is not the best
+        runs = [kmeans2(latents, count, CLUSTERING_ROUNDS, minit="++", rng=rng) for _ in range(CLUSTERING_STARTS)]
+    best, _ = min(runs, key=lambda run: float(((latents - run[0][run[1]]) ** 2).sum()))
+    centres = rounded(best)
     return centres, np.array(np.quantile(distances(latents, centres), quantile))  # Interpretation S5
 
 

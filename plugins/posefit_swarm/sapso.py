@@ -1,6 +1,7 @@
 """Simulated-annealed particle swarm optimisation: Algorithm 1 of Li, Sun, Chen and Li (2012), as ask and tell.
 
-Attributes have the paper's letters. `posefit_reproduce.sapso.letter` follows it where this reads it otherwise.
+Attributes have the paper's letters; a comment `# SAPSO (n)` marks its equation n. Where the paper is silent, an
+Interpretation is named, see docs/background/interpretations.md; `posefit_reproduce.sapso.letter` is the paper's letter.
 """
 
 import math
@@ -17,7 +18,7 @@ Rows = NDArray[np.int64]
 
 
 class SAPSO:
-    """Algorithm 1. Positions and velocities are those of the unit box.
+    """Algorithm 1. Positions are in the box [-1, 1]^d, in which every half-range is 1.
 
     Settings:
         population_size (N): of the swarm, 1 or more. Section 5.2.
@@ -25,7 +26,7 @@ class SAPSO:
         temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
         cooling (gamma): factor on the temperature after each iteration (Interpretation S6), 0 to 1. Section 5.2.
         stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
-        inertia (A): factor on the old velocity at first, above 0.1; it falls to 0.1. Section 3.1, Interpretation S5.
+        inertia (A): factor on the old velocity at first, above 0.1; it falls towards 0.1. Section 3.1, Interpretation S5.
         acceleration (c1, c2): of the pulls towards the personal and the swarm's best, 0 or more. Section 3.1.
         alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. Section 2.2.
     """
@@ -55,6 +56,7 @@ class SAPSO:
         self.space, self.rng, self.c, self.C = space, rng, 0, iterations
         self.T, self.gamma, self.T0 = temperature, cooling, stop_temperature
         self.A, self.acceleration, self.alpha = inertia, acceleration, alpha
+        # the positions to be evaluated next; c counts iterations, and the paper's own c is c ln(10 A) / C
         self.moved = draw_population(space, rng, population_size)  # SAPSO A1.1
         self.x, self.cost = self.moved.copy(), np.full(population_size, np.inf)
         self.pbest, self.pbest_cost = self.x.copy(), self.cost.copy()
@@ -73,7 +75,7 @@ class SAPSO:
         self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
         better = self.cost < self.pbest_cost  # SAPSO A1.2b
         self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
-        if self.c > 0:
+        if self.c > 0:  # the first evaluation is no move
             self.T *= self.gamma  # SAPSO A1.2e
         if self.c < self.C:
             self.v, self.moved = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)
@@ -89,7 +91,7 @@ class SAPSO:
 
 
 def inertia_at(c: int, C: int, A: float) -> float:
-    """Return omega of iteration c of C: it falls from A to 0.1. Section 3.1."""
+    """Return omega of iteration c of C: it falls from A towards 0.1. Section 3.1."""
     return A / math.exp(c * math.log(10.0 * A) / C)  # SAPSO inertia
 
 
@@ -101,14 +103,14 @@ def limited(v: Array, alpha: float) -> Array:
 def first_velocities(space: Space, rng: np.random.Generator, count: int, alpha: float) -> Array:
     """Return the velocities (count, d) of first particles, towards the prediction where there is one."""
     if space.start is None:
-        return rng.uniform(-alpha, alpha, (count, space.dimensions))
+        return rng.uniform(-alpha, alpha, (count, space.dimensions))  # ours: the paper does not say
     v_pred = space.start.velocity
     low, high = np.minimum(v_pred, 0.0), np.maximum(v_pred, 0.0)  # Interpretation S12
     return limited(rng.uniform(low, high, (count, space.dimensions)), alpha)  # SAPSO (7)
 
 
 def fly(space: Space, x: Array, v: Array) -> tuple[Array, Array]:
-    """Return velocities and positions (n, d) of particles at x (n, d): the walls of the box stop them."""
+    """Return velocities and positions (n, d) of particles at x (n, d): the box's walls stop them. Constraint 1."""
     there = wrap(space, x + v)  # SAPSO (2)
     inside = np.minimum(np.maximum(there, -1.0), 1.0)
     return np.where(inside == there, v, 0.0), inside
@@ -122,8 +124,9 @@ def redrawn(
 ) -> tuple[Array, Array]:
     """Return velocities and positions (n, d) after a step from x (n, d) that is allowed. Interpretation S7.
 
-    A particle whose step is not has rand() drawn again so many times, and then stays where it is. `step` returns the
-    velocities and positions (k, d) of some particles (k,), and `allowed` which of these are (k,).
+    A particle whose step is not allowed has rand() drawn again `redraws` times, all at once; the first that is allowed
+    counts, and where none is the particle stays, at rest. `step` returns the velocities and positions (k, d) of some
+    particles (k,), and `allowed` which of these are (k,); the paper's letter asks that of velocities, too.
     """
     v, moved = step(np.arange(len(x)))
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c

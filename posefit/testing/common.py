@@ -46,8 +46,12 @@ def construction(case: PluginCase) -> None:
         len(by_position) == len(case.arguments),
         f"a factory must take ({taken}) and keyword-only settings, got {len(by_position)} that are not keyword-only",
     )
-    untyped = [setting.name for setting in settings_of(case.factory) if setting.annotation is inspect.Parameter.empty]
-    expect(not untyped, f"a setting must have a type, such as {(untyped or ['n'])[0]}: int = 40, got none")
+    for setting in settings_of(case.factory):
+        if setting.annotation is inspect.Parameter.empty:
+            kind = type(setting.default).__name__
+            raise BrokenError(
+                f"a setting must have a type, such as {setting.name}: {kind} = {setting.default}, got none"
+            )
     case.build()
 
 

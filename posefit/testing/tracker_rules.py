@@ -165,5 +165,6 @@ RULES = [
     inputs,
     follows,
     common.silence,
+    common.nonsense_settings,
     common.unknown_setting,
 ]

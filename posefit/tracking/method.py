@@ -62,10 +62,10 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
     if family in offers["optimiser"]:
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
-    raise InputError(
-        f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, "
-        f"got {quoted(method)}{suggestion(optimiser, known)}"
-    )
+    hint = suggestion(optimiser, known) or "; posefit plugins doctor says whether a plugin failed to load"
+    if family in offers["prior"]:
+        hint = f"; as a prior it is @{optimiser}"
+    raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}")
 
 
 def resolved(source: Footage, options: TrackOptions) -> TrackOptions:

@@ -82,7 +82,7 @@ class OutputFolder(Output):
         if self.path.exists() and not self.path.is_dir():
             raise InputError(f"{self.path}: expected a folder to write to, got a file")
         if self.path.exists() and not force:
-            raise InputError(f"{self.path}: expected a new folder, got one that exists; force replaces it")
+            raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
         if self.path.exists() and (others := other_entries(self.path, _MINE)):
             came = f"one with {cut(others[0])}"
             raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
