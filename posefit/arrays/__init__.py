@@ -1,23 +1,17 @@
 """Array types, checked arrays that cannot be written to, and the compilation of plain functions of arrays."""
 
-import os
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posefit.arrays.compiling import compiled_once
+from posefit.arrays.compiling import compiled
 from posefit.errors import InputError
 from posefit.reading import quoted
 
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint64]  # 64 pixels a number
-
-if "NUMBA_CPU_NAME" in os.environ:
-    # A processor that is named has its own instructions and none besides. numba, not yet imported, takes the name for
-    # their order only: x86-64-v3 would still have AVX-512 where this machine has it.
-    os.environ.setdefault("NUMBA_CPU_FEATURES", "")
 
 
 def jit(function: Callable[..., Any]) -> Any:
@@ -25,7 +19,7 @@ def jit(function: Callable[..., Any]) -> Any:
 
     Rounding may differ from strict IEEE order only where a product and a sum are contracted, or in a zero's sign.
     """
-    return _compiled(function, "never")
+    return compiled(function, "never")
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -33,17 +27,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
     A call costs as much as filling a few blocks of pixels: each array is counted as in use, and then as not.
     """
-    return _compiled(function, "always")
-
-
-def _compiled(function: Callable[..., Any], inline: str) -> Any:
-    import numba
-
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}, "inline": inline}
-    # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
-    options["no_cfunc_wrapper"] = True
-    compiled: Any = numba.njit(**options)(function)
-    return compiled if compiled is function else compiled_once(compiled)  # NUMBA_DISABLE_JIT: nothing is compiled
+    return compiled(function, "always")
 
 
 def writeable(values: ArrayLike) -> Array:

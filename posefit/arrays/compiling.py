@@ -1,150 +1,96 @@
-"""Compiled functions, once a machine: numba's cache, made safe against changes elsewhere and against processes.
+"""Functions compiled by numba, and its cache of them: in a folder that is named after what is compiled, and with what.
 
 numba's own cache looks at the one file that a function stands in. What is compiled holds copies of every function that
-it calls, and of every constant, wherever these stand: so the cache of a function is empty, too, once a file has
-changed that its module imports, directly or not.
-
-numba's own cache also lets several processes compile at the same time, and loses a signature where two of them write
-its index. So each function has a lock beside its cache, a file that is locked (`flock`) while the function is searched,
-compiled and written: who comes later finds it there. The operating system drops a lock when its process ends in any
-way. Locks cannot wait for each other in a circle: a process takes them one within the other only where one function
-calls another, and no two functions call each other. Where there is no lock to be had, on a disk without them or one
-that cannot be written to, every process compiles.
+it calls, and of every constant, wherever these stand: so the folder's name has digests of the sources of posefit and of
+the function's own package. Each signature of a function has an index of its own there, so that processes that compile
+at the same time lose nothing of each other's; and what cannot be read or written is not in the cache, and no error.
 """
 
-import ast
-import gc
 import hashlib
 import os
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
-from importlib.util import resolve_name
 from pathlib import Path
 from typing import Any
 
-STARTED = time.time()  # before the modules were loaded that are compiled
-# whose versions are numba's affair
-_FOREIGN = sys.stdlib_module_names | {"cv2", "llvmlite", "numba", "numpy", "scipy"}
+from posefit.version import source_digest
 
-_held: set[Path] = set()  # of this process, which only the thread that holds numba's own lock may look at
+if "NUMBA_CPU_NAME" in os.environ:
+    # A processor that is named has its own instructions and none besides. numba, not yet imported, takes the name for
+    # their order only: x86-64-v3 would still have AVX-512 where this machine has it.
+    os.environ.setdefault("NUMBA_CPU_FEATURES", "")
 
 
-def compiled_once(dispatcher: Any) -> Any:
-    """Return a function of numba's, cached where there is a folder for it, that one process at a time compiles."""
-    from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.types import unliteral
+def compiled(function: Callable[..., Any], inline: str) -> Any:
+    """Return a function compiled by numba, whose calls are inlined "always" or "never"."""
+    import numba
 
-    function, alone = dispatcher.py_func, dispatcher.compile
-
-    @cache
-    def lock() -> Path | None:
-        folder = cached(dispatcher)
-        return None if folder is None else folder / f"{function.__module__}.{function.__qualname__}.lock"
-
-    def compile_in_turn(signature: Any) -> Any:
-        if isinstance(signature, tuple):  # a number written out in a call would be a type of its own
-            signature = tuple(unliteral(argument) for argument in signature)  # type: ignore[no-untyped-call]
-        # a thread of this process that waits for another process must not hold what a second thread needs to go on
-        with global_compiler_lock, uncollected(), in_turn(lock()):
-            return _compiled(alone, signature)
-
-    dispatcher.compile = compile_in_turn
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}, "inline": inline}
+    # these functions are not called from C; wrappers for it would take a twelfth of the time to compile
+    options["no_cfunc_wrapper"] = True
+    dispatcher: Any = numba.njit(**options)(function)
+    if dispatcher is not function:  # NUMBA_DISABLE_JIT: nothing is compiled
+        dispatcher._cache = cache_kind()(function)
     return dispatcher
 
 
-def _compiled(alone: Callable[[Any], Any], signature: Any) -> Any:
-    try:
-        return alone(signature)
-    except OSError:  # it is compiled, and could not be written
-        return alone(signature)
+def cache_folder(module: str) -> Path:
+    """Return where functions of a module are cached: below NUMBA_CACHE_DIR where it is set, else the user's caches."""
+    import numba
+    from numba.misc.appdirs import user_cache_dir
 
-
-def cached(dispatcher: Any) -> Path | None:
-    """Return the folder of a dispatcher's cache, which is used from now on; None where there is none.
-
-    To be called when the function is compiled or searched: earlier, its module may not have imported everything yet.
-    """
-    from numba.core.caching import FunctionCache, IndexDataCacheFile
-
-    with suppress(RuntimeError):
-        own: Any = FunctionCache(dispatcher.py_func)  # type: ignore[no-untyped-call]
-        stamp = own._impl.locator.get_source_stamp(), made_of(dispatcher.py_func.__module__)
-        own._cache_file = IndexDataCacheFile(own.cache_path, own._impl.filename_base, stamp)  # type: ignore[no-untyped-call]
-        dispatcher._cache = own
-        return Path(own.cache_path)
-    return None
+    parent = os.environ.get("NUMBA_CACHE_DIR") or user_cache_dir(appname="posefit", appauthor=False)
+    return Path(parent) / f"numba-{numba.__version__}-{source_digest('posefit')}-{source_digest(module)}"
 
 
 @cache
-def made_of(module: str) -> str:
-    """Return a digest of the source files of a module and of all that it imports as it is loaded, directly or not.
+def cache_kind() -> Any:
+    """Return numba's cache of a function, changed where this module's first lines say so."""
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, _CacheLocator
 
-    Raises RuntimeError where one of them has changed since: what runs in this process is not what stands there.
-    """
-    digest, waiting, visited = hashlib.sha256(), [module], {module}
-    while waiting:
-        text, imported = _source(waiting.pop())
-        digest.update(text)
-        new = [name for name in imported if name not in visited and name.partition(".")[0] not in _FOREIGN]
-        visited.update(new)
-        waiting += new
-    return digest.hexdigest()
+    class Locator(_CacheLocator):
+        """Says where a function is cached: in a folder whose name says of which sources it is."""
 
+        def __init__(self, function: Any) -> None:
+            self._folder, self._line = cache_folder(function.__module__), function.__code__.co_firstlineno
 
-@cache
-def _source(module: str) -> tuple[bytes, list[str]]:
-    """Return the text of a module's file, and the names of what it imports; nothing where there is no such file."""
-    file = getattr(sys.modules.get(module), "__file__", None) or ""
-    if not file.endswith(".py"):
-        return b"", []
-    if STARTED < Path(file).stat().st_mtime <= time.time():
-        raise RuntimeError(f"{file} has changed")
-    text, names = Path(file).read_bytes(), []
-    package = module if Path(file).stem == "__init__" else module.rpartition(".")[0]
-    for line in ast.parse(text).body:  # what stands within `if` or a function need not be loaded in every process
-        if isinstance(line, ast.Import):
-            names += [one.name for one in line.names]
-        elif isinstance(line, ast.ImportFrom):
-            start = resolve_name("." * line.level + (line.module or ""), package)
-            names += [start, *(f"{start}.{one.name}" for one in line.names)]
-    return text, names
+        def get_cache_path(self) -> str:
+            return str(self._folder)
 
+        def get_source_stamp(self) -> str:
+            return ""
 
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Have Python look for no garbage in the body: numba has so many objects that a fifth of compiling goes into it."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
+        def get_disambiguator(self) -> str:
+            return str(self._line)
 
+        @classmethod
+        def from_function(cls, py_func: Any, py_file: Any) -> Any:  # noqa: ARG003 - numba calls it
+            return cls(py_func)
 
-@contextmanager
-def in_turn(path: Path | None) -> Iterator[None]:
-    """Hold the lock of a path in the body; where there is none to be had, go on without it."""
-    if path is None or path in _held:  # a function that calls itself
-        yield
-        return
-    try:
-        import fcntl
+    class Results(CompileResultCacheImpl):
+        _locator_classes = (Locator,)
 
-        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except (ImportError, OSError):
-        yield
-        return
-    _held.add(path)
-    try:
-        with suppress(OSError):  # a disk without locks
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-    finally:
-        _held.discard(path)
-        with suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_UN)  # a process that was forked meanwhile may hold it open
-        os.close(file)
+    class Cache(FunctionCache):
+        _impl_class = Results
+
+        def _open(self, key: Any) -> None:
+            digest = hashlib.sha256(repr(key).encode()).hexdigest()[:12]
+            base = f"{self._impl.filename_base}-{digest}"
+            self._cache_file = IndexDataCacheFile(self._cache_path, base, source_stamp="")  # type: ignore[no-untyped-call]
+
+        def _load_overload(self, sig: Any, target_context: Any) -> Any:
+            try:
+                self._open(self._index_key(sig, target_context.codegen()))
+                return super()._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            except Exception:  # a damaged file may raise anything: it is compiled again, and written over
+                with suppress(Exception):
+                    self._cache_file.flush()
+                return None
+
+        def _save_overload(self, sig: Any, data: Any) -> None:
+            with suppress(Exception):  # there is no place to write
+                self._open(self._index_key(sig, data.codegen))
+                super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+    return Cache

@@ -1,15 +1,15 @@
-"""One process compiles a function, others wait for it; none waits for ever, and none needs a cache."""
+"""numba's cache: nothing is lost between processes, what is damaged is compiled again, and nothing needs a place for it."""
 
 import os
 import shutil
 import subprocess
 import sys
 from collections import Counter
-from threading import Timer
+from itertools import product
 
 import pytest
 
-from posefit.arrays.compiling import in_turn
+from tests.cases import each
 
 DEEPER = """
 from numba.extending import overload
@@ -28,13 +28,12 @@ def _compiled(x):
     return lambda x: x
 """
 MIDDLE = """
-from deeper import FACTOR, deep, plain
+from package.deeper import FACTOR, deep, plain
 """
-# a loop that calls another, one that calls itself, one that calls another twice, one that no type fits, and one that
-# is to become part of others
+# a loop that calls another, one that calls itself, one that no type fits, and one that is to become part of others
 LOOPS = """
 from posefit.arrays import inlined, jit
-from middle import FACTOR, deep, plain
+from package.middle import FACTOR, deep, plain
 
 @jit
 def changing(x):
@@ -56,15 +55,6 @@ def halved(n):
     return 0 if n < 2 else 1 + halved(n // 2)
 
 @jit
-def first(values):
-    one = 1
-    return picked(values, 0) + picked(values, values.size - 2 * one)
-
-@jit
-def picked(values, i):
-    return values[i]
-
-@jit
 def impossible(values):
     return values + "words"
 
@@ -81,12 +71,12 @@ from numba.core import event
 class Listener(event.Listener):
     def on_start(self, one):
         name = one.data["dispatcher"].py_func
-        if name.__module__ == "loops":
+        if name.__module__ == "package.loops":
             print("compiled", name.__name__, one.data["args"][0], flush=True)
     def on_end(self, one):
         pass
 
-import loops
+from package import loops
 event.register("numba:compile", Listener())
 print("ready", flush=True)
 while not os.path.exists("go"):
@@ -102,11 +92,13 @@ assert loops.halved(9) == 3
 @pytest.fixture
 def start():
     def started(script, tmp_path, deeper=DEEPER, **variables):
-        for name, text in (("loops", LOOPS), ("middle", MIDDLE), ("deeper", deeper)):
-            (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+        (tmp_path / "package").mkdir(exist_ok=True)
+        for name, text in (("__init__", ""), ("loops", LOOPS), ("middle", MIDDLE), ("deeper", deeper)):
+            (tmp_path / "package" / f"{name}.py").write_text(text, encoding="utf-8")
         variables["PYTHONDONTWRITEBYTECODE"] = "1"  # Python takes a file of the same second and size for the same
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0", **variables}
         path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {name: value for name, value in environment.items() if value is not None}
         return subprocess.Popen(
             [sys.executable, "-c", RUN + script],
             cwd=tmp_path,
@@ -134,14 +126,18 @@ ONCE = {
 }
 
 
-def test_two_processes_that_start_on_an_empty_cache_compile_each_function_once_in_all(start, tmp_path):
-    both = [start(ALL, tmp_path), start(ALL, tmp_path)]
-    for one in both:
-        assert one.stdout.readline() == "ready\n"
-    (tmp_path / "go").touch()
-    assert Counter(compiled(both[0]) + compiled(both[1])) == ONCE
-    # and nothing of it is lost: a third one finds both signatures of each
-    assert compiled(start(ALL, tmp_path)) == []
+def test_two_processes_that_start_on_an_empty_cache_lose_nothing_of_each_others(start, tmp_path):
+    scripts = "assert loops.outer(np.arange(4.0)) == 14.0", "assert loops.outer(np.arange(4)) == 14.0"
+    for both in ((ALL, ALL), scripts):
+        shutil.rmtree(tmp_path / "cache", ignore_errors=True)
+        (tmp_path / "go").unlink(missing_ok=True)
+        processes = [start(script, tmp_path) for script in both]
+        for process in processes:
+            assert process.stdout.readline() == "ready\n"
+        (tmp_path / "go").touch()
+        assert {*compiled(processes[0]), *compiled(processes[1])} <= ONCE.keys()
+        # a third one finds both signatures of each
+        assert compiled(start("\n".join(scripts), tmp_path)) == []
 
 
 EACH = """
@@ -150,7 +146,7 @@ from threading import Thread
 jobs = [Thread(target=loops.outer, args=(np.arange(4.0),)), Thread(target=loops.inner, args=(np.arange(4.0), 1))]
 for job in jobs: job.start()
 for job in jobs: job.join()
-# a function that cannot be compiled leaves no lock behind
+# a function that cannot be compiled
 from numba.core.errors import TypingError
 for _ in range(2):
     try:
@@ -158,11 +154,7 @@ for _ in range(2):
         raise AssertionError
     except TypingError:
         pass
-from posefit.arrays.compiling import _held
-assert not _held
-# a number written out in a call is no signature of its own
-assert loops.first(np.arange(3.0, 6.0)) == 7.0
-# a function that is inlined is kept as well where Python calls it
+# a function that is inlined is in the cache as well where Python calls it
 assert loops.doubled(2.0) == 4.0
 """
 IMPOSSIBLE = ["impossible array(float64, 1d, C)"] * 2
@@ -170,12 +162,12 @@ IMPOSSIBLE = ["impossible array(float64, 1d, C)"] * 2
 
 def test_each_function_is_compiled_once(start, tmp_path):
     (tmp_path / "go").touch()
-    loops = ["doubled float64", *(f"{name} array(float64, 1d, C)" for name in ("first", "inner", "outer", "picked"))]
+    loops = ["doubled float64", *(f"{name} array(float64, 1d, C)" for name in ("inner", "outer"))]
     assert sorted(compiled(start(EACH, tmp_path))) == sorted([*loops, *IMPOSSIBLE])
     assert compiled(start(EACH, tmp_path)) == IMPOSSIBLE
 
 
-def test_every_change_of_what_a_module_imports_compiles_it_again_once(start, tmp_path):
+def test_every_change_of_the_package_compiles_it_again_once(start, tmp_path):
     (tmp_path / "go").touch()
     assert compiled(start("assert loops.changing(2.0) == 6.0", tmp_path)) == ["changing float64"]
     for before, after, value in (
@@ -189,32 +181,35 @@ def test_every_change_of_what_a_module_imports_compiles_it_again_once(start, tmp
     assert compiled(start("assert loops.changing(2.0) == 9.0", tmp_path, DEEPER.replace(before, after))) == []
 
 
+@each(("kind", "damaged"), product(["nbi", "nbc"], [b"", b"\x80\x04 no pickle", None]))
+def test_a_damaged_file_is_compiled_again_and_written_over(start, tmp_path, kind, damaged):
+    (tmp_path / "go").touch()
+    assert Counter(compiled(start(ALL, tmp_path))) == ONCE
+    files = [*(tmp_path / "cache").rglob(f"*.{kind}")]
+    assert files
+    for file in files:
+        file.write_bytes(file.read_bytes()[:-9] if damaged is None else damaged)
+    assert Counter(compiled(start(ALL, tmp_path))) == ONCE
+    assert compiled(start(ALL, tmp_path)) == []
+
+
 def test_without_a_folder_or_room_for_the_cache_every_process_compiles(start, tmp_path):
     (tmp_path / "go").touch()
     script = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
     assert Counter(compiled(start(script + ALL, tmp_path))) == ONCE
-    nowhere = {"HOME": str(tmp_path / "file"), "XDG_CACHE_HOME": str(tmp_path / "file")}
-    for name in ("file", "__pycache__"):
-        shutil.rmtree(tmp_path / name, ignore_errors=True)
-        (tmp_path / name).write_text("a file where the folder should be", encoding="utf-8")
-    for _ in range(2):
-        assert Counter(compiled(start(ALL, tmp_path, NUMBA_CACHE_DIR=nowhere["HOME"], **nowhere))) == ONCE
+    (tmp_path / "file").write_text("a file where the folder should be", encoding="utf-8")
+    nowhere = str(tmp_path / "file")
+    for variables in (
+        {"NUMBA_CACHE_DIR": nowhere},
+        {"NUMBA_CACHE_DIR": None, "HOME": nowhere, "XDG_CACHE_HOME": nowhere},
+    ):
+        for _ in range(2):
+            assert Counter(compiled(start(ALL, tmp_path, **variables))) == ONCE
 
 
-HOLD = """
-import sys, time
-from pathlib import Path
-from posefit.arrays.compiling import in_turn
-with in_turn(Path(sys.argv[1])):
-    print("held", flush=True)
-    time.sleep(60)
-"""
-
-
-def test_a_lock_is_waited_for_until_its_holder_dies_and_never_ones_own(tmp_path):
-    path = tmp_path / "one.lock"
-    with subprocess.Popen([sys.executable, "-c", HOLD, str(path)], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "held\n"
-        Timer(0.2, process.kill).start()
-        with in_turn(path), in_turn(path):
-            assert process.wait(timeout=30) != 0
+def test_without_a_home_the_cache_is_that_of_the_users_entry(start, tmp_path):
+    (tmp_path / "go").touch()
+    script = "from posefit.arrays.compiling import cache_folder\nassert cache_folder('package.loops').is_absolute()\n"
+    nothing = {"NUMBA_CACHE_DIR": None, "HOME": None, "XDG_CACHE_HOME": str(tmp_path / "caches")}
+    assert Counter(compiled(start(script + ALL, tmp_path, **nothing))) == ONCE
+    assert compiled(start(ALL, tmp_path, **nothing)) == []

@@ -63,7 +63,7 @@ def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tup
     """Return the arguments of `count_on_device` that come before the poses."""
     chain = body.skeleton.chain
     view = (camera.rotation.ravel(), camera.translation, camera.focal, camera.centre)
-    person = _there(body, lambda: (chain.parents, chain.angles, chain.turned, chain.turns, chain.offsets, body.radii))
+    person = _there(body, lambda: (chain.parents, chain.angles, chain.turns, chain.offsets, body.radii))
     seen_by = _there(camera, lambda: (np.concatenate(view),))
     words = _there(silhouette, lambda: (*(bits.view(np.uint32) for bits in silhouette.bits), [silhouette.pixels]))
     return *person, *seen_by, camera.width, camera.height, *words
