@@ -40,7 +40,7 @@ def cache_folder(module: str) -> Path:
     import numba
     from numba.misc.appdirs import user_cache_dir
 
-    parent = os.environ.get("NUMBA_CACHE_DIR") or user_cache_dir(appname="posefit", appauthor=False)
+    parent = os.environ.get("NUMBA_CACHE_DIR") or user_cache_dir(appname="posefit", appauthor=False)  # type: ignore[no-untyped-call]
     return Path(parent) / f"numba-{numba.__version__}-{source_digest('posefit')}-{source_digest(module)}"
 
 
@@ -69,7 +69,7 @@ def cache_kind() -> Any:
             return cls(py_func)
 
     class Results(CompileResultCacheImpl):
-        _locator_classes = (Locator,)
+        _locator_classes = [Locator]  # noqa: RUF012 - as numba has it
 
     class Cache(FunctionCache):
         _impl_class = Results
@@ -81,16 +81,16 @@ def cache_kind() -> Any:
 
         def _load_overload(self, sig: Any, target_context: Any) -> Any:
             try:
-                self._open(self._index_key(sig, target_context.codegen()))
+                self._open(self._index_key(sig, target_context.codegen()))  # type: ignore[no-untyped-call]
                 return super()._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             except Exception:  # a damaged file may raise anything: it is compiled again, and written over
                 with suppress(Exception):
-                    self._cache_file.flush()
+                    self._cache_file.flush()  # type: ignore[no-untyped-call]
                 return None
 
         def _save_overload(self, sig: Any, data: Any) -> None:
             with suppress(Exception):  # there is no place to write
-                self._open(self._index_key(sig, data.codegen))
+                self._open(self._index_key(sig, data.codegen))  # type: ignore[no-untyped-call]
                 super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
 
     return Cache
