@@ -69,7 +69,7 @@ def cache_kind() -> Any:
             return cls(py_func)
 
     class Results(CompileResultCacheImpl):
-        _locator_classes = [Locator]  # noqa: RUF012 - as numba has it
+        _locator_classes = [Locator]  # type: ignore[list-item]  # noqa: RUF012 - as numba has it
 
     class Cache(FunctionCache):
         _impl_class = Results
