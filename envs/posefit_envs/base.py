@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace
 from posefit.arrays import Array
-from posefit.arrays.exchange import exchanged
 from posefit.fitting.check import whole
+from posefit.fitting.exchange import exchanged
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted

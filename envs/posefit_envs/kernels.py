@@ -31,12 +31,12 @@ class Scenes(NamedTuple):
 
 
 @jit
-def unpack_scenes(proposals, centres, halves, anchors, first, poses, translations, latents):
+def unpack_scenes(proposals, centres, halves, anchors, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, k, d); return whether all of them are finite."""
     finite, upright = True, np.zeros((3 + latents.shape[2], 2))
     for i in range(proposals.shape[0]):
         finite &= unpack_proposals(
-            proposals[i], centres[i], halves[i], anchors[i], first, upright, poses[i], translations[i], latents[i]
+            proposals[i], centres[i], halves[i], anchors[i], upright, poses[i], translations[i], latents[i]
         )
     return finite
 

@@ -121,9 +121,7 @@ class Stage:
     def _unpacked(self, proposals: Array) -> tuple[Array, Array]:
         (n, k, d), first = proposals.shape, self._first
         poses, translations, latents = np.empty((n, k, ANGLES)), np.empty((n, k, 3)), np.empty((n, k, d - first))
-        finite = unpack_scenes(
-            proposals, self._centres, self._halves, self._anchors, first, poses, translations, latents
-        )
+        finite = unpack_scenes(proposals, self._centres, self._halves, self._anchors, poses, translations, latents)
         assert finite, "actions are checked, and spaces are finite"
         angles = self._prior.inverse_transform(latents.reshape(n * k, -1))
         poses[..., 3:] = angles.reshape(n, k, -1)

@@ -26,7 +26,7 @@ class SAPSO:
         temperature (T): of the annealing at first, above 0, in units of the cost. Section 5.2.
         cooling (gamma): factor on the temperature after each iteration (Interpretation S6), 0 to 1. Section 5.2.
         stop_temperature (T0): the search ends at or below it, 0 or more; 0 never ends it. Interpretation S5.
-        inertia (A): factor on the old velocity at first, above 0.1; it falls towards 0.1. Section 3.1, Interpretation S5.
+        inertia (A): factor on the old velocity at first, above 0.1; falls towards 0.1. Section 3.1, Interpretation S5.
         acceleration (c1, c2): of the pulls towards the personal and the swarm's best, 0 or more. Section 3.1.
         alpha (alpha): velocities stay within it times the half-range of a coordinate, above 0. Section 2.2.
     """

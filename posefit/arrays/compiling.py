@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from posefit.version import NOT_IN_RESULTS, source_digest
 
@@ -22,10 +22,20 @@ MAX_FOLDERS = 32  # of a user's cache: those of older sources are removed
 
 
 class TolerantCache(FunctionCache):
-    """numba's cache, for which a file that is empty, cut off or cannot be written is a miss."""
+    """numba's cache, for which a file that is empty, cut off or cannot be written is a miss.
+
+    Each signature has an index of its own: of one index two processes may write, one loses what the other compiled.
+    """
+
+    def open_index(self, sig: Any) -> None:
+        """Use the index of a signature."""
+        base = f"{self._impl.filename_base}-{hashlib.sha256(str(sig).encode()).hexdigest()[:12]}"
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = IndexDataCacheFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled for a signature; None where it is not there."""
+        self.open_index(sig)
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whatever a damaged file raises
@@ -35,6 +45,7 @@ class TolerantCache(FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Write what was compiled for a signature, if there is room."""
+        self.open_index(sig)
         with suppress(OSError):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 

@@ -41,53 +41,60 @@ def areas_of_proposals(
     counts = [np.empty((len(proposals), 3), dtype=np.int64) for _ in views]
     drawings = [drawing_on_device(body, *view) for view in views]
     first = space.dimensions - len(space.prior.low)
-    weights, offset = space.prior.affine  # type: ignore[attr-defined]
-    arrays = (space.centre, space.half, space.anchor, space.tilt_mean, weights, offset)
-    box = [cuda.to_device(np.array(array, dtype=np.float64, order="C")) for array in arrays]
+    box = tuple(map(on_device, (space.centre, space.half, space.anchor)))
+    affine = tuple(map(on_device, space.prior.affine))  # type: ignore[attr-defined]
+    decoding = first, box, on_device(space.tilt_mean), affine
     for silhouette in silhouettes:
         count_poses(len(proposals), silhouette)
     for start in range(0, len(proposals), PART):
         part = slice(start, start + PART)
         there = cuda.to_device(proposals[part])
         placed: list[Any] = [cuda.device_array((len(there), wide), np.float64) for wide in (ANGLES, 3)]
-        decode_on_device[-(-len(there) * ANGLES // THREADS), THREADS](there, first, *box, *placed)
+        decode_on_device[-(-len(there) * ANGLES // THREADS), THREADS](there, *decoding, *placed)
         launches = [launched(drawing, *placed) for drawing in drawings]
         for out, areas in zip(counts, launches, strict=True):
             out[part] = areas.copy_to_host()
     return counts
 
 
+def on_device(array: Array) -> Any:
+    """Return a copy of an array on the device."""
+    return cuda.to_device(np.array(array, dtype=np.float64, order="C"))
+
+
 @cuda.jit(device=True)
-def coordinate(proposals, i, k, centre, half):
+def coordinate(proposals, i, k, box):
     """Return coordinate k of proposal i."""
-    return centre[k] + half[k] * proposals[i, k]
+    return box[0][k] + box[1][k] * proposals[i, k]
 
 
 @cuda.jit(device=True)
-def sum_over_latents(proposals, i, centre, half, first, weights, skipped, column, total):
+def sum_over_latents(proposals, i, box, first, weights, skipped, column, total):
     """Return `total` and the latents of proposal i, each times its weight in a column, below some rows skipped."""
-    for k in range(first, centre.size):
-        total += coordinate(proposals, i, k, centre, half) * weights[skipped + k - first, column]
+    for k in range(first, box[0].size):
+        total += coordinate(proposals, i, k, box) * weights[skipped + k - first, column]
     return total
 
 
 @cuda.jit
-def decode_on_device(proposals, first, centre, half, anchor, tilt, weights, offset, poses, translations):
+def decode_on_device(proposals, first, box, tilt, affine, poses, translations):
     """Write poses (n, 66) and translations (n, 3) of proposals (n, d), a thread an angle.
 
-    Latents begin at coordinate `first`. Joint angles are `offset` (63,) and the latents by `weights` (m, 63); the mean
-    tilt is the rows least, most and base of `tilt` (3 + m, 2) and the latents by the others.
+    Latents begin at coordinate `first`; `box` are its centre and half (d,), and the anchor (3,). Joint angles are the
+    offset (63,) of `affine` and the latents by its weights (m, 63); the mean tilt is the rows least, most and base of
+    `tilt` (3 + m, 2) and the latents by the others.
     """
+    weights, offset = affine
     at = cuda.grid(1)
     i, j = at // _ANGLES, at % _ANGLES
     if i >= poses.shape[0]:
         return
     if j >= 3:
-        poses[i, j] = sum_over_latents(proposals, i, centre, half, first, weights, 0, j - 3, offset[j - 3])
+        poses[i, j] = sum_over_latents(proposals, i, box, first, weights, 0, j - 3, offset[j - 3])
         return
-    angle = coordinate(proposals, i, j, centre, half)
+    angle = coordinate(proposals, i, j, box)
     if j > 0:
-        mean = sum_over_latents(proposals, i, centre, half, first, tilt, 3, j - 1, tilt[2, j - 1])
+        mean = sum_over_latents(proposals, i, box, first, tilt, 3, j - 1, tilt[2, j - 1])
         angle += min(max(mean, tilt[0, j - 1]), tilt[1, j - 1])
     poses[i, j] = angle
-    translations[i, j] = coordinate(proposals, i, 3 + j, centre, half) if first > 3 else anchor[j]
+    translations[i, j] = coordinate(proposals, i, 3 + j, box) if first > 3 else box[2][j]

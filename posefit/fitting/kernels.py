@@ -96,12 +96,13 @@ def spreads_away(latents, spread, away):
 
 
 @jit
-def unpack_proposals(proposals, centre, half, anchor, first, mean, poses, translations, latents):
+def unpack_proposals(proposals, centre, half, anchor, mean, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
 
-    Pitch and roll are added to the tilt that goes with the latents, which `mean` (3 + m, 2) says as `Tilt` does.
+    Pitch and roll are added to the tilt that goes with the latents, the last coordinates, which `mean` (3 + m, 2) says
+    as `Tilt` does. The translation is searched where there are coordinates for it, else it is the anchor.
     """
-    total = 0.0
+    first, total = proposals.shape[1] - latents.shape[1], 0.0
     for i in range(proposals.shape[0]):
         for j in range(3):
             poses[i, j] = centre[j] + half[j] * proposals[i, j]

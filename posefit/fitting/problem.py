@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array, writeable
-from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.check import at_least, between
+from posefit.fitting.exchange import exchanged
 from posefit.fitting.kernels import move_to_borders
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.body import Body

@@ -108,9 +108,9 @@ class SearchSpace:
         d, m = len(self.centre), len(self.prior.low)
         if proposals.shape[1:] != (d,):
             raise InputError(f"proposals must have shape (n, {d}), got {proposals.shape}")
-        n, first = len(proposals), d - m
+        n = len(proposals)
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
-        box = self.centre, self.half, self.anchor, first, self.tilt_mean
+        box = self.centre, self.half, self.anchor, self.tilt_mean
         if not unpack_proposals(proposals, *box, poses, translations, latents):
             raise InputError("proposals must be finite, got nan or infinity")
         if self.root_order == "xyz":

@@ -176,9 +176,8 @@ def place_lanes(chain, poses, places, rows, lanes):
     for j in range(_JOINTS):
         for i in range(3):
             for lane in range(LANES):
-                lanes[X + LANES * (_JOINTS * i + j) + lane] = lanes[
-                    _FRAMES + 3 * LANES * (4 * j + 3) + LANES * i + lane
-                ]
+                place = lanes[_FRAMES + LANES * (12 * j + 9 + i) + lane]
+                lanes[X + LANES * (_JOINTS * i + j) + lane] = place
 
 
 @inlined

@@ -10,7 +10,7 @@ from posefit.arrays import Array, Bits, writeable
 from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.geometry.skeleton import ANGLES
+from posefit.geometry.skeleton import ANGLES, Skeleton
 from posefit.silhouette import drawn, kernels
 from posefit.silhouette.mask import Mask, Silhouette, unpack
 from posefit.silhouette.rasteriser import View, strips_and_words
@@ -122,6 +122,15 @@ def costs_in(
     counted = np.empty((len(poses), 3), dtype=np.int64)
     kernels.count_areas(*drawing, poses, translations, counted)
     return mismatch(counted, beta)
+
+
+def compile_kernels() -> None:
+    """Compile what every cost needs, before processes are started each of which would compile it."""
+    point = Body(Skeleton("point", np.zeros((26, 3)), np.tile(np.eye(3), (26, 1, 1)), ()), np.zeros((26, 2)))
+    camera = Camera.around(np.zeros(3), 0.0, 1.0, (8, 8))
+    place, pose = np.zeros((1, 3)), np.zeros((1, ANGLES))
+    point.skeleton.joints(pose, place)
+    pose_costs(point, [camera], [Silhouette.of(np.ones((8, 8)))], pose, place)
 
 
 def mismatch(areas: Areas, beta: float = BETA) -> Array:

@@ -11,7 +11,8 @@ from posefit.arrays import Bits
 from posefit.errors import InputError
 from posefit.geometry.camera import Camera
 from posefit.reading import quoted
-from posefit.silhouette.rasteriser import STRIP_PIXELS, strips_and_words
+from posefit.silhouette.rasteriser import strips_and_words
+from posefit.silhouette.spans import STRIP_PIXELS
 
 Mask = NDArray[np.bool_]  # (height, width)
 

@@ -20,9 +20,9 @@ from posefit.silhouette.spans import BLOCK, STRIP_PIXELS, set_spans
 NEAR, FAR = 0.05, 1e6  # metres; a bone with an end outside of this depth is not drawn
 NONE = np.uint64(0)
 _NOWHERE = 1 << 20  # a block or strip beyond every image
-_FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
-_ZERO, _ONE, _WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP_PIXELS)
-_HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
+FLAT = 1e-9  # a tangent flatter than this lies between rows of pixels
+ZERO, ONE, WINDOW = np.float32(0), np.float32(1), np.float32(2 * STRIP_PIXELS)
+HUGE, _NAN = np.float32(1e9), np.float32(np.nan)
 
 # Scratch rows of LANES poses, each with ROOM for what there is of them, in one flat array as in `geometry.kernels`.
 ROOM, CONES = 32 * LANES, 26 * LANES
@@ -116,7 +116,7 @@ def outline(ends, lines, bounds, strips, width, height):
             y = along * dy + apart * dx
             a = v0 + r0 * y - top
             b = v1 + r1 * y - top
-            crosses = (abs(x) > _FLAT) & (gap > 0.0)
+            crosses = (abs(x) > FLAT) & (gap > 0.0)
             slope = -y / (x if crosses else 1.0)
             at = side * (_XQ - _XP) + k
             lines[_XP + at] = u0 + r0 * x - a * slope
@@ -154,7 +154,7 @@ def window(step, k, bounds, lines, keys, strips, stride):
     keys[k] = (np.int64(place) << 32) + np.int64(bounds[_ROW + k] * ROOM + k)
     column = np.float32(np.int32(STRIP_PIXELS * strip))
     lines[_COLUMN + k] = column
-    lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, _WINDOW)
+    lines[_STOP + k] = min(np.float32(np.int32(STRIP_PIXELS * (bounds[_LAST + k] + 1))) - column, WINDOW)
 
 
 @inlined
@@ -195,19 +195,19 @@ def columns(spans, lines, j, row):
         y = row + np.float32(k - BLOCK)
         x = xp + mp * y
         crosses = (y >= pa) & (y <= pb)
-        low = x if crosses else _HUGE
-        high = x if crosses else -_HUGE
+        low = x if crosses else HUGE
+        high = x if crosses else -HUGE
         x = xq + mq * y if (y >= qa) & (y <= qb) else _NAN
         low = min(low, x)
         high = max(high, x)
-        h = math.sqrt(s0 - (y - y0) * (y - y0))
+        h = np.sqrt(s0 - (y - y0) * (y - y0))
         low = min(low, x0 - h)
         high = max(high, x0 + h)
-        h = math.sqrt(s1 - (y - y1) * (y - y1))
+        h = np.sqrt(s1 - (y - y1) * (y - y1))
         low = min(low, x1 - h)
         high = max(high, x1 + h)
-        spans[k] = np.int32(np.ceil(max(low - column, _ZERO)))
-        spans[k + BLOCK] = np.int32(min(high - column + _ONE, stop))
+        spans[k] = np.int32(np.ceil(max(low - column, ZERO)))
+        spans[k + BLOCK] = np.int32(min(high - column + ONE, stop))
 
 
 @inlined

@@ -15,10 +15,10 @@ from typing import Any, Literal, final
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import one_of, positive, whole
+from posefit.fitting.exchange import exchanged
 from posefit.reading import quoted
 from posefit.suites.functions import (
     DIMENSIONS,

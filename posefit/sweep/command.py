@@ -146,6 +146,9 @@ def engine(
         raise InputError("--dask-dashboard must be given with --dask-local, whose workers it shows, got it without")
 
     def start() -> Engine:
+        from posefit.silhouette.cost import compile_kernels
+
+        compile_kernels()
         if scheduler is not None or dask_local is not None:
             from posefit.sweep.engines.cluster import Cluster
 

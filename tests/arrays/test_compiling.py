@@ -36,7 +36,7 @@ class Listener(event.Listener):
 
 from package.loops import scaled
 event.register("numba:compile", Listener())
-print(scaled(np.arange(4.0)))
+print(scaled(np.arange(4, dtype=KIND)))
 """
 
 
@@ -47,12 +47,12 @@ def run(tmp_path: Path) -> Any:
     (tmp_path / "package/__init__.py").touch()
     (tmp_path / "package/loops.py").write_text(LOOPS.replace("from constants", "from package.constants"))
 
-    def ran(factor: float = 1.0, before: str = "", **variables: str) -> tuple[float, list[str]]:
+    def ran(factor: float = 1.0, before: str = "", kind: str = "float", **variables: str) -> tuple[float, list[str]]:
         (tmp_path / "package/constants.py").write_text(f"FACTOR = {factor}\n")
         environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
         path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
         environment |= {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **variables}
-        command = [sys.executable, "-c", before + RUN]
+        command = [sys.executable, "-c", before + RUN.replace("KIND", kind)]
         lines = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split("\n")
         return float(lines[-2]), [line.removeprefix("compiled ") for line in lines if line.startswith("compiled")]
 
@@ -98,5 +98,5 @@ def test_two_processes_at_once_lose_nothing(run: Any) -> None:
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(2) as pool:
-        assert [total for total, _ in pool.map(lambda _: run(), range(2))] == [12.0, 12.0]
-    assert run() == (12.0, [])
+        assert [total for total, _ in pool.map(lambda kind: run(kind=kind), ("float", "int"))] == [12.0, 12.0]
+    assert [run(kind=kind) for kind in ("float", "int")] == [(12.0, [])] * 2

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
+from posefit.geometry.kernels import Chain
 from posefit.silhouette.cuda.launch import THREADS, count_on_device
 from posefit.silhouette.mask import Silhouette
 
@@ -63,10 +64,10 @@ def drawing_on_device(body: Body, camera: Camera, silhouette: Silhouette) -> tup
     """Return the arguments of `count_on_device` that come before the poses."""
     chain = body.skeleton.chain
     view = (camera.rotation.ravel(), camera.translation, camera.focal, camera.centre)
-    person = _there(body, lambda: (chain.parents, chain.angles, chain.turned, chain.turns, chain.offsets, body.radii))
+    *bones, radii = _there(body, lambda: (*chain, body.radii))
     seen_by = _there(camera, lambda: (np.concatenate(view),))
     words = _there(silhouette, lambda: (*(bits.view(np.uint32) for bits in silhouette.bits), [silhouette.pixels]))
-    return *person, *seen_by, camera.width, camera.height, *words
+    return Chain(*bones), radii, *seen_by, (camera.width, camera.height), tuple(words)
 
 
 def _there(owner: Any, arrays: Callable[[], Sequence[Any]]) -> Sequence[Any]:

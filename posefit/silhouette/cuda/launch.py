@@ -11,20 +11,27 @@ import numpy as np
 from numba import cuda, float32, float64, int32, uint32
 from numba.cuda.extending import overload
 
+from posefit.geometry import kernels
+from posefit.geometry.kernels import PI_HIGH, PI_LOW
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
-from posefit.silhouette.rasteriser import BLOCK, FAR, NEAR
-from posefit.silhouette.rasteriser import STRIP_PIXELS as STRIP
+from posefit.silhouette.rasteriser import FAR, FLAT, HUGE, NEAR, ONE, WINDOW, ZERO
+from posefit.silhouette.spans import BLOCK
+from posefit.silhouette.spans import STRIP_PIXELS as STRIP
 
 THREADS = 64  # of a block
 WORDS = 4  # of a row that a thread fills at a time
 _ANGLES, _BONES, _JOINTS = ANGLES, len(BONES), len(JOINTS)
-_PI_HIGH, _PI_LOW = 3.141592653589793, 1.2246467991473532e-16  # pi in two parts, as on a CPU
-_FLAT = 1e-9
-_ZERO, _ONE, _WINDOW = np.float32(0.0), np.float32(1.0), np.float32(64.0)
-_HUGE = np.float32(1e9)
 U, V, METRE = range(3)  # rows of `ends`, a column a joint
 X0, Y0, S0, X1, Y1, S1, XP, MP, PA, PB, XQ, MQ, QA, QB, LINES = range(15)  # rows of `lines`, a column a bone
 ROW, STOP, FIRST, LAST, TOP, BOUNDS = range(6)  # rows of `bounds`: those drawn, strips, and the cone's own first row
+
+
+def on_device(function):
+    """Return a function of numbers, which is compiled for CPUs, as it is compiled for a device."""
+    return cuda.jit(device=True)(getattr(function, "py_func", function))
+
+
+sine_cosine_near_zero, rotated = on_device(kernels.sine_cosine_near_zero), on_device(kernels.rotated)
 
 
 def fused(factor, by, addend):
@@ -85,27 +92,10 @@ def _ceiled_compiled(number):  # noqa: ARG001
 @cuda.jit(device=True)
 def write_sine(i, angle, sines, cosines):
     """Write the sine and cosine of one angle, by the polynomials of a CPU."""
-    turns = floored(angle * (1.0 / _PI_HIGH) + 0.5)
-    x = (angle - turns * _PI_HIGH) - turns * _PI_LOW
+    turns = floored(angle * (1.0 / PI_HIGH) + 0.5)
     sign = 1.0 - 2.0 * (turns - 2.0 * floored(0.5 * turns))
-    z = x * x
-    s = -1.0 / 1307674368000.0
-    s = s * z + 1.0 / 6227020800.0
-    s = s * z - 1.0 / 39916800.0
-    s = s * z + 1.0 / 362880.0
-    s = s * z - 1.0 / 5040.0
-    s = s * z + 1.0 / 120.0
-    s = s * z - 1.0 / 6.0
-    sines[i] = sign * (x + x * z * s)
-    c = 1.0 / 20922789888000.0
-    c = c * z - 1.0 / 87178291200.0
-    c = c * z + 1.0 / 479001600.0
-    c = c * z - 1.0 / 3628800.0
-    c = c * z + 1.0 / 40320.0
-    c = c * z - 1.0 / 720.0
-    c = c * z + 1.0 / 24.0
-    c = c * z - 0.5
-    cosines[i] = sign * (1.0 + z * c)
+    sine, cosine = sine_cosine_near_zero((angle - turns * PI_HIGH) - turns * PI_LOW)
+    sines[i], cosines[i] = sign * sine, sign * cosine
 
 
 @cuda.jit(device=True)
@@ -129,24 +119,19 @@ def place_root(i, place, sines, cosines, frames):
 
 
 @cuda.jit(device=True)
-def place_bones(i, starts, angles, turned, turns, offsets, sines, cosines, frames):
+def place_bones(i, chain, sines, cosines, frames):
     """Write world coordinate i of all frames (27, 4, 3) beyond the root's: no axis asks for another one."""
+    starts, angles, turns, offsets = chain
     for b in range(starts.size):
         p, a = starts[b], angles[b]
-        u, v, w = frames[p, 0, i], frames[p, 1, i], frames[p, 2, i]
-        if turned[b]:
-            first = u * turns[b, 0, 0] + v * turns[b, 1, 0] + w * turns[b, 2, 0]
-            second = u * turns[b, 0, 1] + v * turns[b, 1, 1] + w * turns[b, 2, 1]
-            w = u * turns[b, 0, 2] + v * turns[b, 1, 2] + w * turns[b, 2, 2]
-            u, v = first, second
+        x, y, z = frames[p, 0, i], frames[p, 1, i], frames[p, 2, i]
+        u = x * turns[b, 0, 0] + y * turns[b, 1, 0] + z * turns[b, 2, 0]
+        v = x * turns[b, 0, 1] + y * turns[b, 1, 1] + z * turns[b, 2, 1]
+        w = x * turns[b, 0, 2] + y * turns[b, 1, 2] + z * turns[b, 2, 2]
         if a >= 0:  # Rz @ Ry @ Rx
-            first = u * cosines[a + 2] + v * sines[a + 2]
-            v = v * cosines[a + 2] - u * sines[a + 2]
-            u = first * cosines[a + 1] - w * sines[a + 1]
-            w = w * cosines[a + 1] + first * sines[a + 1]
-            first = v * cosines[a] + w * sines[a]
-            w = w * cosines[a] - v * sines[a]
-            v = first
+            u, v = rotated(u, v, sines[a + 2], cosines[a + 2])
+            w, u = rotated(w, u, sines[a + 1], cosines[a + 1])
+            v, w = rotated(v, w, sines[a], cosines[a])
         frames[b + 1, 0, i], frames[b + 1, 1, i], frames[b + 1, 2, i] = u, v, w
         frames[b + 1, 3, i] = frames[p, 3, i] + u * offsets[b, 0] + v * offsets[b, 1] + w * offsets[b, 2]
 
@@ -167,20 +152,26 @@ def project_joint(j, frames, view, ends):
 
 
 @cuda.jit(device=True)
-def write_segment(k, row, px, py, slope, gap, u0, v0, r0, v1, r1, lines):
-    """Write one tangent segment of cone k, from row `row` of `lines` on: its line, and the rows that it crosses."""
-    a = v0 + r0 * py
-    b = v1 + r1 * py
-    crosses = abs(px) > _FLAT and gap > 0.0
-    lines[row, k] = u0 + r0 * px - a * slope
+def write_segment(k, row, normal, gap, first, last, lines):
+    """Write one tangent segment of cone k, from row `row` of `lines` on: its line, and the rows that it crosses.
+
+    It lies in the direction `normal` from the middles (u, v, radius) of both discs.
+    """
+    (x, y), (u0, v0, r0), (_, v1, r1) = normal, first, last
+    a = v0 + r0 * y
+    b = v1 + r1 * y
+    crosses = abs(x) > FLAT and gap > 0.0
+    slope = -y / (x if crosses else 1.0)
+    lines[row, k] = u0 + r0 * x - a * slope
     lines[row + 1, k] = slope
     lines[row + 2, k] = min(a, b) if crosses else 1.0
     lines[row + 3, k] = max(a, b) if crosses else 0.0
 
 
 @cuda.jit(device=True)
-def write_cone(k, start, radii, ends, strips, width, height, lines, bounds):
+def write_cone(k, start, radii, ends, size, lines, bounds):
     """Write the bounds of cone k, and the discs and tangent segments that border it; no rows where it is invisible."""
+    strips, width, height = size
     bounds[ROW, k] = bounds[STOP, k] = 0
     u0, v0, r0 = ends[U, start], ends[V, start], ends[METRE, start] * radii[k, 0]
     u1, v1, r1 = ends[U, k + 1], ends[V, k + 1], ends[METRE, k + 1] * radii[k, 1]
@@ -211,10 +202,8 @@ def write_cone(k, start, radii, ends, strips, width, height, lines, bounds):
     v1 -= top
     lines[X0, k], lines[Y0, k], lines[S0, k] = u0, v0, r0 * r0
     lines[X1, k], lines[Y1, k], lines[S1, k] = u1, v1, r1 * r1
-    p = -py / (px if abs(px) > _FLAT and gap > 0.0 else 1.0)
-    q = -qy / (qx if abs(qx) > _FLAT and gap > 0.0 else 1.0)
-    write_segment(k, XP, px, py, p, gap, u0, v0, r0, v1, r1, lines)
-    write_segment(k, XQ, qx, qy, q, gap, u0, v0, r0, v1, r1, lines)
+    write_segment(k, XP, (px, py), gap, (u0, v0, r0), (u1, v1, r1), lines)
+    write_segment(k, XQ, (qx, qy), gap, (u0, v0, r0), (u1, v1, r1), lines)
 
 
 @cuda.jit(device=True)
@@ -223,7 +212,7 @@ def crossing(k, y, lines):
 
     All are float32, as on a CPU.
     """
-    low, high = _HUGE, -_HUGE
+    low, high = HUGE, -HUGE
     if lines[PA, k] <= y <= lines[PB, k]:
         x = fused(lines[MP, k], y, lines[XP, k])
         low = high = x
@@ -232,12 +221,12 @@ def crossing(k, y, lines):
         low, high = min(low, x), max(high, x)
     away = y - lines[Y0, k]
     square = fused(-away, away, lines[S0, k])
-    if square >= _ZERO:
+    if square >= ZERO:
         half = single_root(square)
         low, high = min(low, lines[X0, k] - half), max(high, lines[X0, k] + half)
     away = y - lines[Y1, k]
     square = fused(-away, away, lines[S1, k])
-    if square >= _ZERO:
+    if square >= ZERO:
         half = single_root(square)
         low, high = min(low, lines[X1, k] - half), max(high, lines[X1, k] + half)
     return low, high
@@ -253,9 +242,9 @@ def word_of(low, high, strip, first, last, start):
     if strip < first or strip > last:
         return np.uint32(0)
     column = np.float32(STRIP * start)
-    stop = min(np.float32(STRIP * (last + 1)) - column, _WINDOW)
-    a = np.int32(ceiled(max(low - column, _ZERO)))
-    b = np.int32(min(high - column + _ONE, stop))
+    stop = min(np.float32(STRIP * (last + 1)) - column, WINDOW)
+    a = np.int32(ceiled(max(low - column, ZERO)))
+    b = np.int32(min(high - column + ONE, stop))
     before = STRIP * (strip - start)
     return spanned(a - before, b - before)
 
@@ -300,29 +289,14 @@ def add_counts(row, strip, strips, words, observed, valid, counts):
 
 
 @cuda.jit
-def count_on_device(
-    starts,
-    angles,
-    turned,
-    turns,
-    offsets,
-    radii,
-    view,
-    width,
-    height,
-    observed,
-    valid,
-    pixels,
-    poses,
-    translations,
-    areas,
-):
+def count_on_device(chain, radii, view, size, observed, poses, translations, areas):
     """Write the areas (n, 3) R, B, Y of poses (n, 66), one a block.
 
-    First come the fields of `Chain`, then radii, then a view (16,): rotation, translation, focal lengths, centre.
-    `observed` and `valid` (strips, rows) are bit images as `rasteriser` makes them, in 32-bit words; of the observed
-    silhouette's pixels there are so many (1,).
+    First come a `Chain` and radii, then a view (16,): rotation, translation, focal lengths, centre; and its width and
+    height. `observed` are the bit images (strips, rows) of the person and of valid pixels as `rasteriser` makes them,
+    in 32-bit words, and how many pixels are the person's (1,).
     """
+    (width, height), (person, valid, pixels), starts = size, observed, chain[0]
     sines = cuda.shared.array(_ANGLES, float64)
     cosines = cuda.shared.array(_ANGLES, float64)
     frames = cuda.shared.array((_JOINTS, 4, 3), float64)
@@ -333,7 +307,7 @@ def count_on_device(
     counts = cuda.shared.array(2, int32)
     words = cuda.local.array(WORDS, uint32)
     i, thread, threads = cuda.blockIdx.x, cuda.threadIdx.x, cuda.blockDim.x
-    strips = observed.shape[0]
+    strips = person.shape[0]
 
     for a in range(thread, _ANGLES, threads):
         write_sine(a, poses[i, a], sines, cosines)
@@ -343,20 +317,20 @@ def count_on_device(
     cuda.syncthreads()
     if thread < 3:
         place_root(thread, translations[i, thread], sines, cosines, frames)
-        place_bones(thread, starts, angles, turned, turns, offsets, sines, cosines, frames)
+        place_bones(thread, chain, sines, cosines, frames)
     cuda.syncthreads()
     for j in range(thread, _JOINTS, threads):
         project_joint(j, frames, view, ends)
     cuda.syncthreads()
     for b in range(thread, _BONES, threads):
-        write_cone(b, starts[b], radii, ends, strips, width, height, lines, bounds)
+        write_cone(b, starts[b], radii, ends, (strips, width, height), lines, bounds)
         bound(b, bounds, box)
     cuda.syncthreads()
     rows, across = max(box[1] - box[0], 0), (box[3] - box[2]) // WORDS + 1
     for item in range(thread, rows * across, threads):
         row, strip = box[0] + item % rows, box[2] + item // rows * WORDS
         fill(row, strip, strips, lines, bounds, words)
-        add_counts(row, strip, strips, words, observed, valid, counts)
+        add_counts(row, strip, strips, words, person, valid, counts)
     cuda.syncthreads()
     if thread == 0:
         body, overlap = counts[0], counts[1]

@@ -193,11 +193,11 @@ def pull(parents, centres, radii, contour, scale, blocks, slopes):
 def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     """Add the squares of one view to those of the bones: curves (27, 6, 6) and forces (27, 6, 1 + F), over twists.
 
-    `sums` are both. The first force is half the gradient, the others are half the second derivatives by a twist and F factors of the
-    build. `frames` (27, 4, 3) are of the joints. `contour` is the field, its corner and size, the points (n, 2) and how
-    many pixels each stands for; a distance counts less beyond `reach` metres. `grown` is how joints (F, 27, 3) and
-    radii (F, 26, 2) change with factors, and a matrix (1 + F, 1 + F) to whose first column the gradient by these is
-    added, and to the rest the second derivatives.
+    `sums` are both. The first force is half the gradient, the others are half the second derivatives by a twist and F
+    factors of the build. `frames` (27, 4, 3) are of the joints. `contour` is the field, its corner and size, the points
+    (n, 2) and how many pixels each stands for; a distance counts less beyond `reach` metres. `grown` is how joints (F,
+    27, 3) and radii (F, 26, 2) change with factors, and a matrix (1 + F, 1 + F) to whose first column the gradient by
+    these is added, and to the rest the second derivatives.
     """
     rotation, translation, focal, centre = camera
     curves, forces = sums
@@ -387,7 +387,10 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, out):
 
 @jit
 def add_all_bones(chain, frames, sines, cosines, curves, forces, matrices, slopes):
-    """Write `add_bones` of T frames, as `place_frames` writes them, to matrices (T, 69, 69) and slopes (T, 69, 1 + F)."""
+    """Write `add_bones` of T frames, which `place_frames` wrote.
+
+    They go to matrices (T, 69, 69) and slopes (T, 69, 1 + F).
+    """
     screws = np.empty((NUMBERS, 6))
     for k in range(len(frames)):
         write_screws(chain, frames[k], sines[k], cosines[k], screws)

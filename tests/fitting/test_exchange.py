@@ -10,8 +10,8 @@ import pytest
 
 import posefit
 import posefit_envs
-from posefit.arrays.exchange import exchanged
 from posefit.errors import InputError
+from posefit.fitting.exchange import exchanged
 from tests.cases import each
 
 DRAWN = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 9))
