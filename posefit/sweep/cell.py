@@ -59,7 +59,7 @@ class Cell:
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell as JSON holds it."""
-        spec: dict[str, Any] = json.loads(json_of(self._values))
+        spec: dict[str, Any] = json.loads(json.dumps(self._values))
         return spec
 
     @cached_property

@@ -122,8 +122,8 @@ class Ledger:
         import numpy as np
 
         k, _ = self._places[key]
-        ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
         try:
+            ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
                 unpacked = sum(member.file_size for member in archive.infolist())
             if unpacked <= MAX_JOINTS_BYTES:
@@ -177,7 +177,7 @@ class Ledger:
         file, database = self._open[k]
         try:
             yield from database.execute(query, values)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise _damaged(file, error) from None
 
 
@@ -328,7 +328,7 @@ def _reader(file: Path) -> sqlite3.Connection:
         if hasattr(database, "setlimit"):
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
         _check_format(file, database)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise _damaged(file, error) from None
     return database
 
@@ -380,7 +380,7 @@ def _locked(path: Path) -> sqlite3.Connection:
     return database
 
 
-def _damaged(file: Path, error: sqlite3.Error) -> InputError:
+def _damaged(file: Path, error: Exception) -> InputError:
     what = f"got {cut(str(error))}: take it from a copy, or save what can be read by sqlite3 {file.name} .recover"
     return InputError(f"{file}: expected a whole SQLite file, {what}")
 

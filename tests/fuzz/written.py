@@ -45,10 +45,15 @@ def written(folder: Path) -> dict[str, bytes]:
     (unfinished,) = (folder / "made").iterdir()
     content, mark = ((unfinished / name).read_bytes() for name in ("frames.jsonl", "unfinished.json"))
     return {
-        "rows": json.dumps([made[0]["spec"], figures[0]]).encode(), "searches": json.dumps([made[1]["spec"], figures[1]]).encode(),
-        "quarantine": json.dumps([made[0]["spec"], ["it had to"]]).encode(), "ledger": (folder / "seed" / FILE).read_bytes(),
+        "rows": lines(made[0]["spec"], figures[0]), "searches": lines(made[1]["spec"], figures[1]),
+        "quarantine": lines(made[0]["spec"], ["it had to"]), "ledger": (folder / "seed" / FILE).read_bytes(),
         "frames": content, "mark": mark,
     }  # fmt: skip
+
+
+def lines(*values: object) -> bytes:
+    """Return values as JSON, one a line."""
+    return "\n".join(map(json.dumps, values)).encode()
 
 
 def mended(content: bytes) -> bytes:
@@ -63,7 +68,8 @@ def readers() -> dict[str, Callable[[Path], object]]:
     from posefit.sweep.ledger import Ledger
 
     def reported(file: Path) -> object:
-        summary = write_report(str(file), f"{file}.html", warn=checked_message, csv=f"{file}.csv")
+        out = file.parent / NAME
+        summary = write_report(str(file), f"{out}.html", warn=checked_message, csv=f"{out}.csv")
         Ledger(file).frame()
         return leaderboard_lines(summary)
 
@@ -75,13 +81,12 @@ def readers() -> dict[str, Callable[[Path], object]]:
     def in_ledger(kind: str, status: str) -> Callable[[Path], object]:
         def read(path: Path) -> object:
             """Write the texts of a spec and of a row, or of the reasons of a quarantined cell, into a ledger."""
-            spec, _, row = path.read_bytes().decode(errors="surrogateescape").strip("[]").partition("}, ")
-            file = path.with_name(f"{NAME}.sqlite")
+            spec, _, row = path.read_bytes().decode(errors="replace").partition("\n")
+            file = path.parent / f"{NAME}-ledger" / FILE
             with Writer(file):
                 pass
             with closing(sqlite3.connect(file)) as database, database:
-                values = "a" * 64, kind, f"{spec}}}", status, row if status != "done" else "[]", row
-                values = tuple(value.encode(errors="replace").decode() for value in values)  # type: ignore[assignment]
+                values = "a" * 64, kind, spec, status, row if status != "done" else "[]", row
                 database.execute(
                     "INSERT INTO cells (key, kind, spec, status, faults, row) VALUES (?, ?, ?, ?, ?, ?)", values
                 )
