@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from posefit.errors import InputError
 from posefit.version import posefit_build
@@ -25,11 +25,6 @@ ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
-# Of the two tracks, and of the shorter of two searches, from which the time of a cell is estimated
-TRIAL_FRAMES = (1, 4)
-TRIAL_EVALUATIONS = 400  # of a frame, at most
-TRIAL_SEARCH_EVALUATIONS = 200  # where a population is no larger
-TRIAL_SEARCH_FACTOR = 4  # evaluations of the longer search for each of the shorter
 
 
 @dataclass(frozen=True)
@@ -72,17 +67,8 @@ class Cell:
         return {"kind": self.kind, **{field.name: getattr(self, field.name) for field in fields(self)}}  # type: ignore[arg-type]
 
     @property
-    def alike(self) -> tuple[object, ...]:
-        """What the time of an evaluation depends on."""
-        raise NotImplementedError
-
-    @property
     def total_evaluations(self) -> int:
         """The evaluations of the whole cell."""
-        raise NotImplementedError
-
-    def trials(self) -> tuple[Self, Self]:
-        """Return two cells of fewer evaluations, the second of more than the first."""
         raise NotImplementedError
 
     def measure(self) -> CellResult:
@@ -131,21 +117,9 @@ class TrackCell(Cell):
         return f"{self.name or self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
 
     @property
-    def alike(self) -> tuple[object, ...]:
-        """What the time of a frame depends on."""
-        views, corrupted = len(self.view_degrees), bool(self.corruption)
-        return self.method, str(self.settings), self.hypotheses, self.size, views, corrupted
-
-    @property
     def total_evaluations(self) -> int:
         """The evaluations of all frames."""
         return self.frames * self.evaluations
-
-    def trials(self) -> tuple[Self, Self]:
-        """Return two cells of fewer frames and evaluations."""
-        evaluations = min(self.evaluations, TRIAL_EVALUATIONS)
-        short, long = (replace(self, frames=min(n, self.frames), evaluations=evaluations) for n in TRIAL_FRAMES)
-        return short, long
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
@@ -202,25 +176,9 @@ class SearchCell(Cell):
         return f"{self.name or self.method} on {problem}, seed {self.seed}"
 
     @property
-    def alike(self) -> tuple[object, ...]:
-        """What the time of an evaluation depends on."""
-        return self.method, str(self.settings), self.function, self.dimension, self.infeasible
-
-    @property
     def total_evaluations(self) -> int:
         """The evaluations."""
         return self.evaluations
-
-    def trials(self) -> tuple[Self, Self]:
-        """Return two searches of fewer evaluations."""
-        from posefit.registry import registry
-        from posefit.settings import population
-
-        size = population(registry().optimiser(self.method), self.settings, self.evaluations)
-        least = max(TRIAL_SEARCH_EVALUATIONS, size)
-        sizes = (min(n, self.evaluations) for n in (least, TRIAL_SEARCH_FACTOR * least))
-        short, long = (replace(self, evaluations=evaluations) for evaluations in sizes)
-        return short, long
 
     def measure(self) -> CellResult:
         """Search the problem."""

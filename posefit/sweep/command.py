@@ -106,47 +106,47 @@ def preview(plan: str, out: str | None, shard: str | None, start: Callable[[], E
     """
     path = None if out is None else Path(out) / file_of(shard)
     ledger = Ledger(path) if path is not None and path.exists() else None
-    largest: dict[Any, Cell] = {}
-    totals: dict[Any, tuple[int, int]] = {}
+    first: dict[str, Cell] = {}  # of each method, of those that are to run
+    totals = Counter[str]()  # evaluations of each method's
     counts: dict[str, Counter[str]] = {}
-    number, head = 0, '{"cells": ['
+    number = to_run = 0
     for cell in cells_of(Plan.read(plan), shard):
         done = ledger is not None and cell.key in ledger
         number += 1
         if not done:
-            kind, size = cell.alike, cell.total_evaluations
-            largest[kind] = max(largest.get(kind, cell), cell, key=lambda known: known.total_evaluations)
-            count, evaluations = totals.get(kind, (0, 0))
-            totals[kind] = count + 1, evaluations + size
+            to_run += 1
+            method = f"{cell.method} {json_of(cell.settings)}"
+            first.setdefault(method, cell)
+            totals[method] += cell.total_evaluations
         if as_json:
-            yield f"{head}{json.dumps({'key': cell.key, 'done': done, **cell.spec})}"
-            head = ","
+            yield ("," if number > 1 else '{"cells": [') + json.dumps({"key": cell.key, "done": done, **cell.spec})
         else:
             for name, value in cell.spec.items():
                 counts.setdefault(name, Counter())[value if isinstance(value, str) else json_of(value)] += 1
-    takes: dict[str, Any] = {"seconds": 0.0, "untried": {}}
-    workers = 0
-    if largest:
+    seconds, workers, untried = 0.0, 0, {}
+    if first:
         with closing(start()) as engine:
-            takes, workers = estimate(largest, totals, engine), engine.window()
+            workers = engine.window()
+            for (method, cell), taken in zip(first.items(), estimate(list(first.values()), engine), strict=True):
+                if isinstance(taken, str):
+                    untried[str(cell)] = taken
+                else:
+                    seconds += taken * totals[method] / cell.total_evaluations / workers
     if as_json:
-        yield f'], "workers": {workers}, {json.dumps(takes)[1:]}'
+        rest = {"seconds": seconds, "workers": workers, "untried": untried}
+        yield f"], {json.dumps(rest)[1:]}"
         return
     for name, values in counts.items():
         if name in ("method", "motion") or (len(values) > 1 and name not in ("version", "files")):
             shown = [f"{count:,} x {cut(value)}" for value, count in islice(values.items(), VALUES)]
             more = [f"and {len(values) - VALUES:,} other values"] * (len(values) > VALUES)
             yield f"{name:16}  {', '.join(shown + more)}"
-    untried = takes["untried"]
-    for cell_text, reason in islice(untried.items(), WARNINGS):
-        yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
+    for text, reason in islice(untried.items(), WARNINGS):
+        yield f"warning: {text}: {reason}; cells of its method count for no time here, and may be quarantined"
     if len(untried) > WARNINGS:
-        yield f"warning: the same holds of {counted(len(untried) - WARNINGS, 'other kind')}; --json has each"
-    to_run, all_evaluations = (sum(column) for column in zip(*totals.values(), strict=True)) if totals else (0, 0)
-    duration = f"about {duration_text(takes['seconds'])} on {counted(workers, 'worker')}"
-    yield f"{number:,} cells, {to_run:,} of them to run" + f", {all_evaluations:,} evaluations: {duration}" * bool(
-        totals
-    )
+        yield f"warning: the same holds of {counted(len(untried) - WARNINGS, 'other method')}; --json has each"
+    takes = f", {totals.total():,} evaluations: about {duration_text(seconds)} on {counted(workers, 'worker')}"
+    yield f"{number:,} cells, {to_run:,} of them to run{takes if first else ''}"
 
 
 def engine(

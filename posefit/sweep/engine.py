@@ -7,10 +7,9 @@
 A Dask cluster, here or elsewhere, is one too: cluster.py.
 """
 
-import json
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -105,27 +104,18 @@ def single_thread() -> None:
     threadpool_limits(1)
 
 
-def estimate(largest: Mapping[Any, Cell], totals: Mapping[Any, tuple[int, int]], engine: Engine) -> dict[str, Any]:
-    """Return about how many seconds cells take; and of kinds that fail, a cell and the reason.
-
-    Of each kind there are its cell with the most evaluations and, in `totals`, how many cells and evaluations. Two
-    trials of it run, after a first pair that compiles what is not compiled yet: they differ by their evaluations' time.
-    """
-    seconds, untried = 0.0, {}
-    for kind, cell in largest.items():
-        short, long = cell.trials()
-        times: list[float] = []
-        for trial in (short, long, short, long):
-            engine.submit(trial)
+def estimate(cells: Sequence[Cell], engine: Engine) -> list[float | str]:
+    """Return how many seconds each of some cells takes, run for the second time, or why it failed at the first."""
+    taken: list[float | str] = []
+    for cell in cells:
+        for _ in range(2):  # the first compiles what is not compiled yet
+            engine.submit(cell)
             while not (outcomes := engine.wait(POLL_SECONDS)):
                 pass
-            if outcomes[0].result is None:
-                untried[json.dumps(str(cell))[1:-1]] = outcomes[0].reason or "what ran it was lost"
+            if (result := outcomes[0].result) is None:
+                taken.append(outcomes[0].reason or "what ran it was lost")
                 break
-            times.append(float(outcomes[0].result.row["seconds"]))
         else:
-            count, evaluations = totals[kind]
-            more = long.total_evaluations - short.total_evaluations
-            each = max(times[3] - times[2], 0.0) / more if more else 0.0
-            seconds += count * max(times[2] - each * short.total_evaluations, 0.0) + each * evaluations
-    return {"seconds": seconds / engine.window(), "untried": untried}
+            assert result is not None
+            taken.append(float(result.row["seconds"]))
+    return taken

@@ -109,7 +109,7 @@ def test_a_preview_of_many_cells_fits_a_screen_however_many_kinds_fail(plan: Pat
     assert motion.split(maxsplit=1) == ["motion", "5,400 x walk"]
     assert seed.endswith(", 6 x 10, 6 x 11, and 888 other values")
     assert len(warnings) == 6
-    assert warnings[-1] == "warning: the same holds of 1 other kind; --json has each"
+    assert warnings[-1] == "warning: the same holds of 1 other method; --json has each"
     assert last.startswith("5,400 cells, 5,400 of them to run, ")
 
 
