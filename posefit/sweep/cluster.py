@@ -12,6 +12,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -44,7 +45,8 @@ class Cluster:
         self._limits, self._patience = limits or Limits(), patience
         self._call = partial(_call, run, self._limits)
         self._distributed = _library()
-        self._local = None if workers is None else _local(self._distributed, workers)
+        self._settings = ExitStack()
+        self._local = None if workers is None else _local(self._distributed, workers, self._settings)
         self._client: Any = None
         self._address = scheduler if self._local is None else self._local.scheduler_address
         self._running: dict[Any, tuple[Any, float]] = {}  # the job of each future, and when it was sent
@@ -91,6 +93,7 @@ class Cluster:
             self._client.close(timeout=CONNECT_SECONDS)
         if self._local is not None:
             self._local.close(timeout=CONNECT_SECONDS)
+        self._settings.close()
 
     def _outcome(self, future: Any) -> Outcome[Any, Any]:
         job, _ = self._running.pop(future)
@@ -152,25 +155,28 @@ def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None]:
         return None, text_of(error)
 
 
-def _local(distributed: Any, workers: int) -> Any:
+def _local(distributed: Any, workers: int, stack: ExitStack) -> Any:
     """Return a cluster of worker processes on this machine, one thread each, unreachable from elsewhere."""
     import dask
 
-    settings: dict[str, Any] = {"distributed.scheduler.allowed-failures": 0}  # attempts are counted by the ledger
+    settings: dict[str, Any] = {
+        "distributed.scheduler.allowed-failures": 0,  # attempts are counted by the ledger
+        "distributed.deploy.lost-worker-timeout": "3650 days",  # a nanny goes on, however often its worker dies
+    }
     settings |= {f"distributed.{part}.http.routes": [] for part in ("scheduler", "worker")}
-    with dask.config.set(settings):
-        return distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=0,  # each cell has a limit of its own
-            host=LOOPBACK,
-            protocol="tls://",
-            security=distributed.Security.temporary(),
-            dashboard_address=f"{LOOPBACK}:0",  # None would take a port that others may have
-            scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,
-        )
+    stack.enter_context(dask.config.set(settings))
+    return distributed.LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        memory_limit=0,  # each cell has a limit of its own
+        host=LOOPBACK,
+        protocol="tls://",
+        security=distributed.Security.temporary(),
+        dashboard_address=f"{LOOPBACK}:0",  # None would take a port that others may have
+        scheduler_kwargs={"dashboard": False},
+        silence_logs=logging.CRITICAL,
+    )
 
 
 def _plugin(distributed: Any) -> Any:
