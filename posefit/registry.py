@@ -38,6 +38,7 @@ LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_
 
 Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+OWN = "this process"  # instead of the distribution of an optimiser that no plugin registered
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides
 Registrable: TypeAlias = Kind | Literal["command"]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
@@ -67,6 +68,8 @@ class Offer:
         The packages of posefit's own plugins, which have one version, are distinguished by name. What such a plugin
         offers from posefit itself depends on posefit's build.
         """
+        if self.distribution == OWN:
+            return f"{self.name} {self.version}".rstrip()
         module = (self.factory.func if isinstance(self.factory, partial) else self.factory).__module__
         if self.distribution == PROJECT and module.partition(".")[0] == PROJECT:
             return posefit_build()
@@ -165,7 +168,24 @@ class Registry:
 @lru_cache(maxsize=1)
 def registry() -> Registry:
     """Return the methods of all installed plugins; they are loaded once a process."""
-    return Registry(plugins_of(KINDS))
+    return Registry((*plugins_of(KINDS), *_own.values()))
+
+
+_own: dict[str, Plugin] = {}
+
+
+def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
+    """Let this process know optimisers by their names, each with a digest of its source.
+
+    Raises ValueError where a plugin has registered one of them.
+    """
+    for name, (factory, digest) in factories.items():
+        if not _NAME.fullmatch(name):
+            raise InputError(f"a factory must have a name of letters, digits, _, + and -, got {quoted(name)}")
+        if name not in _own and name in {**registry().offers["optimiser"], **registry().offers["tracker"]}:
+            raise InputError(f"a factory must have a name of its own, got {name}, which a plugin has registered")
+        _own[name] = Plugin(name, OWN, digest, "loaded", offers=(Offer("optimiser", name, factory, OWN, digest),))
+        registry.cache_clear()
 
 
 @lru_cache

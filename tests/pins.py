@@ -28,6 +28,7 @@ FRAMES = "8:16"  # of motions
 METHODS = ("sapso@pca", "pso@pca", "cma@pca", "annealed@pca", "particle@full", "random@pca", "vsmm", "sapso+vsmm")
 EXPORTS = ("*.amc", "*.asf", "*.bvh", "*.c3d", "*.glb", "*.mot", "*.osim", "*.trc", "angles.csv", "gait.csv")
 TIMES = ("version", "key", "seconds", "_ms", "ms_", "cpu", "wall")  # in the names of columns that are left out
+LABELS = ("kind", "name")  # columns of a row that no result depends on, and that were not there at first
 ENVIRONMENTS = (
     ("FitImage", {}),
     ("FitImage", {"noise": {"holes": 0.3, "shadow": 0.5}}),
@@ -136,8 +137,10 @@ def exports(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def without_times(row: dict[str, str]) -> dict[str, str]:
-    """Return the columns of a row that are not of times and versions."""
-    return {name: value for name, value in row.items() if not any(word in name for word in TIMES)}
+    """Return the columns of a row that are not of times and versions, and no labels."""
+    return {
+        name: value for name, value in row.items() if name not in LABELS and not any(word in name for word in TIMES)
+    }
 
 
 def rollouts(_: Path) -> Iterator[tuple[str, str]]:

@@ -50,6 +50,7 @@ ROW = {
     "version": ("", "versions of posefit and of the plugins that are not its own"),
     "status": ("", "`done` or `quarantined`, after three failed attempts"),
     "reason": ("", "why a quarantined cell failed"),
+    "kind": ("", "`track` or `search`"),
     "evaluations_used": ("", "poses whose cost was computed, in all frames together"),
     "dimensions": ("", "coordinates of a proposal; none of a tracker that searches no box"),
     "seconds": ("s", "wall time of the whole cell"),
@@ -109,7 +110,7 @@ def page() -> str:
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
         "`baselines_degrees.mean_pose`.",
         "What the cell is: the fields [of a plan](../howto/plan.md#the-fields-of-a-cell), and",
-        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason")})),
+        _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason", "kind")})),
         "What it measured: the figures of [`summary.json`](#keys-of-summary-json), `evaluations_per_second` aside, and",
         _table("column", _described({name: ROW[name] for name in SPENT})),
         "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",

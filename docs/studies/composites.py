@@ -43,7 +43,7 @@ from posefit.progress import Progress
 from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
-from posefit.sweep.engines.engine import Limits
+from posefit.sweep.engine import Limits
 from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
 from posefit.tracking.result import Track

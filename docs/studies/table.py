@@ -9,7 +9,7 @@ in `--ledger` is not run again.
 import json
 import os
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from contextlib import closing, nullcontext
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,11 +21,11 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
 from posefit.sweep.cell import run_cell
-from posefit.sweep.command import cores, swept
-from posefit.sweep.engines.engine import Limits
-from posefit.sweep.engines.processes import Processes
+from posefit.sweep.command import swept
+from posefit.sweep.engine import Limits
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
+from posefit.sweep.pool import Pool, cores
 from posefit.tracking.measures import BASELINES, MEASURES
 
 Row = Mapping[str, Any]
@@ -44,8 +44,7 @@ def rows(plan: Plan, workers: int | None, ledger: str | None) -> list[dict[str, 
     Raises ValueError where a cell failed.
     """
     with nullcontext(ledger) if ledger else TemporaryDirectory() as folder:
-        with closing(Processes(workers or cores(), Limits(), run_cell)) as engine:
-            tally = swept(plan, folder, engine, say)
+        tally = swept(plan, folder, Pool(workers or cores(), Limits(), run_cell), say)
         if tally.stopped:
             raise KeyboardInterrupt
         found = Ledger(folder)

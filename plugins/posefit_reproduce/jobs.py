@@ -8,9 +8,8 @@ from typing import Any, TypeVar
 
 from posefit.errors import InputError
 from posefit.files import new_folder
-from posefit.sweep.command import cores
-from posefit.sweep.engines.engine import Limits
-from posefit.sweep.engines.processes import Processes
+from posefit.sweep.engine import Limits
+from posefit.sweep.pool import Pool, cores
 
 POLL_SECONDS = 0.2  # between checks for an interruption
 
@@ -30,7 +29,7 @@ def each(
     Jobs and results travel between processes. Raises ValueError where a job fails, and ends the others.
     """
     wanted = cores() if workers is None else workers
-    engine: Processes[tuple[K, Callable[[], T]], T] = Processes(min(wanted, len(jobs)), limits or Limits(), _called)
+    engine: Pool[tuple[K, Callable[[], T]], T] = Pool(min(wanted, len(jobs)), limits or Limits(), _called)
 
     def ended() -> Iterator[tuple[K, T]]:
         waiting, running = deque(jobs.items()), 0
@@ -38,12 +37,12 @@ def each(
             while waiting and running < engine.window():
                 engine.submit(waiting.popleft())
                 running += 1
-            for one in engine.wait(POLL_SECONDS):
+            for outcome in engine.wait(POLL_SECONDS):
                 running -= 1
-                key = one.cell[0]
-                if one.result is None:
-                    raise InputError(f"{key}: {one.reason}")
-                yield key, one.result
+                key = outcome.job[0]
+                if outcome.result is None:
+                    raise InputError(f"{key}: {outcome.reason}")
+                yield key, outcome.result
 
     with closing(engine):
         results = dict(progress(ended(), len(jobs)) if progress else ended())

@@ -1,7 +1,7 @@
 """`posefit sweep` and `posefit report`."""
 
 import json
-from contextlib import closing, nullcontext
+from contextlib import nullcontext
 from itertools import islice
 from typing import Any
 
@@ -15,7 +15,8 @@ LINES = 1000  # that are printed at a time
 
 @click.command()
 @click.argument("plan")
-@click.option("--out", metavar="DIR", help="The ledger: a new folder, or one that a sweep goes on in.")
+@click.option("--out", metavar="DIR", help="The ledger's folder: a new one, or one that a sweep goes on in.")
+@click.option("--shard", metavar="I/N", help="Run each Nth cell from the Ith, into a file of its own in DIR.")
 @options(ENGINE)
 @click.option(
     "--dry-run",
@@ -31,6 +32,7 @@ def sweep(
     /,
     plan: str,
     out: str | None,
+    shard: str | None,
     dry_run: bool,
     retry_quarantined: bool,
     keep_old: bool,
@@ -39,19 +41,18 @@ def sweep(
 ) -> None:
     """Run the cells of PLAN: methods, motions, views, corruptions and seeds; or single searches of a suite.
 
-    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment, and any number of
-    them may work on one DIR: the same command goes on where it was.
+    PLAN is a .toml file, `default`, or - for standard input. A sweep may be killed at any moment: the same command goes
+    on where it was. Several may share a plan and a DIR as shards.
     Exit status 1 where cells were quarantined after three attempts, 130 where it was stopped.
     """
     from posefit.sweep import command
-    from posefit.sweep.engines.engine import Limits
-    from posefit.sweep.estimate import TRIAL_SECONDS
+    from posefit.sweep.engine import TRIAL_SECONDS, Limits
     from posefit.sweep.plan import Plan
 
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
     start = command.engine(Limits(min(seconds, TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
     if dry_run:
-        lines, some = command.preview(plan, out, start, as_json), ""
+        lines, some = command.preview(plan, out, shard, start, as_json), ""
         while True:
             with results_alone() if as_json else nullcontext():  # a plugin may print, too
                 some = "\n".join(islice(lines, LINES))
@@ -61,22 +62,25 @@ def sweep(
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
+        how: dict[str, Any] = {"shard": shard, "retry_quarantined": retry_quarantined, "keep_old": keep_old}
+        command.file_of(shard)
         cells = Plan.read(plan)
-        with closing(start()) as engine:  # without an engine there is no folder either
-            tally = command.swept(cells, out, engine, say, retry_quarantined=retry_quarantined, keep_old=keep_old)
+        tally = command.swept(cells, out, start(), say, **how)  # without an engine there is no folder either
     click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
     context.exit(130 if tally.stopped else 1 if tally.quarantined else 0)
 
 
 @click.command()
-@click.argument("ledger", metavar="DIR")
+@click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-def report(ledger: str, out: str | None, as_json: bool, **others: Any) -> None:
-    """Write the results of a sweep to DIR as one page that any browser opens, offline.
+def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:
+    """Write the results of sweeps to DIR as one page that any browser opens, offline.
+
+    Each DIR is a folder of ledgers (.sqlite), or one of them.
 
     Without --out it prints which method leads and the leaderboard, and writes no page.
 

@@ -36,7 +36,7 @@ from posefit.report.summary import (
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SHOWN
-from posefit.sweep.ledger import ROWS, Ledger
+from posefit.sweep.ledger import Ledger
 from posefit.tracking.measures import BASELINES
 
 REASONS = 5  # of failures, the most frequent ones, that the first screen names
@@ -97,7 +97,7 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
             "taking_part": contest.methods,
             **(_search_curves(contest) if runs.is_search else _track_curves(contest, board[0]["method"])),
         }
-    changed = time.localtime((ledger.path / ROWS).stat().st_mtime)
+    changed = time.localtime(ledger.changed)
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
     data |= {
         "title": "Report of single searches" if runs.is_search else "Report of a sweep",

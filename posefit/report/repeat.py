@@ -19,7 +19,7 @@ def repeat_command(spec: Mapping[str, Any]) -> str:
         return command_head(spec) + "".join(f"{name} = {_toml(spec[name])}\n" for name in LAST_FIELDS) + "END"
     plan = {
         "suite": spec["suite"],
-        "methods": [{"method": spec["method"], "settings": spec["settings"]}],
+        "methods": [{name: spec[name] for name in ("method", "name", "settings") if name != "name" or spec[name]}],
         **{f"{name}s": [spec[name]] for name in ("function", "dimension", "instance", "seed")},
         "budgets": [spec["evaluations"] // spec["dimension"]],
         "infeasible": spec["infeasible"],
@@ -33,6 +33,7 @@ def command_head(spec: Mapping[str, Any]) -> str:
     The shell does not interpret the plan, whatever names it holds: each of its lines begins with a field's name.
     """
     fields = {name: spec[name] for name in FIELDS if name in spec and name not in LAST_FIELDS}
+    fields = {name: value for name, value in fields.items() if name != "name" or value}
     # TOML has no null: settings are parsed from their text
     fields["settings"] = {name: setting_text(value) for name, value in spec["settings"].items()}
     return _BEGIN + "[[cells]]\n" + "".join(f"{name} = {_toml(value)}\n" for name, value in fields.items())

@@ -25,7 +25,7 @@ from posefit.uncertainty.calibration import BINS
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
-_METHOD_FIELDS = ("method", "settings", "evaluations", "hypotheses", "version")  # of a track's spec
+_METHOD_FIELDS = ("method", "name", "settings", "evaluations", "hypotheses", "version")  # of a track's spec
 _NAMED_FIELDS = ("motion", "view_degrees", "corruption", "instance")  # that the name of a track's instance has
 NO_MODES: Array = np.zeros((BINS, 3), dtype=np.float32)
 _PROBLEM_FIELDS = ("function", "dimension", "instance", "suite")  # of a search's spec
@@ -115,9 +115,9 @@ def runs_of(ledger: "Ledger") -> Runs:
             places[place] = sys.intern(_text(_place(spec)))
         texts = (places[place], *heads[fields])
         rows.append(_Row(*texts, spec["seed"], row["key"], tuple(row["warnings"]), figures, tuple(data)))
-    if not kinds and not ledger.bad():
+    if not kinds:
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    return _sorted_runs(ledger.version, True in kinds, rows, quarantined, ledger.bad())
+    return _sorted_runs(ledger.version, True in kinds, rows, quarantined)
 
 
 def _track_data(row: Mapping[str, Any], grids: dict[bytes, Any]) -> tuple[Any, ...]:
@@ -135,9 +135,7 @@ def _search_data(run: SuiteRun) -> tuple[Any, ...]:
     return np.array([100.0 - reached, reached, run.cost - run.truth_cost]), run, evaluations
 
 
-def _sorted_runs(
-    version: str, searches: bool, rows: list[_Row], quarantined: Sequence[Mapping[str, Any]], bad: Sequence[str]
-) -> Runs:
+def _sorted_runs(version: str, searches: bool, rows: list[_Row], quarantined: Sequence[Mapping[str, Any]]) -> Runs:
     errors: dict[str, list[float]] = {}
     for row in rows:
         errors.setdefault(row.method, []).append(np.nan_to_num(row.figures[0], nan=np.inf))
@@ -161,8 +159,14 @@ def _sorted_runs(
     failed = Counter(_text(_variant(cell["spec"])) for cell in quarantined)
     return Runs(
         version=version,
-        methods=distinct([fields["method"] for fields in variants], [_variation(fields) for fields in variants]),
-        variants=tuple({**fields, "settings": ", ".join(settings_text(fields["settings"]))} for fields in variants),
+        methods=distinct(
+            [fields["name"] or fields["method"] for fields in variants], [_variation(fields) for fields in variants]
+        ),
+        variants=tuple(
+            {name: value for name, value in fields.items() if name != "name"}
+            | {"settings": ", ".join(settings_text(fields["settings"]))}
+            for fields in variants
+        ),
         instances=distinct([_place_name(place) for place in places], [_place_details(place) for place in places]),
         places=tuple(places),
         method=method,
@@ -172,7 +176,7 @@ def _sorted_runs(
         keys=tuple(row.key for row in rows),
         figures=dict(zip(names, figures.T, strict=True)),
         warnings={k: row.warnings for k, row in enumerate(rows) if row.warnings},
-        failures=(*map(_failure, quarantined), *map(_bad_row, bad)),
+        failures=tuple(map(_failure, quarantined)),
         failed=tuple(failed[text] for text in methods),
         unfinished=tuple(sorted({json.loads(text)["method"] for text in failed if text not in errors})),
         is_search=searches,
@@ -200,22 +204,16 @@ def _failure(cell: Mapping[str, Any]) -> dict[str, Any]:
     spec = cell["spec"]
     where = f"f{spec['function']} in {spec['dimension']}D" if is_search(spec) else spec["motion"]
     return {
-        "name": f"{spec['method']} on {where}, instance {spec['instance']}, seed {spec['seed']}",
-        "method": spec["method"],
+        "name": f"{spec['name'] or spec['method']} on {where}, instance {spec['instance']}, seed {spec['seed']}",
+        "method": spec["name"] or spec["method"],
         "reasons": list(dict.fromkeys(cell["reasons"])),
         "command": repeat_command(spec),
     }
 
 
-def _bad_row(reason: str) -> dict[str, Any]:
-    where, _, why = reason.partition(": ")
-    command = "The next sweep of the plan runs this cell again."
-    return {"name": where, "method": "damaged rows", "reasons": [why], "command": command}
-
-
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
     if is_search(spec):
-        fields = {name: spec[name] for name in ("method", "settings", "infeasible", "version")}
+        fields = {name: spec[name] for name in ("method", "name", "settings", "infeasible", "version")}
         return {**fields, "budget": spec["evaluations"] / spec["dimension"]}
     return {name: spec[name] for name in _METHOD_FIELDS}
 
@@ -233,7 +231,7 @@ def _variation(variant: Mapping[str, Any]) -> list[str]:
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
     if is_search(spec):
         return {name: spec[name] for name in _PROBLEM_FIELDS}
-    return {name: value for name, value in spec.items() if name not in (*_METHOD_FIELDS, "seed")}
+    return {name: value for name, value in spec.items() if name not in (*_METHOD_FIELDS, "kind", "seed")}
 
 
 def _rank(place: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -1,6 +1,6 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
 
 def write_report(
-    path: str,
+    path: str | Sequence[str],
     out: str | None,
     *,
     figures: str | None = None,
@@ -28,7 +28,7 @@ def write_report(
     csv: str | None = None,
     warn: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Write the report of a ledger to a file, and return what the command prints.
+    """Write the report of a ledger, or of several together, to a file, and return what the command prints.
 
     That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
     `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
@@ -36,15 +36,14 @@ def write_report(
     Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
     need matplotlib: before anything is written, if possible.
     """
-    _check_places(Path(path), out, [figures, iohprofiler, csv])
+    paths = [path] if isinstance(path, str | Path) else path
+    _check_places(Path(paths[0]), out, [figures, iohprofiler, csv])
     if figures is not None:
         from posefit.report.figures import library, write_figures
 
         library("figure")
-    ledger = Ledger(path, warn)
+    ledger = Ledger(*paths)
     runs = runs_of(ledger)
-    if csv is not None and not len(ledger) and not ledger.quarantined_keys():
-        raise InputError(f"{csv}: expected a row to write, got a ledger with damaged ones alone")
     if runs.is_search and (figures is not None or iohprofiler is not None):
         name = "iohprofiler" if figures is None else "figures"
         table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from posefit.errors import InputError
 from posefit.version import posefit_build
@@ -25,43 +25,59 @@ ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
 UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
-# Of the two tracks, and of the shorter of two searches, from which the time of a cell is estimated
-TRIAL_FRAMES = (1, 4)
-TRIAL_EVALUATIONS = 400  # of a frame, at most
-TRIAL_SEARCH_EVALUATIONS = 200  # where a population is no larger
-TRIAL_SEARCH_FACTOR = 4  # evaluations of the longer search for each of the shorter
 
 
 @dataclass(frozen=True)
 class CellResult:
     """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
 
-    row: dict[str, Any]  # as JSON holds it: the spec, the key, and the figures
+    row: dict[str, Any]  # as JSON holds it: the key, the spec, and the figures
     joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search
 
 
-class _Spec:
+class Cell:
     """Everything that one run depends on. `posefit.sweep.plan` makes cells that are checked.
 
     `version` is that of posefit and of the method's plugins, with digests of their sources: see
-    `posefit.registry.version_of`.
+    `posefit.registry.version_of`. `name` is what reports call the method; it changes no result, and no key.
     """
+
+    kind: ClassVar[str]  # "track" or "search"
+    method: str
+    settings: Mapping[str, Any]
+    evaluations: int
+    instance: int
+    seed: int
+    name: str
+    version: str
 
     @cached_property
     def spec(self) -> dict[str, Any]:
         """The cell as JSON holds it."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-        spec: dict[str, Any] = json.loads(json.dumps(values))
+        spec: dict[str, Any] = json.loads(json.dumps(self._values))
         return spec
 
     @cached_property
     def key(self) -> str:
-        """The cell's name: the SHA-256 of its spec, version included, as 64 hexadecimal digits."""
-        return hashlib.sha256(json_of(self.spec).encode()).hexdigest()
+        """The SHA-256 of its spec without its name, version included, as 64 hexadecimal digits."""
+        return hashlib.sha256(json_of({**self._values, "name": ""}).encode()).hexdigest()
+
+    @property
+    def _values(self) -> dict[str, Any]:
+        return {"kind": self.kind, **{field.name: getattr(self, field.name) for field in fields(self)}}  # type: ignore[arg-type]
+
+    @property
+    def total_evaluations(self) -> int:
+        """The evaluations of the whole cell."""
+        raise NotImplementedError
+
+    def measure(self) -> CellResult:
+        """Run it. Raises ValueError where a file has changed since it was planned."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class TrackCell(_Spec):
+class TrackCell(Cell):
     """A motion that is tracked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
@@ -92,28 +108,18 @@ class TrackCell(_Spec):
     yaw_off_degrees: float = 0.0
     body_off_percent: float = 0.0
     seed: int = 0
+    name: str = ""
     files: Mapping[str, str] = field(default_factory=dict)
     version: str = field(default_factory=posefit_build)
+    kind: ClassVar[str] = "track"
 
     def __str__(self) -> str:
-        return f"{self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """What the time of a frame depends on."""
-        views, corrupted = len(self.view_degrees), bool(self.corruption)
-        return self.method, str(self.settings), self.hypotheses, self.size, views, corrupted
+        return f"{self.name or self.method} on {self.motion}, instance {self.instance}, seed {self.seed}"
 
     @property
     def total_evaluations(self) -> int:
         """The evaluations of all frames."""
         return self.frames * self.evaluations
-
-    def trials(self) -> tuple[Self, Self]:
-        """Return two cells of fewer frames and evaluations."""
-        evaluations = min(self.evaluations, TRIAL_EVALUATIONS)
-        short, long = (replace(self, frames=min(n, self.frames), evaluations=evaluations) for n in TRIAL_FRAMES)
-        return short, long
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
@@ -149,7 +155,7 @@ class TrackCell(_Spec):
 
 
 @dataclass(frozen=True)
-class SearchCell(_Spec):
+class SearchCell(Cell):
     """An optimiser that searches a problem of a suite once."""
 
     method: str
@@ -161,31 +167,18 @@ class SearchCell(_Spec):
     settings: Mapping[str, Any] = field(default_factory=dict)  # of the optimiser
     infeasible: str = "repair"
     seed: int = 0
+    name: str = ""
     version: str = field(default_factory=posefit_build)
+    kind: ClassVar[str] = "search"
 
     def __str__(self) -> str:
-        return f"{self.method} on f{self.function} in {self.dimension}D, instance {self.instance}, seed {self.seed}"
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """What the time of an evaluation depends on."""
-        return self.method, str(self.settings), self.function, self.dimension, self.infeasible
+        problem = f"f{self.function} in {self.dimension}D, instance {self.instance}"
+        return f"{self.name or self.method} on {problem}, seed {self.seed}"
 
     @property
     def total_evaluations(self) -> int:
         """The evaluations."""
         return self.evaluations
-
-    def trials(self) -> tuple[Self, Self]:
-        """Return two searches of fewer evaluations."""
-        from posefit.registry import registry
-        from posefit.settings import population
-
-        size = population(registry().optimiser(self.method), self.settings, self.evaluations)
-        least = max(TRIAL_SEARCH_EVALUATIONS, size)
-        sizes = (min(n, self.evaluations) for n in (least, TRIAL_SEARCH_FACTOR * least))
-        short, long = (replace(self, evaluations=evaluations) for evaluations in sizes)
-        return short, long
 
     def measure(self) -> CellResult:
         """Search the problem."""
@@ -205,7 +198,15 @@ class SearchCell(_Spec):
         return CellResult(row, b"")
 
 
-Cell = TrackCell | SearchCell
+KINDS: dict[str, type[TrackCell] | type[SearchCell]] = {kind.kind: kind for kind in (TrackCell, SearchCell)}
+
+
+def cell_from(spec: Mapping[str, Any]) -> Cell:
+    """Return the cell of a spec, as JSON holds it."""
+    values: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in spec.items() if name != "kind"
+    }
+    return KINDS[spec["kind"]](**values)
 
 
 def run_cell(cell: Cell) -> CellResult:

@@ -12,7 +12,7 @@ from posefit.fitting.check import between, finite_number, whole
 from posefit.footage.masks import FPS
 from posefit.footage.source import MOTIONS, load_motion, training_clips
 from posefit.motion import built_in, recorded
-from posefit.reading import quoted, suggestion
+from posefit.reading import SHOWN, quoted, suggestion
 from posefit.registry import Offer, registry, version_of
 from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
@@ -119,6 +119,13 @@ def _name(field: str, value: Any) -> str:
     return value
 
 
+def label(field: str, value: Any) -> str:
+    """Return what reports call a method."""
+    if not isinstance(value, str) or len(value) > SHOWN or not value.isprintable():
+        raise InputError(f"{field} must be a text of at most {SHOWN} characters, got {quoted(value)}")
+    return value
+
+
 def _method(field: str, value: Any) -> str:
     """Return a method by its whole name: `sapso` is `sapso@pca`."""
     return str(method_names(_name(field, value)))
@@ -200,6 +207,7 @@ CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "view_degrees": _views,
     "corruption": _corruption,
     "instance": lambda field, value: whole(field, value, 0),
+    "name": lambda field, value: label(field, value),
     "frames": _frames,
     "yaw_off_degrees": _within(ALL_AROUND),
     "body_off_percent": _within(MAX_BODY_OFF),

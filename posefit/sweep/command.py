@@ -2,23 +2,24 @@
 
 import json
 import os
+import re
 import shlex
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import fields
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
 from posefit.reading import counted, cut
-from posefit.sweep.cell import json_of, run_cell
-from posefit.sweep.driver import Cells, Driver, Tally, drive_cells, keys_of
-from posefit.sweep.engines.engine import Engine, Limits, Run
-from posefit.sweep.ledger import INDEX, Ledger
-from posefit.sweep.plan import Plan
+from posefit.sweep.cell import Cell, json_of, other_version, run_cell
+from posefit.sweep.drive import Tally, drive
+from posefit.sweep.engine import Engine, Limits, Run, estimate
+from posefit.sweep.ledger import FILE, Ledger, Writer
+from posefit.sweep.plan import MAX_CELLS, Plan
+from posefit.sweep.pool import Pool, cores
 
 VALUES = 12  # of a field, that a preview lists
 WARNINGS = 5  # of a preview
@@ -27,99 +28,125 @@ Say = Callable[[str], None]
 
 
 def swept(
-    cells: Cells, out: str | Path, running: Engine, say: Say, *, retry_quarantined: bool = False, keep_old: bool = False
+    plan: Plan,
+    out: str | Path,
+    engine: Engine,
+    say: Say,
+    *,
+    shard: str | None = None,
+    retry_quarantined: bool = False,
+    keep_old: bool = False,
 ) -> Tally:
-    """Return how cells ended that an engine ran into the ledger in a folder, with a bar on stderr.
+    """Return how the cells of a plan, or of one shard, ended that an engine ran into a folder, with a bar on stderr.
 
-    With `keep_old` a cell does not run that has a row of another version of posefit or of a plugin.
+    With `keep_old` a cell does not run that has a row of another version of posefit or of a plugin. The engine is
+    closed at the end.
     """
     from tqdm import tqdm
 
-    with Driver(out, say) as driver:
+    with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
+        old: dict[str, Counter[str]] = {}  # the versions of rows that count for no cell of today, by the rest of a spec
+        for spec in ledger.old_specs():
+            if any(map(other_version, spec["version"].split(", "))):
+                old.setdefault(_unversioned(spec), Counter())[spec["version"]] += 1
+        for version, count in sum(old.values(), Counter[str]()).items():
+            kept = "count, too" if keep_old else "do not count here; --keep-old keeps them"
+            say(f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and {kept}")
+        chosen = cells_of(plan, shard)
+        ledger.plan(cell for cell in chosen if not (keep_old and old and _unversioned(cell.spec) in old))
         if retry_quarantined:
-            quarantined = driver.ledger.quarantined_keys()
-            count = sum(driver.release_quarantined(key) for key in keys_of(cells) if key in quarantined)
+            count = ledger.release_quarantined()
             say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
-        for version, count in (outdated := driver.ledger.outdated()).items():
-            kept = "are kept" if keep_old else "do not count here; --keep-old keeps them"
-            say(f"{count} of the {len(driver.ledger)} rows in {out} are of another version, {cut(version)}, and {kept}")
-        if keep_old and outdated:
-            old = {_unversioned(row["spec"]) for row in driver.ledger.rows() if row["spec"]["version"] in outdated}
-            cells = [cell for cell in cells if cell.key in driver.ledger or _unversioned(cell.spec) not in old]
-        bar = tqdm(total=len(cells), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
-        started = False
+        bar = tqdm(total=ledger.counts().total(), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
+        start: list[int] = []
 
         def watch(tally: Tally) -> None:
-            nonlocal started
-            settled = tally.done + tally.quarantined
-            if not started:
-                started, bar.n, bar.initial = True, settled, settled
-                if settled:
-                    say(f"{settled} of {tally.cells} cells are done already")
+            finished = tally.done + tally.quarantined
+            if not start:
+                start.append(finished)
+                bar.n = bar.initial = finished
+                if finished:
+                    say(f"{finished} of {tally.cells} cells are done already")
             if tally.failed or tally.quarantined:
                 bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
-            bar.update(settled - bar.n)
+            bar.update(finished - bar.n)
 
         def say_beside_bar(message: str) -> None:
             bar.clear()
             say(message)
 
         with bar:
-            return drive_cells(cells, driver, running, say_beside_bar, watch)
+            return drive(ledger, engine, say_beside_bar, watch)
+
+
+def file_of(shard: str | None) -> str:
+    """Return the name of a shard's file. Raises InputError where it is none."""
+    if shard is None:
+        return FILE
+    match = re.fullmatch(r"([0-9]{1,7})/([0-9]{1,7})", shard)
+    if not match or not 1 <= int(match[1]) <= int(match[2]) <= MAX_CELLS:
+        raise InputError(f"--shard must be I/N such as 2/8, got {cut(shard)}")
+    return f"ledger-{int(match[1])}-of-{int(match[2])}.sqlite"
+
+
+def cells_of(plan: Plan, shard: str | None) -> Iterator[Cell]:
+    """Return the cells of a plan, or each Nth of them, from the Ith, for a shard I/N."""
+    first, _, count = (shard or "1/1").partition("/")
+    return islice(plan, int(first) - 1, None, int(count))
 
 
 def _unversioned(spec: Mapping[str, Any]) -> str:
-    return json_of({name: value for name, value in spec.items() if name != "version"})
+    return json_of({**spec, "version": "", "name": ""})
 
 
-def preview(plan: str, out: str | None, start: Callable[[], Engine], as_json: bool) -> Iterator[str]:
+def preview(plan: str, out: str | None, shard: str | None, start: Callable[[], Engine], as_json: bool) -> Iterator[str]:
     """Yield the lines of a preview: how many cells of a plan have which values, and about how long all take.
 
     Or those of one JSON object with each cell, and whether it is done. A million cells are never in memory together.
     """
-    from posefit.sweep.estimate import Estimate, KindTotal, Workload, estimate_of
-
-    cells = Plan.read(plan)
-    ledger = Ledger(out) if out is not None and (Path(out) / INDEX).exists() else None
-    left: Workload = {}
-    workers = count = 0
+    path = None if out is None else Path(out) / file_of(shard)
+    ledger = Ledger(path) if path is not None and path.exists() else None
+    first: dict[str, Cell] = {}  # of each method, of those that are to run
+    totals = Counter[str]()  # evaluations of each method's
     counts: dict[str, Counter[str]] = {}
-    if as_json:
-        yield '{"cells": ['
-    for k, cell in enumerate(cells):
+    number = to_run = 0
+    for cell in cells_of(Plan.read(plan), shard):
         done = ledger is not None and cell.key in ledger
+        number += 1
         if not done:
-            left.setdefault(cell.kind, KindTotal(cell)).add(cell)
-            count += 1
+            to_run += 1
+            method = f"{cell.method} {json_of(cell.settings)}"
+            first.setdefault(method, cell)
+            totals[method] += cell.total_evaluations
         if as_json:
-            line = json.dumps({"key": cell.key, "done": done, **cell.spec})
-            yield line if k == len(cells) - 1 else f"{line},"
+            yield ("," if number > 1 else '{"cells": [') + json.dumps({"key": cell.key, "done": done, **cell.spec})
         else:
-            for one in fields(cell):
-                value = getattr(cell, one.name)
-                text = value if isinstance(value, str) else json_of(value)
-                counts.setdefault(one.name, Counter())[text] += 1
-    estimate = Estimate(0.0, {})
-    if left:
-        with closing(start()) as running:
-            workers = running.window()
-            estimate = estimate_of(left, running, workers)
+            for name, value in cell.spec.items():
+                counts.setdefault(name, Counter())[value if isinstance(value, str) else json_of(value)] += 1
+    seconds, workers, untried = 0.0, 0, {}
+    if first:
+        with closing(start()) as engine:
+            workers = engine.window()
+            for (method, cell), taken in zip(first.items(), estimate(list(first.values()), engine), strict=True):
+                if isinstance(taken, str):
+                    untried[str(cell)] = taken
+                else:
+                    seconds += taken * totals[method] / cell.total_evaluations / workers
     if as_json:
-        untried = json.dumps(estimate.untried)
-        yield f'], "seconds": {estimate.seconds!r}, "workers": {workers}, "untried": {untried}}}'
+        rest = {"seconds": seconds, "workers": workers, "untried": untried}
+        yield f"], {json.dumps(rest)[1:]}"
         return
     for name, values in counts.items():
         if name in ("method", "motion") or (len(values) > 1 and name not in ("version", "files")):
-            shown = [f"{number:,} x {cut(value)}" for value, number in islice(values.items(), VALUES)]
+            shown = [f"{count:,} x {cut(value)}" for value, count in islice(values.items(), VALUES)]
             more = [f"and {len(values) - VALUES:,} other values"] * (len(values) > VALUES)
             yield f"{name:16}  {', '.join(shown + more)}"
-    for cell_text, reason in islice(estimate.untried.items(), WARNINGS):
-        yield f"warning: {cell_text}: {reason}; cells of its kind count for no time here, and would be quarantined"
-    if len(estimate.untried) > WARNINGS:
-        yield f"warning: the same holds of {counted(len(estimate.untried) - WARNINGS, 'other kind')}; --json has each"
-    evaluations = sum(total.evaluations for total in left.values())
-    takes = f", {evaluations:,} evaluations: about {duration_text(estimate.seconds)} on {counted(workers, 'worker')}"
-    yield f"{len(cells):,} cells, {count:,} of them to run{takes if left else ''}"
+    for text, reason in islice(untried.items(), WARNINGS):
+        yield f"warning: {text}: {reason}; cells of its method count for no time here, and may be quarantined"
+    if len(untried) > WARNINGS:
+        yield f"warning: the same holds of {counted(len(untried) - WARNINGS, 'other method')}; --json has each"
+    takes = f", {totals.total():,} evaluations: about {duration_text(seconds)} on {counted(workers, 'worker')}"
+    yield f"{number:,} cells, {to_run:,} of them to run{takes if first else ''}"
 
 
 def engine(
@@ -129,7 +156,6 @@ def engine(
     workers: int | None = None,
     scheduler: str | None = None,
     dask_local: int | None = None,
-    dask_dashboard: bool = False,
 ) -> Callable[[], Engine]:
     """Return a function that starts the engine asked for: processes of this machine, or Dask workers.
 
@@ -142,20 +168,16 @@ def engine(
     for name, value in (("workers", workers), ("dask-local", dask_local)):
         if value is not None and value < 1:
             raise InputError(f"--{name} must be at least 1, got {value}")
-    if dask_dashboard and dask_local is None:
-        raise InputError("--dask-dashboard must be given with --dask-local, whose workers it shows, got it without")
 
     def start() -> Engine:
         from posefit.silhouette.cost import compile_kernels
 
         compile_kernels()
         if scheduler is not None or dask_local is not None:
-            from posefit.sweep.engines.cluster import Cluster
+            from posefit.sweep.cluster import Cluster
 
-            return Cluster(scheduler, dask_local, limits, run, dashboard=dask_dashboard)
-        from posefit.sweep.engines.processes import Processes
-
-        return Processes(workers or cores(), limits, run)
+            return Cluster(scheduler, dask_local, limits, run)
+        return Pool(workers or cores(), limits, run)
 
     return start
 
@@ -164,7 +186,7 @@ def tally_text(tally: Tally, out: str) -> str:
     """Return how a sweep ended, and the command that shows its results."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
-        line += f"; {tally.quarantined} quarantined: the reasons are in {Path(out) / 'quarantine'}"
+        line += f"; {tally.quarantined} quarantined: posefit report names the reasons"
     if tally.stopped:
         line += "; stopped: the same command goes on from there"
     elif tally.done:
@@ -179,8 +201,3 @@ def duration_text(seconds: float) -> str:
             return f"{seconds / size:.1f} {name}"
     whole = round(seconds)
     return f"{whole} second{'' if whole == 1 else 's'}"
-
-
-def cores() -> int:
-    """Return how many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

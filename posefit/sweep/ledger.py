@@ -1,35 +1,32 @@
-"""The ledger: a folder in which every finished cell has its row, whatever happens to those who write to it.
+"""The ledger: one SQLite file in which every cell has a row, whatever happens to the process that writes it.
 
-ledger.json          the format of the folder
-rows/NAME.jsonl      finished rows, one log a driver
-rows/NAME.joints     the joints of the rows' frames
-leases/KEY.n         the nth attempt at a cell: who runs it, or why it failed
-quarantine/KEY.json  a cell that failed three times, and why; without this file it is tried again
-aside/               damaged lines and files; their cells are run again
+    ledger = Ledger("results")            # every .sqlite file of a folder, or files and folders, while they grow, too
+
+Cells are in the table `cells`: key, kind ("track" or "search"), spec (JSON: what was run), status ("planned", "done" or
+"quarantined"), faults (JSON: the reasons of failed attempts), losses (times that something outside ended it), row
+(JSON: the figures) and arrays (an .npz). The view `runs` has what queries ask for most as columns.
+
+One driver writes a file: it holds a transaction open in a second one beside it, FILE.driver, which names its process.
+SQLite and the operating system drop that lock when the process ends in any way.
 """
 
 import io
+import json
 import os
-import re
-import sys
+import socket
+import sqlite3
 import zipfile
-import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
-from posefit.files import create_once
-from posefit.geometry.skeleton import JOINTS as SKELETON_JOINTS
-from posefit.reading import cut, parsed_json, quoted, read_text
-from posefit.sweep.cell import other_version
-from posefit.sweep.log import JOINTS, SUFFIX, decoded, joints_at, lines
-from posefit.sweep.row import checked_quarantined, checked_row
-from posefit.sweep.table import dataframe
+from posefit.geometry.skeleton import JOINTS
+from posefit.reading import cut, quoted
+from posefit.sweep.cell import Cell, CellResult, cell_from, other_version
+from posefit.sweep.row import checked_row
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
@@ -37,235 +34,357 @@ if TYPE_CHECKING:
 
     from posefit.arrays import Array
 
-INDEX = "ledger.json"
-ROWS, LEASES, QUARANTINE, ASIDE = FOLDERS = ("rows", "leases", "quarantine", "aside")
-FORMAT = 1
-MAX_INDEX_BYTES = 10_000
-REASON = 120  # characters of why a row is bad
+FILE, SUFFIX, DRIVER = "ledger.sqlite", ".sqlite", ".driver"
+FORMAT = 1  # the file's user_version
+ATTEMPTS = 3  # that fail by a cell's own fault
+LOSSES = 50  # attempts that something outside ended
+BUSY_SECONDS = 60.0  # to wait for a reader that is in the way
 MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
-VERSION = re.compile(rb'"version": "([^"]*)"')  # in a row
+MAX_VALUE_BYTES = 200_000_000  # of a value in a file
+NAMES = ("key", "spec", "status")  # that a row has beside its figures
+SCHEMA = f"""
+PRAGMA journal_mode = WAL;
+BEGIN;
+CREATE TABLE IF NOT EXISTS cells (
+    key TEXT PRIMARY KEY, kind TEXT NOT NULL, spec TEXT NOT NULL, status TEXT NOT NULL DEFAULT 'planned',
+    faults TEXT NOT NULL DEFAULT '[]', losses INTEGER NOT NULL DEFAULT 0, row TEXT, arrays BLOB);
+CREATE INDEX IF NOT EXISTS by_status ON cells (status);
+CREATE VIEW IF NOT EXISTS runs AS SELECT key, kind, status, faults,
+    json_extract(spec, '$.method') AS method, json_extract(spec, '$.name') AS name,
+    json_extract(spec, '$.settings') AS settings, json_extract(spec, '$.motion') AS motion,
+    json_extract(spec, '$.function') AS function, json_extract(spec, '$.dimension') AS dimension,
+    json_extract(spec, '$.instance') AS instance, json_extract(spec, '$.seed') AS seed,
+    json_extract(row, '$.error_degrees.mean') AS error_degrees, json_extract(row, '$.mpjpe_mm') AS mpjpe_mm,
+    json_extract(row, '$.cost') AS cost, json_extract(row, '$.seconds') AS seconds FROM cells;
+PRAGMA user_version = {FORMAT};
+COMMIT;
+"""
 
 
 class Ledger:
-    """Reads a ledger, also while drivers write to it. Raises ValueError where the folder is no ledger."""
+    """Reads ledgers, also while drivers write to them. Raises InputError where there is none, or a damaged one."""
 
-    def __init__(self, path: str | Path, say: Callable[[str], None] | None = None) -> None:
-        self.path = Path(path)
-        self._say = say or (lambda _: None)
-        _check_format(self.path)
-        self._ends: dict[str, int] = {}  # how far each log was read
-        self._places: dict[str, tuple[str, int]] = {}  # of every finished row: its log, and where in it
-        self._versions: dict[str, str] = {}  # of every finished row
-        self._bad: dict[tuple[str, int], tuple[str, str]] = {}  # of rows that were put aside: the key, and why
-        self.refresh()
-
-    def refresh(self) -> None:
-        """Read what was written since."""
-        logs = self._logs()
-        if any(logs.get(name, -1) < end for name, end in self._ends.items()):
-            self._ends.clear()  # one was cut off or removed: everything is read again
-            self._places.clear()
-            self._versions.clear()
-        aside = set(os.listdir(self.path / ASIDE))
-        for name in sorted(logs):
-            if logs[name] == self._ends.get(name, 0):
-                continue
-            for offset, line in lines(self.path / ROWS / name, self._ends.get(name, 0)):
-                self._ends[name] = offset + len(line)
-                entry = decoded(line)
-                again = aside and _aside_name(name, offset) in aside
-                if (entry is None or again) and self._checked(name, offset, line, entry) is None:
-                    continue
-                assert entry is not None
-                key, row = entry
-                # a row may be there twice, of a lock that a file system did not keep: the first one counts
-                self._places[key] = min((name, offset), self._places.get(key, (name, offset)))
-                version = VERSION.search(row)
-                self._versions[key] = sys.intern(version[1].decode(errors="replace")) if version else ""
+    def __init__(self, *paths: str | Path) -> None:
+        self.path = Path(paths[0])
+        self.files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
+        self._open = [(file, _reader(file)) for file in self.files]
+        # of cells in several files the first finished one counts, or the first
+        self._places: dict[str, tuple[int, bool]] = {}
+        for k in range(len(self._open)):
+            for key, status in self._query(k, "SELECT key, status FROM cells WHERE status != 'planned'"):
+                if key not in self._places or (status == "done" and not self._places[key][1]):
+                    self._places[key] = k, status == "done"
 
     def __len__(self) -> int:
-        return len(self._places)
+        return sum(done for _, done in self._places.values())
 
     def __contains__(self, key: str) -> bool:
-        return key in self._places
+        return self._places.get(key, (0, False))[1]
+
+    @property
+    def changed(self) -> float:
+        """When its latest file was written, in seconds since 1970."""
+        return max(path.stat().st_mtime for file in self.files for path in file.parent.glob(f"{file.name}*"))
 
     @property
     def version(self) -> str:
         """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
-        builds = {version.partition(", ")[0] for version in self._versions.values()} or {posefit_build()}
+        builds = {version.partition(", ")[0] for version in self._versions()} or {posefit_build()}
         return ", ".join(sorted(build.removeprefix("posefit ") for build in builds))
 
     def outdated(self) -> Counter[str]:
         """Return how many rows are of each version of posefit and plugins that is not the one installed."""
-        counts = Counter(self._versions.values())
-        return Counter({one: count for one, count in counts.items() if any(map(other_version, one.split(", ")))})
+        return Counter({one: n for one, n in self._versions().items() if any(map(other_version, one.split(", ")))})
 
-    def bad(self) -> list[str]:
-        """Return of each row that was put aside, and whose cell has no other row: its file, its line, and why."""
-        return [reason for key, reason in self._bad.values() if key and key not in self]
-
-    def in_quarantine(self, key: str) -> bool:
-        """Return whether a cell is in quarantine."""
-        return (self.path / QUARANTINE / f"{key}.json").is_file()
-
-    def quarantined_keys(self) -> set[str]:
-        """Return the keys of all cells in quarantine that have no row."""
-        names = (entry.name.removesuffix(".json") for entry in os.scandir(self.path / QUARANTINE) if entry.is_file())
-        return {name for name in names if name not in self}
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it, in the order of the plans."""
+        return self._rows("done")
 
     def quarantined(self) -> list[dict[str, Any]]:
         """Return the cells in quarantine: key, spec, status, and the reason of each attempt."""
-        paths = sorted((self.path / QUARANTINE).glob("*.json"))
-        read = [self._read_quarantined(path) for path in paths if path.stem not in self]
-        return [cell for cell in read if cell is not None]
-
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it."""
-        for name in sorted(self._logs()):
-            for offset, line in lines(self.path / ROWS / name):
-                entry = decoded(line)
-                if entry is None or self._places.get(entry[0]) != (name, offset):
-                    continue
-                if (row := self._checked(name, offset, line, entry)) is not None:
-                    yield row
-
-    def row(self, key: str) -> dict[str, Any]:
-        """Return the row of a cell. Raises KeyError where there is none, and InputError where it is damaged."""
-        name, offset = self._places[key]
-        with (self.path / ROWS / name).open("rb") as file:
-            file.seek(offset)
-            line = file.readline()
-        row = self._checked(name, offset, line, decoded(line))
-        if row is None or row["key"] != key:
-            raise InputError(f"{self.path / ROWS / name}: the row of cell {key[:8]} must be whole, got a damaged one")
-        return row
+        return list(self._rows("quarantined"))
 
     def all_rows(self) -> Iterator[dict[str, Any]]:
         """Yield every finished row, and then the cells in quarantine."""
         yield from self.rows()
         yield from self.quarantined()
 
+    def row(self, key: str) -> dict[str, Any]:
+        """Return the row of a cell. Raises KeyError where there is none."""
+        if key not in self:
+            raise KeyError(key)
+        k, _ = self._places[key]
+        (values,) = self._query(k, f"{SELECT} WHERE key = ?", key)
+        return self._checked(k, *values)
+
     def joints(self, key: str) -> dict[str, "Array"]:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
-        start, length, checksum = self.row(key)["joints"]
-        path = (self.path / ROWS / self._places[key][0]).with_suffix(JOINTS)
-        data = joints_at(path, start, length)
+        import numpy as np
+
+        k, _ = self._places[key]
         try:
-            if zlib.crc32(data) != checksum:
-                raise ValueError
+            ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                unpacked = sum(one.file_size for one in archive.infolist())
+                unpacked = sum(member.file_size for member in archive.infolist())
             if unpacked <= MAX_JOINTS_BYTES:
                 with np.load(io.BytesIO(data), allow_pickle=False) as stored:
                     joints: dict[str, Any] = {
                         name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")
                     }
-                shapes = {one.shape for one in joints.values() if np.isfinite(one).all()}
-                if len(shapes) == 1 and (shape := shapes.pop())[1:] == (len(SKELETON_JOINTS), 3) and shape[0]:
+                shapes = {array.shape for array in joints.values() if np.isfinite(array).all()}
+                if len(shapes) == 1 and (shape := shapes.pop())[1:] == (len(JOINTS), 3) and shape[0]:
                     return joints
         except Exception:  # whatever a hostile archive raises
             pass
-        raise InputError(f"{path}: the joints of cell {key[:8]} must be whole, got damaged ones")
+        raise InputError(f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones")
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
+        from posefit.sweep.table import dataframe
+
         return dataframe(self.all_rows())
 
-    def _checked(self, name: str, offset: int, line: bytes, entry: tuple[str, bytes] | None) -> dict[str, Any] | None:
-        """Return the row of a line. A bad one counts no longer, and is put aside: its cell is run again."""
+    def close(self) -> None:
+        """Close its files."""
+        for _, database in self._open:
+            database.close()
+
+    def _versions(self) -> Counter[str]:
+        query = "SELECT json_extract(spec, '$.version'), count(*) FROM cells WHERE status = 'done' GROUP BY 1"
+        counts = Counter[str]()
+        for k in range(len(self._open)):
+            counts.update({str(version): count for version, count in self._query(k, query)})
+        return counts
+
+    def _rows(self, status: str) -> Iterator[dict[str, Any]]:
+        for k in range(len(self._open)):
+            for values in self._query(k, f"{SELECT} WHERE status = ? ORDER BY rowid", status):
+                if self._places.get(values[0]) == (k, status == "done"):
+                    yield self._checked(k, *values)
+
+    def _checked(self, k: int, key: Any, spec: Any, status: Any, faults: Any, row: Any) -> dict[str, Any]:
         try:
-            if entry is None:
-                raise InputError("expected a row with its checksum, got a damaged one")
-            return checked_row(*entry)
+            return checked_row(str(key), spec, status, faults, row)
         except ValueError as error:
-            match = re.search(rb'"key": "([0-9a-f]{64})', line)
-            key = match[1].decode() if match else ""
-            reason = cut(str(error), REASON)
-        if self._places.get(key) == (name, offset):
-            del self._places[key], self._versions[key]
-        log = self.path / ROWS / name
-        with log.open("rb") as file:
-            number = 1 + file.read(offset).count(b"\n")
-        where = f"{log} line {number}"
-        if (name, offset) not in self._bad:
-            self._bad[name, offset] = key, f"{ROWS}/{name} line {number}: {reason}"
-            cell = f", the row of cell {key[:8]}," if key else ""
-            self._set_aside(self.path / ASIDE / _aside_name(name, offset), line, f"{where}{cell} is damaged: {reason}")
-        return None
-
-    def _set_aside(self, aside: Path, line: bytes, damage: str) -> None:
-        """Keep a damaged line of a log for a human to look at."""
-        if aside.exists():
-            return
-        try:
-            aside.write_bytes(line)
-        except OSError as error:
-            self._say(f"warning: {damage}; it cannot be put aside: {error.strerror}; it does not count")
-        else:
-            self._say(f"warning: {damage}; put aside as {aside}, to be run again")
-
-    def _logs(self) -> dict[str, int]:
-        sizes = {}
-        for entry in os.scandir(self.path / ROWS):
-            with suppress(FileNotFoundError):  # an empty one that went away
-                if entry.name.endswith(SUFFIX) and entry.is_file():
-                    sizes[entry.name] = entry.stat().st_size
-        return sizes
-
-    def _read_quarantined(self, path: Path) -> dict[str, Any] | None:
-        """Return the content of a file of the quarantine. A damaged one is put aside, and its cell is tried again."""
-        try:
-            if path.is_file():
-                return checked_quarantined(path.stem, path.read_bytes())
-        except FileNotFoundError:  # it is tried again just now
-            return None
-        except (ValueError, OSError):
-            pass
-        try:
-            path.rename(self.path / ASIDE / path.name)
-        except OSError as error:
-            self._say(f"warning: {path} is damaged, and cannot be put aside: {error.strerror}; it does not count")
-        else:
-            self._say(f"warning: {path} is damaged; put aside, its cell is to be run again")
-        return None
-
-
-def _aside_name(log: str, offset: int) -> str:
-    return f"{Path(log).stem}-{offset}.txt"
-
-
-def create(path: Path) -> None:
-    """Make a folder a ledger, if it is none yet. Raises ValueError where it cannot be one."""
-    try:
-        if path.exists() and not path.is_dir():
-            raise InputError(f"{path}: expected a folder for the ledger, got a file")
-        if not (path / INDEX).exists():
-            names = sorted(entry.name for entry in os.scandir(path)) if path.is_dir() else []
-            # another driver may be making the same ledger
-            if strange := [name for name in names if name not in FOLDERS and not name.lstrip(".").startswith(INDEX)]:
-                raise InputError(f"{path}: expected a new folder or a ledger, got one with {strange[0]}")
-            for name in FOLDERS:
-                (path / name).mkdir(parents=True, exist_ok=True)
-            create_once(path / INDEX, {"format": FORMAT})
-    except OSError as error:
-        raise InputError(f"{path}: expected a folder that can be written to, got {error.strerror}") from None
-    _check_format(path)
-
-
-def _check_format(path: Path) -> None:
-    if os.path.isfile(path):
-        raise InputError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got a file")
-    try:
-        form = parsed_json(read_text(path / INDEX, MAX_INDEX_BYTES))["format"]
-    except FileNotFoundError:
-        raise InputError(f"{path}: expected a ledger, a folder that posefit sweep wrote, got none") from None
-    except (ValueError, KeyError, TypeError) as error:
-        reason = str(error).removeprefix(f"{path / INDEX}: ")
-        raise InputError(f"{path / INDEX}: expected the index of a ledger, got {cut(reason)}") from None
-    if form != FORMAT:
-        raise InputError(f"{path}: expected a ledger of format {FORMAT}, got {quoted(form)}")
-    for name in FOLDERS:
-        if not (path / name).is_dir():
+            name = quoted(str(key)[:8])[1:-1]
+            fix = f"sqlite3 {FILE} \"UPDATE cells SET status = 'planned' WHERE key LIKE '{name}%'\""
             raise InputError(
-                f"{path / name}: expected a folder of the ledger, got {'a file' if (path / name).exists() else 'none'}"
-            )
+                f"{self._open[k][0]}: the row of cell {name} must be one that posefit wrote: {cut(str(error))}; "
+                f"to run it again: {fix}"
+            ) from None
+
+    def _query(self, k: int, query: str, *values: Any) -> Iterator[Any]:
+        file, database = self._open[k]
+        try:
+            yield from database.execute(query, values)
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            raise _damaged(file, error) from None
+
+
+SELECT = "SELECT key, spec, status, faults, row FROM cells"
+
+
+class Writer:
+    """Opens one file of a ledger for writing, as its one driver, and creates it where there is none. A context.
+
+    Raises InputError where another process drives it, where it is damaged, or where it cannot be written to.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        _check_place(self.path)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(self.path)
+            self._db = sqlite3.connect(self.path, timeout=BUSY_SECONDS, isolation_level=None)
+        except (OSError, sqlite3.Error) as error:
+            raise _unwritable(self.path, error) from None
+        try:
+            if self.path.stat().st_size:
+                _check_format(self.path, self._db)
+                if (found := self._db.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
+                    raise sqlite3.DatabaseError(found)
+            self._db.executescript(SCHEMA)
+            self._db.execute("PRAGMA synchronous = FULL")  # what is written survives the loss of power
+            self._db.execute("CREATE TEMP TABLE planned (key TEXT PRIMARY KEY)")
+        except sqlite3.Error as error:
+            self.close()
+            damaged = not isinstance(error, sqlite3.OperationalError)
+            raise (_damaged if damaged else _unwritable)(self.path, error) from None
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let others drive it."""
+        for database in (getattr(self, "_db", None), self._lock):
+            if database is not None:
+                database.close()
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Write all that the body does, or nothing. Raises InputError where there is no room."""
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._db.execute("COMMIT")
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+        except sqlite3.OperationalError as error:
+            raise _unwritable(self.path, error) from None
+
+    def plan(self, cells: Iterable[Cell]) -> None:
+        """Add the cells of a plan, which may be there already; `planned` and `counts` are of these."""
+        with self.transaction():
+            for cell in cells:
+                self.add(cell)
+
+    def add(self, cell: Cell) -> None:
+        """Add one cell of a plan."""
+        self._db.execute("INSERT OR IGNORE INTO planned VALUES (?)", [cell.key])
+        self._db.execute(
+            "INSERT INTO cells (key, kind, spec) VALUES (?, ?, ?) ON CONFLICT (key) DO UPDATE "
+            "SET spec = excluded.spec WHERE spec != excluded.spec",
+            [cell.key, cell.kind, json.dumps(cell.spec)],
+        )
+
+    def planned(self) -> list[int]:
+        """Return the places of the plan's cells that are to run, those that failed last."""
+        query = "SELECT cells.rowid FROM planned JOIN cells USING (key) WHERE status = 'planned'"
+        return [
+            place for (place,) in self._db.execute(f"{query} ORDER BY length(faults) > 2 OR losses > 0, cells.rowid")
+        ]
+
+    def counts(self) -> Counter[str]:
+        """Return how many of the plan's cells are planned, done and quarantined."""
+        query = "SELECT status, count(*) FROM planned JOIN cells USING (key) GROUP BY status"
+        return Counter(dict(self._db.execute(query).fetchall()))
+
+    def cell(self, place: int) -> Cell:
+        """Return the cell in a place."""
+        (spec,) = self._db.execute("SELECT spec FROM cells WHERE rowid = ?", [place]).fetchone()
+        return cell_from(json.loads(spec))
+
+    def finish(self, key: str, result: CellResult) -> bool:
+        """Write what a cell measured, and return whether it is the first: of what ran twice the first counts."""
+        row = json.dumps({name: value for name, value in result.row.items() if name not in NAMES}, allow_nan=False)
+        query = "UPDATE cells SET status = 'done', row = ?, arrays = ? WHERE key = ? AND status != 'done'"
+        return self._db.execute(query, [row, result.joints, key]).rowcount == 1
+
+    def fail(self, key: str, reason: str, own: bool = True) -> bool:
+        """Note a failed attempt, and return whether the cell is in quarantine for it."""
+        faults, losses = self._db.execute("SELECT faults, losses FROM cells WHERE key = ?", [key]).fetchone()
+        reasons = [*json.loads(faults), reason] if own else json.loads(faults)
+        losses += not own
+        quarantined = len(reasons) >= ATTEMPTS or losses >= LOSSES
+        if losses >= LOSSES:
+            reasons = [f"something outside ended it {LOSSES} times", reason]
+        self._db.execute(
+            "UPDATE cells SET status = ?, faults = ?, losses = ? WHERE key = ? AND status = 'planned'",
+            ["quarantined" if quarantined else "planned", json.dumps(reasons), losses, key],
+        )
+        return quarantined
+
+    def release_quarantined(self) -> int:
+        """Let the plan's cells out of quarantine, and return how many."""
+        release = "UPDATE cells SET status = 'planned', faults = '[]', losses = 0 WHERE status = 'quarantined'"
+        return self._db.execute(f"{release} AND key IN (SELECT key FROM planned)").rowcount
+
+    def old_specs(self) -> Iterator[Mapping[str, Any]]:
+        """Yield the specs of finished cells."""
+        return (json.loads(spec) for (spec,) in self._db.execute("SELECT spec FROM cells WHERE status = 'done'"))
+
+
+def _files(path: Path) -> list[Path]:
+    """Return a ledger's files: itself, or those of a folder."""
+    if path.is_file():
+        return [path]
+    if (path / "ledger.json").is_file():
+        raise InputError(
+            f"{path}: expected a ledger in SQLite, got one of an older posefit: run its plan in a new folder"
+        )
+    if not (found := sorted(path.glob(f"*{SUFFIX}"))):
+        came = "a folder without one" if path.is_dir() else "none"
+        raise InputError(f"{path}: expected a ledger, a folder or .sqlite file that posefit sweep wrote, got {came}")
+    return found
+
+
+def _reader(file: Path) -> sqlite3.Connection:
+    """Return what reads a file. Where it can be written, too, SQLite removes what it puts beside it."""
+    mode = "rw" if os.access(file.parent, os.W_OK) and os.access(file, os.W_OK) else "ro"
+    mode += "&immutable=1" if mode == "ro" and not Path(f"{file}-wal").exists() else ""
+    try:
+        database = sqlite3.connect(f"{file.absolute().as_uri()}?mode={mode}", uri=True, timeout=BUSY_SECONDS)
+        database.execute("PRAGMA query_only = ON")
+        if hasattr(database, "setlimit"):
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
+        _check_format(file, database)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        raise _damaged(file, error) from None
+    return database
+
+
+def _check_format(file: Path, database: sqlite3.Connection) -> None:
+    """Return nothing. Raises InputError where a file is no ledger of this format."""
+    columns = [row[1] for row in database.execute("PRAGMA table_info(cells)")]
+    kind = database.execute("SELECT type FROM sqlite_master WHERE name = 'cells'").fetchone()
+    if kind != ("table",) or not {"key", "kind", "spec", "status", "faults", "losses", "row", "arrays"} <= {*columns}:
+        raise InputError(f"{file}: expected a ledger that posefit sweep wrote, got another SQLite file")
+    if (form := database.execute("PRAGMA user_version").fetchone()[0]) != FORMAT:
+        raise InputError(f"{file}: expected a ledger of format {FORMAT}, got {form}")
+
+
+def _check_place(path: Path) -> None:
+    """Return nothing. Raises InputError where a folder is no place for a ledger."""
+    folder = path.parent
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: expected a folder for the ledger, got a file")
+    names = [name for name in sorted(os.listdir(folder)) if not name.startswith(".")] if folder.is_dir() else []
+    if names and not any(name.endswith((SUFFIX, DRIVER)) for name in names):
+        if "ledger.json" in names:
+            _files(folder)
+        raise InputError(f"{folder}: expected a new folder or a ledger, got one with {names[0]}")
+
+
+def _locked(path: Path) -> sqlite3.Connection:
+    """Return what says, as long as it is open, that this process drives a file. Raises InputError where one does."""
+    database = sqlite3.connect(f"{path}{DRIVER}", timeout=0.0, isolation_level=None)
+    try:
+        database.execute("BEGIN IMMEDIATE")
+        database.execute("CREATE TABLE IF NOT EXISTS driver (process INTEGER, host TEXT)")
+        database.execute("DELETE FROM driver")
+        database.execute("INSERT INTO driver VALUES (?, ?)", [os.getpid(), socket.gethostname()])
+        database.execute("COMMIT")
+        database.execute("BEGIN IMMEDIATE")
+    except sqlite3.OperationalError as error:
+        if "locked" not in str(error):
+            raise
+        try:
+            process, host = database.execute("SELECT process, host FROM driver").fetchone()
+        except (sqlite3.Error, TypeError):
+            process, host = "another", "this disk"
+        database.close()
+        raise InputError(
+            f"{path}: expected a ledger that no other sweep writes to, got one that process {process} of {host} "
+            "drives; --shard I/N writes to a file of its own"
+        ) from None
+    return database
+
+
+def _damaged(file: Path, error: Exception) -> InputError:
+    what = f"got {cut(str(error))}: take it from a copy, or save what can be read by sqlite3 {file.name} .recover"
+    return InputError(f"{file}: expected a whole SQLite file, {what}")
+
+
+def _unwritable(path: Path, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or error
+    return InputError(f"{path}: expected a file that can be written to, got {cut(str(reason))}")

@@ -25,12 +25,25 @@ if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
 ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
-_TEXTS = ("key", "version", "status", "reason", "method", "motion", "train", "settings", "view_degrees", "corruption")
+_TEXTS = (
+    "key",
+    "version",
+    "status",
+    "reason",
+    "kind",
+    "method",
+    "name",
+    "motion",
+    "train",
+    "settings",
+    "view_degrees",
+    "corruption",
+)
 
 
 def is_search(spec: Mapping[str, Any]) -> bool:
     """Return whether a spec is that of a single search, which has no motion: see `posefit.sweep.plan`."""
-    return "suite" in spec
+    return bool(spec["kind"] == "search")
 
 
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
@@ -65,7 +78,7 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
             "size": "x".join(map(str, spec["size"])),
         }
     for name, value in row.items():
-        if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability", "joints"):
+        if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
             continue
         if name == "joint_errors_mm":
             flat |= {f"{name}.{joint}": error for joint, error in zip(JOINTS, value, strict=True)}
@@ -92,7 +105,7 @@ def search_run(row: Mapping[str, Any]) -> SuiteRun:
     """Return the run of a row of a single search."""
     spec, trace = row["spec"], row["trace"]
     return SuiteRun(
-        **{name: value for name, value in spec.items() if name not in ("evaluations", "version")},
+        **{name: value for name, value in spec.items() if name not in ("kind", "name", "evaluations", "version")},
         budget=spec["evaluations"],
         truth_cost=row["truth_cost"],
         targets=row["truth_cost"] + TARGETS,

@@ -11,7 +11,7 @@ import click
 from posefit.cli import main
 from tests.docs.pages import ROOT
 
-TOOLS = ("bash", "cd", "dask", "ffmpeg", "lint-imports", "mypy", "printf", "ruff", "sphinx-build", "uv")
+TOOLS = ("bash", "cd", "dask", "ffmpeg", "lint-imports", "mypy", "printf", "ruff", "sphinx-build", "uv", "sqlite3")
 
 
 def commands(text: str) -> Iterator[list[str]]:

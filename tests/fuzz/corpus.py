@@ -38,7 +38,6 @@ seeds = [0, 1]
 method = "random@pca"
 motion = "run"
 """
-LEDGER = '{"format": 1, "version": "0.1.0"}'
 
 
 @dataclass(frozen=True)
@@ -82,8 +81,10 @@ def corpus(folder: Path) -> list[Seed]:
     texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
     texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
-    seeds += [Seed(kind, ".jsonl", content) for kind, content in written(folder).items()]
-    return [*seeds, Seed("plan", ".toml", PLAN.encode()), Seed("ledger", ".json", LEDGER.encode())]
+    seeds += [
+        Seed(kind, ".sqlite3" if kind == "ledger" else ".jsonl", content) for kind, content in written(folder).items()
+    ]
+    return [*seeds, Seed("plan", ".toml", PLAN.encode())]
 
 
 def _npz(reader: str, save: Any, **arrays: Any) -> Seed:

@@ -37,7 +37,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit.motion.asf import read_asf
     from posefit.motion.bvh import read_bvh
     from posefit.sweep import plan
-    from posefit.sweep.ledger import FOLDERS, Ledger
     from posefit_priors.full import Full
     from posefit_priors.loose import Loose
     from posefit_priors.pca import PCA
@@ -64,13 +63,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         filmed = Video.of(path)
         return filmed.warnings, [image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)]
 
-    def ledger(path: Path) -> object:
-        room = path.parent / f"{NAME}-ledger"
-        for name in FOLDERS:
-            (room / name).mkdir(parents=True)
-        shutil.copy(path, room / "ledger.json")
-        return Ledger(room)
-
     def prior(kind: Any) -> Callable[[Path], object]:
         def load(path: Path) -> object:
             learned = kind.load(path)
@@ -87,7 +79,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         "calibration": calibration,
         "video": video,
         "plan": plan.Plan.read,
-        "ledger": ledger,
         **written.readers(),
         **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Transformed)},
     }

@@ -1,18 +1,19 @@
-"""What posefit itself wrote and reads back: rows, quarantine, leases and plans of ledgers, and folders to resume."""
+"""What posefit itself wrote and reads back: rows of ledgers and whole ones, and folders to resume."""
 
 import json
 import os
 import re
 import shutil
+import sqlite3
 import zlib
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import numpy as np
 
 from posefit.fitting.tracker import Frame
-from posefit.sweep.log import encoded
+from posefit.sweep.ledger import FILE, NAMES, Writer
 from posefit.tracking.identity import digest_of
 from posefit.tracking.outputs import OutputFolder
 from posefit.uncertainty.modes import Posterior
@@ -21,7 +22,6 @@ from tests.report.searched import cell as search_cell
 from tests.report.searched import search_result
 from tests.sweep.fake import cells
 
-_ROW = re.compile(rb'\{"key": "([0-9a-f]{64})", "crc": "[0-9a-f]{8}", "row": (\{.*\})\}')
 _FRAME = re.compile(rb"[0-9a-f]{8} (.*)")
 SPEC = {"seed": digest_of(1), "method": digest_of("sapso@pca")}
 NAME = "subject"
@@ -29,11 +29,11 @@ NAME = "subject"
 
 def written(folder: Path) -> dict[str, bytes]:
     """Return a valid content for each of `readers`, which need what is left in `folder`."""
-    tracks = [result(cell, 1.0 + k).row for k, cell in enumerate(cells(3))]
-    searches = [search_result(search_cell("sapso", 1, 9, 10_000 + k), 9 + k).row for k in range(3)]
-    logs = [b"".join(encoded(row["key"], {**row, "joints": [0, 0, 0]}) for row in rows) for rows in (tracks, searches)]
-    lost = {**{name: tracks[0][name] for name in ("key", "spec")}, "status": "quarantined", "reasons": ["it had to"]}
-    lease = {"driver": "20260101T000000-00000000", "process": 1, "host": "h", "rows": 0, "failed": "so", "own": True}
+    made = [result(cells(1)[0], 1.0).row, search_result(search_cell("sapso"), 9).row]
+    figures = [{name: value for name, value in row.items() if name not in NAMES} for row in made]
+    with Writer(folder / "seed" / FILE) as ledger:
+        ledger.plan(cells(2))
+        ledger.finish(cells(1)[0].key, result(cells(1)[0], 1.0))
     frame = Frame(
         np.zeros(66), np.zeros(3), 1.0, np.ones((2, 3)), 40, 0.1, np.ones(2), np.ones(9), np.array([20, 40]),
         {"a": np.ones(2), "b": "text"}, 0.1, Posterior(np.zeros((2, 66)), np.zeros((2, 3)), np.ones(2)), (), 0.5, "walk",
@@ -45,49 +45,52 @@ def written(folder: Path) -> dict[str, bytes]:
     (unfinished,) = (folder / "made").iterdir()
     content, mark = ((unfinished / name).read_bytes() for name in ("frames.jsonl", "unfinished.json"))
     return {
-        "rows": logs[0], "searches": logs[1], "quarantine": json.dumps(lost).encode(), "lease": json.dumps(lease).encode(),
+        "rows": lines(made[0]["spec"], figures[0]), "searches": lines(made[1]["spec"], figures[1]),
+        "quarantine": lines(made[0]["spec"], ["it had to"]), "ledger": (folder / "seed" / FILE).read_bytes(),
         "frames": content, "mark": mark,
     }  # fmt: skip
 
 
+def lines(*values: object) -> bytes:
+    """Return values as JSON, one a line."""
+    return "\n".join(map(json.dumps, values)).encode()
+
+
 def mended(content: bytes) -> bytes:
-    """Return content whose lines have right checksums, where they are rows or recorded frames."""
-
-    def row(match: re.Match[bytes]) -> bytes:
-        crc = zlib.crc32(match[1] + match[2])
-        return b'{"key": "%s", "crc": "%08x", "row": %s}' % (match[1], crc, match[2])
-
-    content = _ROW.sub(row, content)
+    """Return content whose lines have right checksums, where they are recorded frames."""
     return _FRAME.sub(lambda match: b"%08x %s" % (zlib.crc32(match[1]), match[1]), content)
 
 
 def readers() -> dict[str, Callable[[Path], object]]:
     """Return what reads each kind of content; all messages must be clean."""
+
     from posefit.report.write import leaderboard_lines, write_report
-    from posefit.sweep.driver import Driver
-    from posefit.sweep.ledger import Ledger, create
+    from posefit.sweep.ledger import Ledger
 
-    def in_ledger(place: str) -> Callable[[Path], object]:
+    def reported(file: Path) -> object:
+        out = file.parent / NAME
+        summary = write_report(str(file), f"{out}.html", warn=checked_message, csv=f"{out}.csv")
+        Ledger(file).frame()
+        return leaderboard_lines(summary)
+
+    def whole(path: Path) -> object:
+        file = path.with_name(f"{NAME}.sqlite")
+        os.replace(path, file)
+        return reported(file)
+
+    def in_ledger(kind: str, status: str) -> Callable[[Path], object]:
         def read(path: Path) -> object:
-            folder = path.parent / f"{NAME}-ledger"
-            create(folder)
-            os.replace(path, folder / place)
-            say = checked_message
-            summary = write_report(folder, f"{folder}.html", warn=say, csv=f"{folder}.csv")
-            Ledger(folder, say).frame()
-            return leaderboard_lines(summary)
-
-        return read
-
-    def in_sweep(place: str) -> Callable[[Path], object]:
-        def read(path: Path) -> object:
-            folder = path.parent / f"{NAME}-ledger"
-            create(folder)
-            cell = cells(1)[0]
-            os.replace(path, folder / place.format(cell.key))
-            with Driver(folder, checked_message) as driver:
-                driver.ledger.quarantined()
-                return driver.lease(cell)
+            """Write the texts of a spec and of a row, or of the reasons of a quarantined cell, into a ledger."""
+            spec, _, row = path.read_bytes().decode(errors="replace").partition("\n")
+            file = path.parent / f"{NAME}-ledger" / FILE
+            with Writer(file):
+                pass
+            with closing(sqlite3.connect(file)) as database, database:
+                values = "a" * 64, kind, spec, status, row if status != "done" else "[]", row
+                database.execute(
+                    "INSERT INTO cells (key, kind, spec, status, faults, row) VALUES (?, ?, ?, ?, ?, ?)", values
+                )
+            return reported(file)
 
         return read
 
@@ -106,10 +109,10 @@ def readers() -> dict[str, Callable[[Path], object]]:
         return read
 
     return {
-        "rows": in_ledger("rows/a.jsonl"),
-        "searches": in_ledger("rows/a.jsonl"),
-        "quarantine": in_ledger(f"quarantine/{cells(1)[0].key}.json"),
-        "lease": in_sweep("leases/{}.1"),
+        "rows": in_ledger("track", "done"),
+        "searches": in_ledger("search", "done"),
+        "quarantine": in_ledger("track", "quarantined"),
+        "ledger": whole,
         "frames": resumed("frames.jsonl"),
         "mark": resumed("unfinished.json"),
     }

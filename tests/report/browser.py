@@ -12,11 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.files import create_once
-from posefit.sweep.cell import CellResult, TrackCell, packed_joints
-from posefit.sweep.driver import Driver
-from posefit.sweep.ledger import QUARANTINE, ROWS
-from posefit.sweep.log import Writer
+from posefit.sweep.cell import CellResult, TrackCell, cell_from, packed_joints
+from posefit.sweep.ledger import FILE, Writer
 
 # what no page may take for markup
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\u2028'\"&"
@@ -113,13 +110,12 @@ def ledger(
     path: Path, results: Iterable[CellResult], failures: list[tuple[TrackCell, list[str]]] | None = None
 ) -> Path:
     """Write a ledger of results and of cells in quarantine with their reasons."""
-    with Driver(path):
-        pass
-    writer = Writer(path / ROWS)
-    for result in results:
-        writer.append(result.row["key"], result.row, result.joints)
-    writer.close()
-    for cell, reasons in failures or []:
-        content = {"key": cell.key, "spec": cell.spec, "status": "quarantined", "reasons": reasons}
-        create_once(path / QUARANTINE / f"{cell.key}.json", content)
+    with Writer(path / FILE) as writer, writer.transaction():
+        for done in results:
+            writer.add(cell_from(done.row["spec"]))
+            writer.finish(done.row["key"], done)
+        for cell, reasons in failures or []:
+            writer.add(cell)
+            lost = "UPDATE cells SET status = 'quarantined', faults = ? WHERE key = ?"
+            writer._db.execute(lost, [json.dumps(reasons), cell.key])
     return path

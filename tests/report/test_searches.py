@@ -15,7 +15,7 @@ from posefit.report.contest import baseline_rows, leaderboard
 from posefit.report.repeat import repeat_command
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.plan import search_cells
+from posefit.sweep.plan import Plan
 from tests.commands import error_of, run
 from tests.report.browser import data_in, ledger, result
 from tests.report.contests import FIRST, contest_in, sentence
@@ -131,7 +131,7 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
 def test_the_command_of_a_search_is_a_plan_of_that_one_cell() -> None:
     search = cell("pso", 7, 24, 3, seed=5, budget=30, infeasible="reject", settings={"population_size": 20})
     plan = repeat_command(search.spec).partition("<<'END'\n")[2].removesuffix("END")
-    (other,) = search_cells(parsed_toml(plan))
+    (other,) = Plan.of(parsed_toml(plan))
     assert other.spec == {**search.spec, "version": other.version}
 
 

@@ -14,8 +14,8 @@ import posefit
 from posefit.errors import InputError
 from posefit.suites.running import run_of, run_on, suite_scores
 from posefit.sweep.cell import run_cell
-from posefit.sweep.ledger import Ledger
-from posefit.sweep.plan import Plan, search_cells
+from posefit.sweep.ledger import FILE, Ledger, Writer
+from posefit.sweep.plan import Plan
 from posefit.sweep.table import search_runs
 from tests.cases import each
 from tests.commands import run
@@ -32,13 +32,10 @@ budgets = [10]
 
 def swept(folder: Path, *plans: str) -> Path:
     """Return a folder, once the cells of plans have run into its ledger."""
-    from posefit.sweep.driver import Driver, Lease
-
-    with Driver(folder) as driver:
-        for cell in [cell for plan in plans for cell in search_cells(tomllib.loads(plan))]:
-            lease = driver.lease(cell)
-            assert isinstance(lease, Lease)
-            driver.finish(lease, run_cell(cell))
+    with Writer(folder / FILE) as ledger:
+        for cell in [cell for plan in plans for cell in Plan.of(tomllib.loads(plan))]:
+            ledger.add(cell)
+            ledger.finish(cell.key, run_cell(cell))
     return folder
 
 
@@ -152,7 +149,7 @@ instances = [3, 4]
 
 
 def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not() -> None:
-    cells = search_cells(tomllib.loads(PLAN))
+    cells = list(Plan.of(tomllib.loads(PLAN)))
     assert {(cell.function, cell.dimension) for cell in cells} == {(1, 9), (1, 24), (7, 24)}
     assert len(cells) == len({cell.key for cell in cells}) == 3 * 2 * 2
     assert {cell.evaluations for cell in cells if cell.dimension == 24} == {240}
@@ -231,7 +228,10 @@ def test_a_mistake_is_one_line_and_status_2(
         ({"motions": ["walk"]}, "a plan of a suite must hold suite, methods, .*, got 'motions'"),
         ({"methods": []}, r"methods must be a list of at least one, got \[\]"),
         ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
-        ({"methods": [{"method": "pso", "seed": 1}]}, "an entry of methods must hold method and settings, got 'seed'"),
+        (
+            {"methods": [{"method": "pso", "seed": 1}]},
+            "an entry of methods must hold method, name, settings, got 'seed'",
+        ),
         ({"methods": [{"method": "pso", "settings": {"particle": 2}}]}, "a setting of pso must be one of"),
         ({"budgets": [4]}, "evaluations must hold one population of 40, got 36 of sapso"),
         ({"seeds": [1, 1]}, "the cells of a plan must differ, got sapso on f1"),

@@ -1,7 +1,7 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR processes|dask CELLS` drives a sweep of such cells; what a cell does follows from its
-`frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
+`python -m tests.sweep.fake DIR pool|dask CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
+does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
 import ctypes
@@ -10,17 +10,18 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from posefit.sweep.cell import CellResult, TrackCell, packed_joints
-from posefit.sweep.engines.engine import Limits, Outcome
+from posefit.sweep.engine import Limits, Outcome
 
 if TYPE_CHECKING:
-    from posefit.sweep.driver import Driver, Lease, Tally
-    from posefit.sweep.engines.engine import Engine
+    from posefit.sweep.drive import Tally
+    from posefit.sweep.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
 SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
@@ -102,10 +103,12 @@ def result(cell: TrackCell) -> CellResult:
 
 def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
     """Return how a sweep ended."""
-    from posefit.sweep.driver import Driver, drive_cells
+    from posefit.sweep.drive import drive
+    from posefit.sweep.ledger import FILE, Writer
 
-    with Driver(out) as driver:
-        return drive_cells(chosen, driver, engine, print)
+    with Writer(out / FILE) as ledger:
+        ledger.plan(chosen)
+        return drive(ledger, engine, print)
 
 
 class Instant:
@@ -133,43 +136,32 @@ def filled(folder: Path, count: int = 5, start: int = 0) -> Path:
     return folder
 
 
-def leased(driver: "Driver", cell: TrackCell) -> "Lease":
-    """Return the lease on a cell that is free."""
-    from posefit.sweep.driver import Lease
-
-    lease = driver.lease(cell)
-    assert isinstance(lease, Lease)
-    return lease
-
-
-def finished(driver: "Driver", cell: TrackCell) -> None:
-    """Lease a cell, and write its row."""
-    driver.finish(leased(driver, cell), result(cell))
-
-
-def failed(driver: "Driver", cell: TrackCell, *reasons: str, own: bool = True) -> None:
-    """Note failed attempts at a cell."""
-    for reason in reasons:
-        driver.fail(leased(driver, cell), reason, own)
-
-
 def starts(path: Path) -> list[tuple[str, int]]:
     """Return key and process of each start that was noted."""
     lines = path.read_text().splitlines() if path.exists() else []
     return [(key, int(process)) for key, process in (line.split() for line in lines)]
 
 
+def bad(seed: int) -> list[TrackCell]:
+    """Return five cells that raise, exit, end their process, want all memory and never end."""
+    kinds = (RAISE, LEAVE, SEGFAULT, HOG, ENDLESS)
+    return [replace(cells(1)[0], seed=seed + k, frames=kind) for k, kind in enumerate(kinds)]
+
+
 def main() -> int:
     """Drive a sweep as the command line says, and return its exit status."""
-    from posefit.sweep.engines.cluster import Cluster
-    from posefit.sweep.engines.processes import Processes
+    from posefit.sweep.cluster import Cluster
+    from posefit.sweep.pool import Pool
     from tests.sweep.fake import behave  # by a name that other processes can import
 
-    where, kind, many = sys.argv[1:4]
-    made: Engine = Processes(2, LIMITS, behave)
+    where, kind, many, seconds = sys.argv[1:5]
+    limits = Limits(float(seconds), 1.0)
+    chosen = cells(int(many), SLOW)
+    made: Engine = Pool(2, limits, behave)
     if kind == "dask":
-        made = Cluster(workers=2, limits=LIMITS, run=behave, patience=300.0)
-    tally = swept(Path(where), cells(int(many), SLOW if len(sys.argv) > 4 else 60), made)
+        made.close()
+        made = Cluster(workers=2, limits=limits, run=behave, patience=300.0)
+    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], made)
     return 1 if tally.quarantined else 130 if tally.stopped else 0
 
 

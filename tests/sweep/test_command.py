@@ -6,12 +6,10 @@ from pathlib import Path
 import pytest
 
 from posefit.sweep.command import duration_text
-from posefit.sweep.driver import Driver
-from posefit.sweep.ledger import Ledger
+from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.sweep.fake import failed
 
 PLAN = """
 [defaults]
@@ -111,7 +109,7 @@ def test_a_preview_of_many_cells_fits_a_screen_however_many_kinds_fail(plan: Pat
     assert motion.split(maxsplit=1) == ["motion", "5,400 x walk"]
     assert seed.endswith(", 6 x 10, 6 x 11, and 888 other values")
     assert len(warnings) == 6
-    assert warnings[-1] == "warning: the same holds of 1 other kind; --json has each"
+    assert warnings[-1] == "warning: the same holds of 1 other method; --json has each"
     assert last.startswith("5,400 cells, 5,400 of them to run, ")
 
 
@@ -119,11 +117,13 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
     plan.write_text('[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nframes = 1\nevaluations = 80\n')
     words, out = ["sweep", plan, "--out", tmp_path / "out", "--workers", 1], tmp_path / "out"
     (cell,) = Plan.read(plan)
-    with Driver(out) as driver:
-        failed(driver, cell, *["the disk of its files was away"] * 3)
+    with Writer(out / FILE) as ledger:
+        ledger.plan([cell])
+        for _ in range(3):
+            ledger.fail(cell.key, "the disk of its files was away")
     lost = run(*words)
     assert lost.exit_code == 1
-    assert f"written to {out}; 1 quarantined: the reasons are in {out}" in lost.stdout
+    assert f"written to {out}; 1 quarantined: posefit report names the reasons" in lost.stdout
     again = run(*words, "--retry-quarantined")
     assert again.exit_code == 0, again.stderr
     assert "1 of 1 cells done, 1 of them now" in again.stdout
@@ -137,12 +137,13 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
         (["PLAN", "--out", "OUT", "--workers", "0"], "--workers must be at least 1, got 0"),
         (["PLAN", "--out", "OUT", "--dask-local", "-1"], "--dask-local must be at least 1, got -1"),
         (["PLAN", "--out", "OUT", "--workers", "1", "--dask-local", "1"], "--workers must not be given with --dask-local"),
-        (["PLAN", "--out", "OUT", "--dask-dashboard"], "--dask-dashboard must be given with --dask-local"),
+        (["PLAN", "--out", "OUT", "--shard", "3/2"], "--shard must be I/N such as 2/8, got 3/2"),
+        (["PLAN", "--out", "OUT", "--shard", "2"], "--shard must be I/N such as 2/8, got 2"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must lie in 0.001 to 1e+08, got 0.0"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "inf"], "the limit of seconds must lie in 0.001 to 1e+08, got inf"),
         (["PLAN", "--out", "OUT", "--cell-gigabytes", "1e30"], "limit of gigabytes must lie in 0.001 to 1e+06, got 1e+30"),
-        (["BAD", "--out", "OUT"], "bad.toml: defaults must be of"),
-        (["BAD", "--out", "OUT", "--dry-run"], "bad.toml: defaults must be of"),
+        (["BAD", "--out", "OUT"], "bad.toml: defaults must hold"),
+        (["BAD", "--out", "OUT", "--dry-run"], "bad.toml: defaults must hold"),
     ],
 )  # fmt: skip
 def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str, plan: Path, tmp_path: Path) -> None:

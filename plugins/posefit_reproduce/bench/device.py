@@ -12,7 +12,7 @@ from posefit.fitting.optimiser import minimise
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import areas
 from posefit.silhouette.cuda.device import check_device, moved_to
-from posefit.sweep.command import cores
+from posefit.sweep.pool import cores
 from posefit_reproduce.bench.experiment import seen_at
 from posefit_reproduce.bench.kernel import bench_problem, fastest, processor
 from posefit_swarm.sapso import SAPSO

@@ -14,7 +14,7 @@ from posefit.fitting.problem import PoseProblem
 from posefit.geometry.camera import Camera
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.mask import Silhouette
-from posefit.sweep.command import cores
+from posefit.sweep.pool import cores
 from posefit_reproduce.bench.environments import vector_env
 from posefit_reproduce.bench.kernel import SIZE, bench_problem, fastest, opencv_costs, processor
 from posefit_reproduce.bench.optimisers import OURS, PARTICLES, optimiser_us, wide_space

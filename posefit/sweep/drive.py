@@ -1,0 +1,95 @@
+"""Drives a sweep: has an engine run the cells of a ledger that are planned, and writes what becomes of them.
+
+Three attempts that fail by the cell's own fault put it into quarantine. One that was ended from outside is no fault of
+the cell: it is tried again after all others, and only fifty of these put it into quarantine.
+"""
+
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from posefit.errors import InputError
+from posefit.sweep.engine import POLL_SECONDS, Engine
+from posefit.sweep.ledger import Writer
+
+
+@dataclass
+class Tally:
+    """How a sweep stands."""
+
+    cells: int
+    done: int = 0  # cells with a row
+    ran: int = 0  # of these, cells that this driver ran
+    failed: int = 0  # attempts of this driver that failed
+    quarantined: int = 0
+    stopped: bool = False  # by the user
+
+
+def drive(
+    ledger: Writer, engine: Engine, say: Callable[[str], None], watch: Callable[[Tally], None] = lambda _: None
+) -> Tally:
+    """Return how a sweep ended: with all planned cells done or quarantined, or stopped. `watch` is called at changes.
+
+    Raises InputError where the ledger cannot be written to or the engine is gone; rows that were finished are safe.
+    """
+    counts = ledger.counts()
+    tally = Tally(counts.total(), counts["done"], quarantined=counts["quarantined"])
+    watch(tally)
+    waiting, running = deque(ledger.planned()), dict[str, int]()  # the place of each cell that runs, by its key
+    try:
+        with _stopping(say) as wishes:
+            while len(wishes) < 2 and (running or (waiting and not wishes)):
+                while waiting and not wishes and len(running) < engine.window():
+                    place = waiting.popleft()
+                    cell = ledger.cell(place)
+                    running[cell.key] = place
+                    engine.submit(cell)
+                if not (outcomes := engine.wait(POLL_SECONDS)):
+                    continue
+                with ledger.transaction():
+                    for outcome in outcomes:
+                        key = outcome.job.key
+                        place = running.pop(key)
+                        if outcome.result is not None:
+                            tally.ran += 1
+                            tally.done += ledger.finish(key, outcome.result)
+                        elif outcome.reason is None:
+                            waiting.append(place)
+                        else:
+                            tally.failed += 1
+                            if ledger.fail(key, outcome.reason, outcome.own):
+                                tally.quarantined += 1
+                            else:
+                                waiting.append(place)
+                watch(tally)
+            tally.stopped = bool(waiting or running)
+    except InputError as error:
+        safe = f"{tally.done} of {tally.cells} cells are done and safe: the same command goes on from there"
+        raise InputError(f"{error}; {safe}") from error
+    finally:
+        engine.close()
+    return tally
+
+
+@contextmanager
+def _stopping(say: Callable[[str], None]) -> Iterator[list[int]]:
+    """Yield wishes to stop, which come by Ctrl-C, twice for at once, or by SIGTERM; in the main thread alone."""
+    wishes: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield wishes
+        return
+
+    def stop(number: int, _: object) -> None:
+        wishes.extend([number] * (2 if number == signal.SIGTERM else 1))
+        if len(wishes) == 1:
+            say("finishing the cells that run; Ctrl-C once more stops at once")
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield wishes
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,145 @@
+"""Runs cells, or other jobs, in processes of this machine, by pebble: whatever a job does ends with its process."""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any, Generic
+
+import cloudpickle
+from pebble import ProcessExpired, ProcessFuture, ProcessPool
+
+from posefit.errors import InputError
+from posefit.limits import end_with_parent, memory
+from posefit.sweep.engine import J, Limits, Outcome, R, single_thread, text_of
+
+START_SECONDS = 60.0  # that a process may take to begin a job
+LEFT = 64  # the status of a process that a job ended with 0
+# Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
+# out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
+OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2}
+
+
+class Pool(Generic[J, R]):
+    """An engine of so many worker processes, each of which calls `prepare` first."""
+
+    def __init__(
+        self, workers: int, limits: Limits, run: Callable[[J], R], prepare: Callable[[], object] | None = None
+    ) -> None:
+        if workers < 1:
+            raise InputError(f"workers must be at least 1, got {workers}")
+        self._workers, self._limits = workers, limits
+        self._run, self._prepare = cloudpickle.dumps(run), cloudpickle.dumps(prepare)
+        self._running: dict[ProcessFuture[bytes], tuple[J, float]] = {}
+        self._start()
+
+    def window(self) -> int:
+        """Return how many processes there are."""
+        return self._workers
+
+    def submit(self, job: J) -> None:
+        """Start a job in an idle process."""
+        arguments = self._run, cloudpickle.dumps(job), self._limits.gigabytes
+        future = self._pool.schedule(_call, args=arguments, timeout=self._limits.seconds)
+        self._running[future] = job, time.monotonic()
+
+    def wait(self, seconds: float) -> list[Outcome[J, R]]:
+        """Return the jobs that ended."""
+        done = wait(self._running, seconds, FIRST_COMPLETED).done
+        outcomes = [self._outcome(future) for future in tuple(self._running) if future in done]
+        late = time.monotonic() - START_SECONDS
+        stuck = any(start < late and not future.running() for future, (_, start) in self._running.items())
+        if stuck or not self._pool.active:  # a worker died while it took a job from the others' queue
+            outcomes += [Outcome(job) for job, _ in self._running.values()]
+            self._running.clear()
+            self.close()
+            self._start()
+        return outcomes
+
+    def close(self) -> None:
+        """End all processes."""
+        self._pool.stop()  # type: ignore[no-untyped-call]
+        self._pool.join()
+
+    def _start(self) -> None:
+        arguments = os.getpid(), sys.path, self._prepare
+        self._pool = ProcessPool(self._workers, initializer=_become_worker, initargs=arguments, context=_Context())
+
+    def _outcome(self, future: "ProcessFuture[bytes]") -> Outcome[J, R]:
+        job, _ = self._running.pop(future)
+        try:
+            return Outcome(job, *pickle.loads(future.result()))
+        except TimeoutError:
+            return Outcome(job, None, self._limits.overtime)
+        except ProcessExpired as error:
+            code = error.exitcode or 0
+            if code >= 0:
+                return Outcome(job, None, f"its process ended itself with status {code % LEFT}")
+            name = next((number.name for number in signal.Signals if number == -code), f"signal {-code}")
+            return Outcome(job, None, f"its process died of {name}", own=-code not in OUTSIDE)
+        except (BrokenProcessPool, CancelledError):
+            return Outcome(job)
+        except Exception as error:  # a result that cannot be read
+            return Outcome(job, None, text_of(error))
+
+
+class _Process(SpawnProcess):
+    """A process that imports what it runs, but not the script that started it, which may compare without a guard."""
+
+    @staticmethod
+    def _Popen(process: Any) -> Any:  # noqa: N802
+        main = sys.modules["__main__"]
+        before = {name: getattr(main, name, None) for name in ("__file__", "__spec__")}
+        try:
+            for name in before:
+                setattr(main, name, None)
+            return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
+        finally:
+            for name, value in before.items():
+                setattr(main, name, value)
+
+
+class _Context(SpawnContext):
+    Process = _Process
+
+
+def _become_worker(parent: int, path: list[str], prepare: bytes) -> None:
+    """Make this process a worker: one thread, deaf to Ctrl-C, which is the driver's, and ended with its parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # so that a kill from outside looks like one
+    with suppress(AttributeError):  # a group of its own: what a terminal or a script sends to the driver is not for it
+        os.setpgid(0, 0)
+    sys.path[:] = path
+    leave = os._exit
+    os._exit = lambda status: leave(status or LEFT)  # pebble takes a process that ends with 0 for one that may
+    single_thread()
+    end_with_parent(parent)
+    if (called := pickle.loads(prepare)) is not None:
+        called()
+
+
+def _call(run: bytes, job: bytes, gigabytes: float) -> bytes:
+    """Return, pickled, what a function makes of a job; or None, and why."""
+    too_large = Limits(gigabytes=gigabytes).too_large
+    ending: tuple[Any, str | None]
+    try:
+        with memory(gigabytes):
+            ending = pickle.loads(run)(pickle.loads(job)), None
+        return cloudpickle.dumps(ending)  # type: ignore[no-any-return]
+    except MemoryError:
+        ending = None, too_large
+    except BaseException as error:  # an exit too: it is the cell's, and ends nothing else
+        ending = None, text_of(error)
+    return pickle.dumps(ending)
+
+
+def cores() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else multiprocessing.cpu_count()

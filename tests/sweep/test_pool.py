@@ -1,0 +1,255 @@
+"""What a cell can do wrong ends with that cell, in processes of this machine and on Dask's workers."""
+
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from posefit.sweep.cell import TIMES, TrackCell, run_cell
+from posefit.sweep.command import swept as sweep
+from posefit.sweep.drive import Tally, drive
+from posefit.sweep.engine import Engine, EngineError, Limits, Outcome
+from posefit.sweep.ledger import ATTEMPTS, FILE, Ledger, Writer
+from posefit.sweep.plan import Plan
+from posefit.sweep.pool import Pool
+from tests.sweep import fake
+from tests.sweep.fake import behave, cells, swept
+
+LIMITS = Limits(seconds=300.0, gigabytes=0.6)  # a slow machine takes seconds to start a worker
+PATIENCE = 300.0  # seconds for workers to come; these tests mean something else
+ROOT = Path(__file__).parents[2]
+Make = Callable[..., Engine]
+
+
+def cluster(*address: str, workers: int | None = None, limits: Limits = LIMITS, patience: float = PATIENCE) -> Any:
+    """Return an engine of Dask workers: those of a scheduler at an address, or so many of its own."""
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
+
+    return Cluster(*address, workers=workers, limits=limits, run=behave, patience=patience)
+
+
+@pytest.fixture(params=["pool", pytest.param("dask", marks=pytest.mark.slow)])
+def make(request: pytest.FixtureRequest) -> Make:
+    """Return what makes an engine of so many workers."""
+    if request.param == "pool":
+        return lambda workers, limits=LIMITS: Pool(workers, limits, behave)
+    return lambda workers, limits=LIMITS: cluster(workers=workers, limits=limits)
+
+
+def one_by_one(engine: Engine, chosen: Sequence[TrackCell]) -> list[Outcome[Any, Any]]:
+    """Return what becomes of cells, each of which begins when the one before has ended."""
+    outcomes: list[Outcome[Any, Any]] = []
+    with closing(engine):
+        engine.window()
+        for cell in chosen:
+            engine.submit(cell)
+            while not (ended := engine.wait(1.0)):
+                pass
+            outcomes += ended
+    return outcomes
+
+
+def test_exceptions_exits_and_limits_of_memory_and_time_are_the_cells_own_faults(make: Make) -> None:
+    reasons = {
+        fake.RAISE: "ZeroDivisionError: one by none",
+        fake.EXIT: "SystemExit: 0",
+        fake.HOG: "it wanted more memory than its limit of 0.6 GB",
+        fake.ENDLESS: "it ran past its limit of 5 s",
+    }
+    ended = one_by_one(make(1, Limits(5.0, 0.6)), [replace(cells(1)[0], frames=n) for n in reasons])
+    assert [(outcome.reason, outcome.own) for outcome in ended] == [(reason, True) for reason in reasons.values()]
+
+
+def test_a_process_that_ends_itself_or_dies_of_its_cell_is_noticed_at_once_and_a_kill_costs_no_attempt() -> None:
+    bad = [replace(cells(1)[0], frames=n) for n in (fake.LEAVE, fake.SEGFAULT)]
+    ended = one_by_one(Pool(1, Limits(3600.0, 0.6), behave), [*bad, *cells(2, fake.KILLED)])
+    assert [(outcome.reason, outcome.own) for outcome in ended] == [
+        ("its process ended itself with status 0", True),
+        ("its process died of SIGSEGV", True),
+        ("its process died of SIGKILL", False),
+        ("its process died of SIGTERM", False),
+    ]
+
+
+@pytest.mark.slow
+def test_a_cell_that_ends_a_dask_worker_is_tried_again_after_the_others(tmp_path: Path) -> None:
+    (outcome,) = one_by_one(cluster(workers=1), [replace(cells(1)[0], frames=fake.LEAVE)])
+    assert (outcome.result, outcome.reason, outcome.own) == (None, "its worker was lost", False)
+
+
+def test_a_bad_cell_is_quarantined_after_three_attempts_and_tried_again_where_that_is_asked(tmp_path: Path) -> None:
+    bad = [replace(cells(1)[0], frames=fake.RAISE)]
+    folder = tmp_path / "results"
+    tally = swept(folder, [*bad, *cells(3)], Pool(1, LIMITS, behave))
+    assert (tally.done, tally.quarantined, tally.failed) == (3, 1, ATTEMPTS)
+    assert Ledger(folder).quarantined()[0]["reasons"] == ["ZeroDivisionError: one by none"] * 3
+    assert swept(folder, bad, Pool(1, LIMITS, behave)).failed == 0
+    again = sweep(bad, folder, Pool(1, LIMITS, behave), print, retry_quarantined=True)  # type: ignore[arg-type]
+    assert again.failed == 3
+
+
+def test_two_workers_run_two_cells_at_once(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # each of the two ends once both have begun
+    monkeypatch.setenv(fake.STARTS, str(tmp_path / "starts"))
+    tally = swept(tmp_path / "results", cells(2, fake.TOGETHER), make(2))
+    assert (tally.done, tally.failed) == (2, 0)
+    assert len({worker for _, worker in fake.starts(tmp_path / "starts")}) == 2
+
+
+def test_where_numba_is_loaded_already_a_worker_leaves_its_number_of_threads_alone() -> None:
+    code = """
+import os
+os.environ["NUMBA_NUM_THREADS"] = "2"
+import numba
+from tests.sweep.fake import compiled
+compiled()
+from posefit.sweep.engine import single_thread
+single_thread()
+assert os.environ["NUMBA_NUM_THREADS"] == "2", os.environ["NUMBA_NUM_THREADS"]
+assert compiled() == 1
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def test_a_script_may_compare_without_a_guard(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import numpy as np\n"
+        "import posefit\n\n"
+        "class Middle:\n"
+        "    def __init__(self, space, rng):\n        self.dimensions = space.dimensions\n"
+        "    def ask(self):\n        return np.zeros((1, self.dimensions))\n"
+        "    def tell(self, proposals, costs):\n        pass\n\n"
+        "result = posefit.compare([Middle, {'method': Middle, 'name': 'again', 'settings': {'pca.components': 4}}],\n"
+        "    seeds=1, frames=1, size=(80, 60), evaluations=2, workers=1)\n"
+        "print(result.tally.done, [row['spec']['method'] for row in result.ledger.rows()])\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout == "2 ['Middle@pca', 'Middle@pca']\n", done.stderr
+
+
+PRODUCT = {
+    "methods": ["sapso@pca", "cma@pca", "particle@full"], "motions": ["walk"], "corruptions": [{}, {"dropped": 0.5}],
+    "views": [[0, 90]], "seeds": 2,
+}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
+
+    plan = Plan.of({"defaults": {"frames": 3, "size": [80, 60], "evaluations": 200, "instance": 1}, "product": PRODUCT})
+
+    def rows_in(folder: Path) -> Any:
+        ledger = Ledger(folder)
+        rows = {row["key"]: {name: row[name] for name in row if name not in TIMES} for row in ledger.rows()}
+        return rows, {key: {k: v.tobytes() for k, v in ledger.joints(key).items()} for key in rows}
+
+    assert sweep(plan, tmp_path / "one", Pool(2, Limits(), run_cell), print).done == len(plan)
+    for shard in ("2/3", "1/3", "3/3"):
+        sweep(plan, tmp_path / "shards", Pool(1, Limits(), run_cell), print, shard=shard)
+    names = sorted(path.name for path in (tmp_path / "shards").glob("*.sqlite"))
+    assert names == [f"ledger-{k}-of-3.sqlite" for k in (1, 2, 3)]
+    assert swept(tmp_path / "dask", list(plan)[::-1], Cluster(workers=2, patience=PATIENCE)).done == len(plan)  # type: ignore[arg-type]
+    first = rows_in(tmp_path / "one")
+    assert len(first[0]) == len(plan)
+    assert rows_in(tmp_path / "shards") == rows_in(tmp_path / "dask") == first
+
+
+@pytest.mark.slow
+def test_workers_of_this_machine_run_nothing_for_who_has_no_certificate() -> None:
+    distributed = pytest.importorskip("distributed")
+    with closing(cluster(workers=1)) as engine:
+        engine.window()
+        address = engine._local.scheduler_address
+        assert address.startswith("tls://127.0.0.1:")
+        worker = next(iter(engine._client.nthreads()))
+        for target in (address, worker):
+            place = target.partition("://")[2]
+            for strange, security in (
+                (f"tcp://{place}", None),
+                (f"tls://{place}", distributed.Security.temporary()),  # a certificate of another authority
+            ):
+                with pytest.raises((OSError, TimeoutError)):
+                    distributed.Client(strange, security=security, timeout=2.0, set_as_default=False)
+
+
+def port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+class Served:
+    """A Dask scheduler at an address, with one worker; it can go away and come back."""
+
+    def __init__(self) -> None:
+        self._port = port()
+        self.address = f"tcp://127.0.0.1:{self._port}"
+        self._started: list[subprocess.Popen[bytes]] = []
+
+    def come(self) -> None:
+        for words in (
+            ["dask_scheduler", "--port", str(self._port), "--host", "127.0.0.1", "--no-dashboard", "--no-show"],
+            ["dask_worker", self.address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "300"],
+        ):
+            command = [sys.executable, "-m", f"distributed.cli.{words[0]}", *words[1:]]
+            quiet = subprocess.DEVNULL
+            self._started.append(subprocess.Popen(command, stdout=quiet, stderr=quiet, cwd=ROOT, env={**os.environ}))
+
+    def go(self) -> None:
+        while self._started:
+            process = self._started.pop()
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    pytest.importorskip("distributed")
+    scheduler = Served()
+    scheduler.come()
+    yield scheduler
+    scheduler.go()
+
+
+def test_a_scheduler_that_is_not_there_is_named() -> None:
+    address = f"tcp://127.0.0.1:{port()}"
+    with pytest.raises(EngineError, match=f"scheduler must be one that answers, got {address}"):
+        cluster(address, patience=1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("returns", [False, True])
+def test_a_scheduler_that_goes_away_leaves_all_rows_and_one_that_comes_back_is_waited_for(
+    served: Served, returns: bool, tmp_path: Path
+) -> None:
+    engine = cluster(served.address)
+    assert engine.window() == 1
+    engine._patience = PATIENCE if returns else 1.0
+    gone = []
+
+    def watch(tally: Tally) -> None:
+        if tally.done == 3 and not gone:
+            gone.append(True)
+            served.go()
+            if returns:
+                served.come()
+
+    with Writer(tmp_path / "results" / FILE) as ledger:
+        ledger.plan(cells(10))
+        if returns:
+            assert drive(ledger, engine, print, watch).done == 10
+        else:
+            with pytest.raises(ValueError, match=r"127.*; \d+ of 10 cells are done and safe: the same command goes on"):
+                drive(ledger, engine, print, watch)
+    assert swept(tmp_path / "results", cells(10), Pool(2, LIMITS, behave)).done == 10
