@@ -307,7 +307,7 @@ def distinct(names: Sequence[str], details: Sequence[Mapping[str, str]]) -> tupl
 
 def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
     """Return the fields whose values are not the same in all mappings, with the short names of these fields."""
-    fields = dict.fromkeys(field for values in several for field in values)
+    fields = dict.fromkeys(field for values in sorted(several, key=len, reverse=True) for field in values)
     differ = [field for field in fields if len({values.get(field) for values in several}) > 1]
     plain = [field.rpartition(".")[2] for field in differ]
     return {field: short if plain.count(short) == 1 else field for field, short in zip(differ, plain, strict=True)}

@@ -78,10 +78,10 @@ def _certainty(contest: Contest, others: Sequence[Row]) -> list[str]:
 
     def effect(row: Row) -> str:
         """Return by how much a method is behind, with the interval and the p."""
-        low, high = (f"{row[end]:+.{digits}f}" for end in ("behind_low", "behind_high"))
+        low, high = (f"{row[end]:+z.{digits}f}" for end in ("behind_low", "behind_high"))
         ends = f", {low} to {high}" if np.isfinite(row["behind_low"]) else ""
         p = "p < 0.001" if row["p"] < 0.001 else f"p = {row['p']:.2g}"
-        behind = f"{row['behind']:+.{digits}f}{points}{ends}".replace("-", "−")
+        behind = f"{row['behind']:+z.{digits}f}{points}{ends}".replace("-", "−")
         return f"{row['name']} ({behind}, {p})"
 
     # the least p, after Holm, that so few blocks can give the first of so many pairs: m 2 / 2^n

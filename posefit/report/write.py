@@ -84,7 +84,7 @@ def _board_lines(report: dict[str, Any]) -> list[str]:
     score, digits = ("reached", 1) if "reached" in board[0] else ("error", 2)
 
     def number(name: str, digits: int, factor: float = 1.0) -> Callable[[dict[str, Any]], str]:
-        return lambda row: "-" if row.get(name) is None else f"{factor * row[name]:.{digits}f}"
+        return lambda row: "-" if row.get(name) is None else f"{factor * row[name]:z.{digits}f}"
 
     def interval(row: dict[str, Any]) -> str:
         return "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"

@@ -26,7 +26,10 @@ function comparison() {
     : "Tests need two methods that share at least two runs.";
   const columns = [
     methodColumn("other"),
-    column("median difference °", "difference", twoDigits, { about: "Below 0 the chosen method is better" }),
+    column("median difference °", "difference", twoDigits, {
+      about: "Below 0 the chosen method is better",
+      down: true,
+    }),
     intervalColumn("Of the median, from six runs on", "difference", 2, () => "–", ["from", "to"]),
     column("p", "p", probability),
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
@@ -39,7 +42,7 @@ function comparison() {
   ];
   const show = (m) => {
     const duels = P?.methods.includes(m) ? duelsOf(m) : [];
-    if (duels.length) table($("pairs"), columns, duels, { name: "Paired tests", by: 1 });
+    if (duels.length) table($("pairs"), columns, duels, { name: "Paired tests", by: 1, down: true });
     else $("pairs").replaceChildren();
     against(m);
   };

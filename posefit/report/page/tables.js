@@ -113,7 +113,7 @@ function leaderboard() {
     textColumn("method", name, method),
     figure(score),
     intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : "–")),
-    column(`behind${points}`, "behind", (value) => number(value, digits), {
+    column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), {
       about: `The median of the differences from the leader in paired ${paired}`,
     }),
     column("p", "p", probability, { about: "Of that difference: Wilcoxon's signed ranks, after Holm over all pairs" }),
