@@ -49,8 +49,8 @@ def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
     ]
     runs = read(tmp_path, *(result(replace(SAPSO, settings=s), 1.0 + k) for k, s in enumerate(several)))
     assert runs.methods == (
-        "sapso@pca (sapso.seed 1, pca.seed 2, cooling 0.9)",
-        "sapso@pca (sapso.seed 1, pca.seed 2)",
+        "sapso@pca (pca.seed 2, cooling 0.9, sapso.seed 1)",
+        "sapso@pca (pca.seed 2, sapso.seed 1)",
         "sapso@pca (pca.seed 3)",
     )
 

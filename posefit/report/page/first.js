@@ -9,10 +9,10 @@ function firstScreen() {
   const bases = D.baselines.filter((row) => given(row[D.score.name]));
   const notes = [caption];
   if (rows.some((row) => given(row.p)))
-    notes.push("Beside a name: how far it is behind the leader, the median of paired runs, with its 95 % interval.");
+    notes.push("Beside a name: how far it is behind the leader, the median of paired runs, with its 95 % interval and p.");
   if (!rows.some((row) => given(row.low))) notes.push(alone);
   if (!bases.length) notes.push(baseless);
-  if (rows.length > MAX_METHODS) notes.push(`${whole(rows.length - MAX_METHODS)} more methods are in the table.`);
+  if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
   $("standing-note").textContent = notes.join(" ");
   const lines = bases.map((row) => ({ ...row, name: D.baseline_names[row.baseline] }));
   lines.sort((a, b) => a[D.score.name] - b[D.score.name]);
