@@ -112,7 +112,7 @@ def suite_table(ledger: str, iohprofiler: str | None, coco: str | None, as_json:
     check_free(iohprofiler)
     check_free(coco)
     results = Ledger(ledger)
-    runs = list(search_runs(results))
+    runs = list(search_runs(results.rows(), results.path))
     if failed := len(results.quarantined()):
         say(f"{counted(failed, 'cell')} failed, left out of all figures")
     if coco is not None:

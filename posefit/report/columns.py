@@ -4,16 +4,39 @@ Label, unit, digits and meaning of a track's figures come from `posefit.tracking
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from scipy.stats import trim_mean
+
+from posefit.arrays import Array
+from posefit.statistics.intervals import TRIMMED
 from posefit.tracking.measures import BASELINES, MEASURES, Measure
 from posefit.uncertainty.calibration import LEVELS
 
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)  # of intervals, as rows have them
 TABLE_LEVEL = "80"  # the interval that tables show
 _SYMBOLS = {"degrees": "°"}  # of units, where there is little room
+
+
+def interquartile_mean(values: Array) -> float | None:
+    """Return the interquartile mean of the finite values; None if there is none."""
+    finite = values[np.isfinite(values)]
+    return float(trim_mean(finite, TRIMMED)) if len(finite) else None
+
+
+def mean(values: Array) -> float | None:
+    """Return the mean of the finite values; None if there is none."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else None
+
+
+def median(values: Array) -> float | None:
+    """Return the median of the finite values; None if there is none."""
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else None
 
 
 @dataclass(frozen=True)
@@ -28,7 +51,7 @@ class Column:
     higher_is_better: bool = False
     in_tables: bool = True
     optional: bool = False  # only methods with an uncertainty have it: tables show it if some row has it
-    share: bool = False  # of frames or joints: a method's value is the plain mean over its runs
+    average: Callable[[Array], float | None] = interquartile_mean  # of a method's runs; of shares the mean
 
     def value(self, row: Mapping[str, Any]) -> float:
         """Return the figure of a row, nan where it has none."""
@@ -81,7 +104,7 @@ def _interval_columns() -> list[Column]:
         width = replace(MEASURES["interval_mm"], label=f"{level} % interval")
         more: dict[str, Any] = {"optional": True, "in_tables": level == TABLE_LEVEL}
         columns += [
-            Column(f"coverage_{level}", coverage, ("coverage", level), higher_is_better=True, share=True, **more),
+            Column(f"coverage_{level}", coverage, ("coverage", level), higher_is_better=True, average=mean, **more),
             Column(f"interval_{level}", width, ("interval_mm", level), **more),
         ]
     return columns
@@ -98,9 +121,9 @@ COLUMNS = {
     for column in (
         Column("error", MEASURES["error_degrees"], ("error_degrees", "mean")),
         *(Column(f"skill_{name}", _skill(name), ("skill", name), higher_is_better=True) for name in BASELINES),
-        Column("lost", _share("lost_rate"), ("lost_rate",), share=True),
-        Column("swapped", _share("swap_rate"), ("swap_rate",), share=True),
-        Column("unknown", _share("unknown_rate"), ("unknown_rate",), optional=True, share=True),
+        Column("lost", _share("lost_rate"), ("lost_rate",), average=mean),
+        Column("swapped", _share("swap_rate"), ("swap_rate",), average=mean),
+        Column("unknown", _share("unknown_rate"), ("unknown_rate",), optional=True, average=mean),
         *_interval_columns(),
         Column("mpjpe", MEASURES["mpjpe_mm"], ("mpjpe_mm",)),
         Column("pa_mpjpe", MEASURES["pa_mpjpe_mm"], ("pa_mpjpe_mm",), in_tables=False),
@@ -123,6 +146,43 @@ TABLE_FIGURES = tuple(name for name, column in COLUMNS.items() if column.in_tabl
 _REACHED = Measure("reached", "targets", "%", 1, "Share of all runs and targets that were reached")
 _ABOVE = Measure("above", "above", "", 2, "Median of the best costs above the true pose's")
 SEARCH_COLUMNS = {
-    "reached": Column("reached", _REACHED, (), higher_is_better=True),
-    "above": Column("above", _ABOVE, ()),
+    "reached": Column("reached", _REACHED, (), higher_is_better=True, average=mean),
+    "above": Column("above", _ABOVE, (), average=median),
+}
+
+TRACK_SCORE: dict[str, Any] = {  # the figure by which methods are ordered, and the texts that depend on it
+    "name": "error",
+    "label": "Errors in degrees",
+    "axis": "error in degrees",
+    "unit": "°",
+    "points": "°",  # of differences
+    "digits": 2,
+    "better": "less",
+    "alone": "One seed, or fewer than eight runs of a method, give no interval.",
+    "paired": "runs",
+    "caption": "Interquartile mean of a method's errors with its 95 % interval; dashed lines are baselines.",
+    "leaderboard": "Each figure is the interquartile mean of a method's runs; shares of frames and joints are means. "
+    "Skill is 1 − error / baseline, of the errors in this table: 0 is no better than the baseline, which uses the true "
+    "root and translation. ",
+    "baseless": "",
+    "curves": "",
+}
+SEARCH_SCORE: dict[str, Any] = {
+    "name": "reached",
+    "label": "Shares of targets reached in per cent",
+    "axis": "share of targets reached",
+    "unit": " %",
+    "points": " points",
+    "digits": 1,
+    "better": "more",
+    "alone": "One instance of a function says nothing about others: there are no intervals.",
+    "baseless": "There is no baseline, for the plan has no random search.",
+    "paired": "instances",
+    "caption": "Share of all runs and targets that a method reached.",
+    "leaderboard": "Shares of targets are means over all runs and targets. Above is the median of the best costs above "
+    "the true pose's. ",
+    "curves": "The share of all runs and targets that a method has reached after so many evaluations for each "
+    "dimension of the problem, all dimensions together: the empirical distribution of running times. A higher curve "
+    "reaches more targets in the same time. The scale is the same for every function. "
+    "Intervals are those that other instances would give.",
 }

@@ -2,15 +2,14 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, SIDES
+from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
-from posefit.motion.built_in import average_skeleton
 from posefit.reading import counted
 from posefit.report import curves
 from posefit.report.animations import animations_of
@@ -27,12 +26,8 @@ from posefit.report.contest import (
 )
 from posefit.report.page import COLOURS
 from posefit.report.runs import Runs, damage, views
-from posefit.report.summary import (
-    leader_sentence,
-    not_worse,
-    three_tracks,
-    unpaired_sentence,
-)
+from posefit.report.summary import leader_sentences, three_tracks, unpaired_sentence
+from posefit.statistics.intervals import RESAMPLES
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SHOWN
@@ -44,101 +39,75 @@ MAX_SEEDS = 50  # that the facts list
 FEW_RUNS = 20  # of a method, below which intervals are called wide
 POINTS = max(curves.POINTS, len(JOINTS))  # at which very many runs are drawn by some of them
 
-_NOT_WORSE = "Methods in bold are not shown to be worse than the best one."
-TRACK_SCORE = {  # what the first figure shows of methods, and the texts of the page that depend on it
-    "name": "error",
-    "label": "Errors in degrees",
-    "axis": "error in degrees",
-    "unit": "°",
-    "digits": 2,
-    "better": "less",
-    "alone": "one seed",  # in place of an interval
-    "paired": "runs",
-    "caption": "Interquartile mean of a method's errors with its 95 % interval; dashed lines are baselines. "
-    f"{_NOT_WORSE}",
-    "leaderboard": "Each figure is the interquartile mean of a method's runs; shares of frames and joints are means. "
-    "Skill is 1 − error / baseline: 0 is no better than the baseline, which uses the true root and translation. ",
-    "curves": "",
-}
-SEARCH_SCORE = {
-    "name": "reached",
-    "label": "Shares of targets reached in per cent",
-    "axis": "share of targets reached",
-    "unit": " %",
-    "digits": 1,
-    "better": "more",
-    "alone": "one instance",
-    "paired": "instances",
-    "leaderboard": "Shares of targets are means over all runs and targets. Above is the median of the best costs above "
-    "the true pose's. ",
-    "curves": "The share of all runs and targets that a method has reached after so many evaluations for each "
-    "dimension of the problem, all dimensions together: the empirical distribution of running times. A higher curve "
-    "reaches more targets in the same time. The scale is the same for every function. "
-    "Intervals are those that other instances would give.",
-}
-
 
 def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs."""
     contest = contest_of(runs)
-    data: dict[str, Any] = {"sections": []}
     answer = "Every cell failed." if runs.failures else "No run has an error yet: there is nothing to compare."
+    data: dict[str, Any] = {"answer": [answer]}
     if contest is not None:
-        board = leaderboard(contest)
-        baselines = baseline_rows(contest, board)
-        tests = paired_tests(contest) if contest.testable else None
-        answer = leader_sentence(contest, board, baselines, tests)
-        data |= {
-            "answer": answer,
-            "not_worse": not_worse(tests, board[0]["method"]),
+        board, baselines = leaderboard(contest), baseline_rows(contest)
+        data = {
+            "answer": leader_sentences(contest, board, baselines),
             "leaderboard": board,
             "baselines": baselines,
-            "pairs": tests,
             "taking_part": contest.methods,
-            **(_search_curves(contest) if runs.is_search else _track_curves(contest, board[0]["method"])),
         }
     changed = time.localtime(ledger.changed)
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
-    data |= {
-        "title": "Report of single searches" if runs.is_search else "Report of a sweep",
-        "headline": answer,
+    leader = data["leaderboard"][0]["method"] if contest else 0
+    part = _searches(runs, contest) if runs.is_search else _tracks(ledger, runs, contest, leader, warn)
+    summary = f"{len(runs):,} {part.pop('kind')} by {counted(len(runs.methods), 'method')} on {part.pop('on')}"
+    notes = [*_notes(runs, contest), *part.pop("notes", [])]
+    sections = [name for name, known in part.pop("sections").items() if known]
+    return {
+        **data,
         "made": f"{ledger.path.resolve().name}, {time.strftime('%d %B %Y', changed)}",
-        "header": _header(runs, contest),
+        "header": _header(runs, contest, summary, part.pop("facts"), notes),
         "methods": [{"name": name, **fields} for name, fields in zip(runs.methods, runs.variants, strict=True)],
         "joints": [place.replace("_", " ") for place in PLACES],
         "parents": PARENTS,
-        "rest": np.round(average_skeleton().joints(np.zeros(ANGLES))[:, :2], 3).tolist(),  # (27, 2) from in front
         "sides": SIDES,
         "colours": COLOURS,
+        "columns": {name: runs.columns[name].as_dict() for name in part.pop("figures")},
+        "score": runs.score,
         "warnings": warnings,
         "warned": {row: [warnings.index(text) for text in texts] for row, texts in runs.warnings.items()},
         "failures": runs.failures,
-        **(_searches(runs, data) if runs.is_search else _tracks(ledger, runs, data, warn)),
+        **part,
+        "sections": sections + (["failures"] if runs.failures else []),
     }
-    return data | {"sections": [*data["sections"], *(["failures"] if runs.failures else [])]}
 
 
-def _tracks(ledger: Ledger, runs: Runs, data: dict[str, Any], warn: Callable[[str], None]) -> dict[str, Any]:
-    """Return the rows of tracks, their animations, and the sections of the page."""
-    needed = {"joints": "joint_errors", "certainty": "certainty"}  # for these sections
-    compared = ["leaderboard", "comparison", "curves", "joints", "certainty"] if "answer" in data else []
+def _tracks(
+    ledger: Ledger, runs: Runs, contest: Contest | None, leader: int, warn: Callable[[str], None]
+) -> dict[str, Any]:
+    """Return what the page has of tracks: the rows, their animations, and the sections."""
+    curves_data = {} if contest is None else _track_curves(contest, leader)
     baselines = {name: _by_instance(runs, f"baseline_{name}") for name in BASELINES}
     rows = {name: getattr(runs, name) for name in ("method", "instance", "head", "seed")}
     rows |= {name: np.round(runs.figures[name], COLUMNS[name].stored_digits) for name in runs.table_figures}
     return {
-        "sections": [name for name in compared if name not in needed or data[needed[name]]]
-        + (["gallery", "author", "rows"] if runs.methods else []),
+        "title": "Report of a sweep",
+        "kind": "tracks",
+        "on": f"{counted(len(runs.instances), 'instance')} of {counted(len(_all(runs, 'motion')), 'motion')}",
+        "facts": _track_facts(runs),
+        "figures": runs.table_figures,
+        "sections": {
+            **dict.fromkeys(("leaderboard", "comparison", "curves"), contest is not None),
+            **{"joints": curves_data.get("joint_errors"), "certainty": curves_data.get("certainty")},
+            **dict.fromkeys(("gallery", "rows"), bool(runs.methods)),
+        },
         "instances": [
             {"name": name, "number": _exact(place["instance"]), **{base: means[i] for base, means in baselines.items()}}
             for i, (name, place) in enumerate(zip(runs.instances, runs.places, strict=True))
         ],
-        "columns": {name: COLUMNS[name].as_dict() for name in runs.table_figures},
         "baseline_names": BASELINES,
-        "score": TRACK_SCORE,
         "rows": {**rows, "key": [key[:8] for key in runs.keys]},
         "seeds": [_exact(seed) for seed in runs.seeds],
         "heads": runs.heads,
-        "animations": animations_of(ledger, runs, warn, first=[row for _, row in data.get("examples", [])]),
+        "animations": animations_of(ledger, runs, warn, first=[row for _, row in curves_data.get("examples", [])]),
+        **curves_data,
     }
 
 
@@ -154,12 +123,13 @@ def _track_curves(contest: Contest, leader: int) -> dict[str, Any]:
     }
     shares = [{"values": values} for values in curves.reached(drawn, evaluations)]
     title = "Targets reached, of all runs and 51 costs an instance"
+    charts = [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]
     return {
+        "notes": _track_notes(contest),
+        "pairs": paired_tests(contest),
         "examples": three_tracks(contest, leader),
         "evaluations": evaluations,
-        "charts": [convergence, _shares_chart("ecdf", title, "evaluations of a frame", shares, 1)]
-        if len(evaluations)
-        else [],
+        "charts": charts if len(evaluations) else [],
         "joint_errors": [vars(errors) for errors in curves.joint_errors(drawn)],
         "certainty": curves.certainty(contest),
     }
@@ -177,17 +147,32 @@ def _shares_chart(chart_id: str, title: str, under: str, series: Sequence[Any], 
     }
 
 
-def _search_curves(contest: Contest) -> dict[str, Any]:
+def _searches(runs: Runs, contest: Contest | None) -> dict[str, Any]:
+    """Return what the page has of single searches: curves, running times, and the sections."""
+    functions, problems = _all(runs, "function"), {(place["function"], place["instance"]) for place in runs.places}
+    part: dict[str, Any] = {
+        "title": "Report of single searches",
+        "kind": "searches",
+        "on": f"{counted(len(functions), 'function')}, {counted(len(problems), 'instance')}",
+        "facts": _search_facts(runs),
+        "figures": list(SEARCH_COLUMNS),
+        "sections": {},
+        "instances": [{"name": name} for name in runs.instances],
+        "baseline_names": {RANDOM: "random search"},
+    }
+    if contest is None:
+        return part
     evaluations = curves.search_grid(contest)
     charts = curves.search_curves(contest, evaluations)
-    most = min(1.0, 1.1 * max(0.05, *(float(one.values[-1]) for _, shares in charts for one in shares)))
+    most = min(1.0, 1.1 * max(0.05, *(float(series.values[-1]) for _, shares in charts for series in shares)))
     under = "evaluations for each dimension"
     return {
-        "sections": ["leaderboard", "curves", *(["by-function"] if len(charts) > 1 else []), "times"],
+        **part,
+        "sections": {"leaderboard": True, "curves": True, "by-function": len(charts) > 1, "times": True},
         "by_function": function_shares(contest),
         "evaluations": evaluations,
         "charts": [
-            _shares_chart(f"chart-{k}", title, under, [vars(one) for one in shares], most)
+            _shares_chart(f"chart-{k}", title, under, [vars(series) for series in shares], most)
             for k, (title, shares) in enumerate(charts)
         ],
         "above": SHOWN,
@@ -195,36 +180,15 @@ def _search_curves(contest: Contest) -> dict[str, Any]:
     }
 
 
-def _searches(runs: Runs, data: dict[str, Any]) -> dict[str, Any]:
-    interval = "; one instance of a function says nothing about others, so there are no intervals."
-    if any(row["low"] is not None and np.isfinite(row["low"]) for row in data.get("leaderboard", [])):
-        interval = " with the 95 % interval that other instances would give."
-    baseline = "There is no baseline, for the plan has no random search."
-    if data.get("baselines"):
-        baseline = "The dashed line is random search."
-    caption = f"Share of all runs and targets that a method reached{interval} {baseline} {_NOT_WORSE}"
-    return {
-        "instances": [{"name": name} for name in runs.instances],
-        "columns": {name: column.as_dict() for name, column in SEARCH_COLUMNS.items()},
-        "baseline_names": {RANDOM: "random search"},
-        "score": {**SEARCH_SCORE, "caption": caption},
-    }
-
-
-def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
+def _header(
+    runs: Runs, contest: Contest | None, summary: str, facts: Mapping[str, Any], notes: list[str]
+) -> dict[str, Any]:
     failed = f"{counted(len(runs.failures), 'cell')} failed" if runs.failures else "no cell failed"
-    if runs.is_search:
-        functions, problems = _all(runs, "function"), {(place["function"], place["instance"]) for place in runs.places}
-        kind, on = "searches", f"{counted(len(functions), 'function')}, {counted(len(problems), 'instance')}"
-    else:
-        motions = counted(len(_all(runs, "motion")), "motion")
-        kind, on = "tracks", f"{counted(len(runs.instances), 'instance')} of {motions}"
-    facts = _search_facts(runs) if runs.is_search else _track_facts(runs)
     return {
         "version": runs.version,
-        "summary": f"{len(runs):,} {kind} by {counted(len(runs.methods), 'method')} on {on}; {failed}.",
+        "summary": f"{summary}; {failed}.",
         "facts": [[name, text if isinstance(text, str) else "; ".join(map(str, text))] for name, text in facts.items()],
-        "notes": _notes(runs, contest),
+        "notes": notes,
         "done": len(runs),
         "failed": len(runs.failures),
         "failed_by": Counter(failure["method"] for failure in runs.failures),
@@ -283,7 +247,7 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
     if contest is None:
         notes.append("No run has an error: nothing can be compared.")
     else:
-        (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
+        (_, instances, seeds), size = contest.rows.shape, contest.rows.size
         if size < len(runs):
             each = f"{counted(instances, 'instance')} with {counted(seeds, 'seed')} each"
             notes.append(f"Methods are compared on the {size:,} of {len(runs):,} runs that all of them share: {each}.")
@@ -293,22 +257,26 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
                 f"Too few runs in common with the others, so not compared: {'; '.join(apart)}. "
                 "Their rows of the leaderboard use their own runs."
             )
-        if not runs.is_search:
-            if seeds == 1:
-                notes.append("One seed says nothing about others: there are no intervals.")
-            elif size / methods < FEW_RUNS:
-                notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
-            if resamples(size) < 2000:
-                notes.append(f"So many runs have {resamples(size)} bootstrap resamples instead of 2,000.")
-            drawn = contest.fewer(POINTS).rows.shape
-            if drawn[1] * drawn[2] < instances * seeds:
-                notes.append(f"Curves and joints use {drawn[1]:,} instances with {drawn[2]:,} seeds each, not all.")
-    if len(_of_methods(runs, "budget" if runs.is_search else "evaluations")) > 1:
+    if len({fields.get("budget", fields.get("evaluations")) for fields in runs.variants}) > 1:
         notes.append("Budgets differ: compare methods of one budget only, as a longer search has lower costs.")
-    if runs.is_search and len(_of_methods(runs, "infeasible")) > 1:
+    if len({fields.get("infeasible") for fields in runs.variants}) > 1:
         notes.append("Infeasible proposals are treated differently: compare methods that treat them in the same way.")
     if len(_of_methods(runs, "version")) > 1:
         notes.append("Commands run rows again if the same versions are installed.")
+    return notes
+
+
+def _track_notes(contest: Contest) -> list[str]:
+    """Return what limits the figures of tracks."""
+    (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
+    notes = []
+    if seeds > 1 and size / methods < FEW_RUNS:
+        notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
+    if resamples(size) < RESAMPLES:
+        notes.append(f"So many runs have {resamples(size)} bootstrap resamples instead of {RESAMPLES:,}.")
+    drawn = contest.fewer(POINTS).rows.shape
+    if drawn[1] * drawn[2] < instances * seeds:
+        notes.append(f"Curves and joints use {drawn[1]:,} instances with {drawn[2]:,} seeds each, not all.")
     return notes
 
 

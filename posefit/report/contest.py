@@ -1,21 +1,23 @@
 """The methods of a sweep compared on the runs that they share."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import trim_mean
 
 from posefit.arrays import Array
-from posefit.report.columns import COLUMNS
+from posefit.fitting.metrics import skill
+from posefit.report.columns import interquartile_mean, mean
 from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
-from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, TRIMMED, iqm_intervals
+from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, iqm_intervals
 from posefit.statistics.means import mean_interval
 from posefit.statistics.pairing import Shared, most_shared
-from posefit.statistics.ranks import LEVEL, compact_letters, friedman, wilcoxon
+from posefit.statistics.ranks import LEVEL, Comparison, compact_letters, wilcoxon
 from posefit.suites.functions import suite_function
 from posefit.tracking.measures import BASELINES
 
@@ -58,6 +60,11 @@ class Contest(Shared):
         """Whether there are methods and blocks enough for a paired test."""
         return bool(min(self.tested_errors().shape[:2]) > 1)
 
+    @cached_property
+    def comparisons(self) -> list[Comparison]:
+        """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
+        return wilcoxon(self.tested_errors()) if self.testable else []
+
     def fewer(self, points: int) -> Self:
         """Return the contest on so few seeds and instances that intervals at so many points are little work.
 
@@ -88,37 +95,31 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for each method, best first; those that do not take part come last, with their own runs.
 
     Of tracks, figures are interquartile means, and the error has an interval; shares of frames or joints are plain
-    means, as most runs lose none. Of single searches, `reached` is a mean over runs and targets with its interval,
-    and `above` a median. Methods that share one of their `letters` do not differ significantly.
+    means, as most runs lose none, and `lost_tracks` counts those that lose any. A skill is 1 - the row's error / the
+    baseline's on the same runs. Of single searches, `reached` is a mean over runs and targets with its interval, and
+    `above` a median. `behind` is the median difference from the leader in paired runs with its interval, `p` is
+    Wilcoxon's after Holm. Methods that share one of their `letters` do not differ significantly.
     """
-    runs = contest.runs
+    runs, score = contest.runs, contest.runs.score
     ends = _search_intervals(contest) if runs.is_search else _error_intervals(contest)
+    baselines = {} if runs.is_search else {row["baseline"]: row["error"] for row in baseline_rows(contest)}
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
-        own = shared_rows(contest, m)
-        row: dict[str, Any] = {
-            "method": m,
-            "name": name,
-            "runs": len(own),
-            "failed": runs.failed[m],
-            "taking_part": m in contest.methods,
-            "low": None,
-            "high": None,
-        }
-        if runs.is_search:
-            row |= {
-                "reached": mean(runs.figures["reached"][own]),
-                "above": float(np.median(runs.figures["above"][own])),
-            }
-        else:
-            for share, average in ((False, interquartile_mean), (True, mean)):
-                row |= {
-                    name: average(runs.figures[name][own]) for name, column in COLUMNS.items() if column.share == share
-                }
+        own, taking_part = shared_rows(contest, m), m in contest.methods
+        row: dict[str, Any] = {"method": m, "name": name, "runs": len(own), "failed": runs.failed[m]}
+        row |= {"taking_part": taking_part, "low": None, "high": None}
+        row |= {figure: column.average(runs.figures[figure][own]) for figure, column in runs.columns.items()}
+        for baseline, shared in baselines.items():
+            row[f"skill_{baseline}"] = _skill(row["error"], shared if taking_part else row[f"baseline_{baseline}"])
+        if "lost" in runs.figures:
+            row["lost_tracks"] = int((runs.figures["lost"][own] > 0.0).sum())
         board.append({**row, **ends.get(m, {})})
-    board.sort(key=_rank)
-    letters = _letters(contest, [row["method"] for row in board if row["taking_part"]])
-    return [{**row, "letters": letters.get(row["method"], "")} for row in board]
+    sign, figure = -1.0 if score["better"] == "more" else 1.0, score["name"]
+    worst = [math.inf if row[figure] is None else sign * row[figure] for row in board]
+    board.sort(key=lambda row: (not row["taking_part"], worst[row["method"]], row.get("above", 0.0)))
+    best_first = [row["method"] for row in board if row["taking_part"]]
+    letters, duels = _letters(contest, best_first), _duels(contest, best_first[0])
+    return [{**row, **duels[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
 
 
 def shared_rows(contest: Contest, method: int) -> NDArray[np.int64]:
@@ -163,40 +164,47 @@ def function_shares(contest: Contest) -> list[dict[str, Any]]:
     ]
 
 
-def _rank(row: dict[str, Any]) -> tuple[Any, ...]:
-    if "reached" in row:
-        return not row["taking_part"], -row["reached"], row["above"], row["name"]
-    return not row["taking_part"], np.inf if row["error"] is None else row["error"]
-
-
 def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
     """Return the letters of each method that takes part; none where too few runs are shared for any test."""
-    if not contest.testable:
-        return {}
-    errors = contest.tested_errors()[[contest.methods.index(m) for m in best_first]]
-    different = [(pair.first, pair.second) for pair in wilcoxon(errors) if pair.adjusted < LEVEL]
-    return dict(zip(best_first, compact_letters(len(best_first), different), strict=True))
+    places = [best_first.index(m) for m in contest.methods]
+    different = [(places[pair.first], places[pair.second]) for pair in contest.comparisons if pair.adjusted < LEVEL]
+    return dict(zip(best_first, compact_letters(len(best_first), different), strict=True)) if contest.testable else {}
 
 
-def baseline_rows(contest: Contest, board: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
+    """Return how far each method is behind the leader, with the p of the difference; None where there is no test."""
+    place, names = contest.methods.index(leader), ("behind", "behind_low", "behind_high", "p")
+    duels: dict[int, dict[str, float | None]] = {m: dict.fromkeys(names) for m in range(len(contest.runs.methods))}
+    for pair in contest.comparisons:
+        if place == pair.first:
+            values = -pair.difference, -pair.high, -pair.low, pair.adjusted
+            duels[contest.methods[pair.second]] = dict(zip(names, values, strict=True))
+        elif place == pair.second:
+            values = pair.difference, pair.low, pair.high, pair.adjusted
+            duels[contest.methods[pair.first]] = dict(zip(names, values, strict=True))
+    return duels
+
+
+def baseline_rows(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for each baseline, on the same runs as the methods.
 
-    Of single searches it is random search, if a method of the leaderboard `board` is it: the best of its variants.
+    Of single searches it is random search, if a method that takes part is it: the best of its variants.
     """
     if contest.runs.is_search:
-        random = [row["reached"] for row in board if row["taking_part"] and is_random(contest.runs, row["method"])]
-        return [{"baseline": RANDOM, "reached": max(random)}] if random else []
-    rows = []
+        shares = contest.of("reached")
+        random = [mean(shares[k]) for k, m in enumerate(contest.methods) if is_random(contest.runs, m)]
+        return [{"baseline": RANDOM, "reached": max(filter(None, random), default=0.0)}] if random else []
     # of each the means (instances, seeds) over the methods that have a value
     values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
-    errors = {name: np.asarray(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
-    for name, own in errors.items():
-        row: dict[str, Any] = {"baseline": name, "error": interquartile_mean(own)}
-        for other, theirs in errors.items():
-            ratio = np.divide(own, theirs, out=np.full(own.shape, np.nan), where=theirs > 0.0)
-            row[f"skill_{other}"] = interquartile_mean(1.0 - ratio)
-        rows.append(row)
-    return rows
+    errors = {name: interquartile_mean(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
+    return [
+        {"baseline": name, "error": error, **{f"skill_{other}": _skill(error, errors[other]) for other in BASELINES}}
+        for name, error in errors.items()
+    ]
+
+
+def _skill(error: float | None, baseline: float | None) -> float | None:
+    return None if error is None or baseline is None else skill(error, baseline)
 
 
 def is_random(runs: Runs, method: int) -> bool:
@@ -204,21 +212,18 @@ def is_random(runs: Runs, method: int) -> bool:
     return bool(runs.variants[method]["method"] == RANDOM)
 
 
-def paired_tests(contest: Contest) -> dict[str, Any]:
-    """Return the paired tests of a contest of at least two methods and blocks.
+def paired_tests(contest: Contest) -> dict[str, Any] | None:
+    """Return the paired tests of a contest of tracks; None where there are not two methods and two blocks.
 
-    `pairs` lists first, second, median difference of errors, p, and p after Holm: a difference below 0 is in favour of
-    the first. Of tracks there are also mean ranks, and each pair has the probability that the first is better than
-    the second, and the ends of its interval, nan where that is not cheap. Tests and ranks use all `blocks`, the
-    probabilities equally many seeds of every instance.
+    `pairs` lists first, second, median difference of errors and its interval, p, p after Holm, and the probability that
+    the first is better than the second with its interval, nan where that is not cheap: a difference below 0 is in
+    favour of the first. Tests use all `blocks`, the probabilities equally many seeds of every instance.
     """
-    tested = contest.tested_errors()
-    pairs = [list(astuple(comparison)) for comparison in wilcoxon(tested)]
-    tests = {"methods": contest.methods, "blocks": tested[0].size, "pairs": pairs}
-    if contest.runs.is_search:
-        return tests
+    if not contest.testable:
+        return None
     errors, rng = contest.of("error"), np.random.default_rng(BOOTSTRAP_SEED)
-    ranking, better = friedman(tested), probability_of_improvement(errors)
+    pairs = [list(astuple(comparison)) for comparison in contest.comparisons]
+    better = probability_of_improvement(errors)
     count = int(min(WORK / (errors[0].size * errors.shape[2] * len(pairs)), RESAMPLES))
     bounded = errors.shape[2] >= MIN_SEEDS and count >= MIN_RESAMPLES
     for pair in pairs:
@@ -227,22 +232,4 @@ def paired_tests(contest: Contest) -> dict[str, Any]:
         if bounded:
             ends = improvement_interval(errors[first], errors[second], rng, resamples=count)[1:]
         pair += [better[first, second], *ends]
-    return {
-        **tests,
-        "ranks": ranking.mean_ranks,
-        "friedman": ranking.p_value,
-        "critical_difference": ranking.critical_difference,
-        "cliques": ranking.cliques,
-    }
-
-
-def interquartile_mean(values: Array) -> float | None:
-    """Return the interquartile mean of the finite values; None if there is none."""
-    finite = values[np.isfinite(values)]
-    return float(trim_mean(finite, TRIMMED)) if len(finite) else None
-
-
-def mean(values: Array) -> float | None:
-    """Return the mean of the finite values; None if there is none."""
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if len(finite) else None
+    return {"methods": contest.methods, "blocks": contest.tested_errors()[0].size, "pairs": pairs}

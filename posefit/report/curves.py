@@ -6,8 +6,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
-from posefit.report.columns import LEVEL_NAMES
-from posefit.report.contest import BOOTSTRAP_SEED, Contest, mean, resamples, shared_rows
+from posefit.report.columns import LEVEL_NAMES, mean
+from posefit.report.contest import BOOTSTRAP_SEED, Contest, resamples, shared_rows
 from posefit.report.runs import Runs
 from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.means import mean_intervals

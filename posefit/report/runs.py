@@ -14,11 +14,19 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
-from posefit.report.columns import COLUMNS, FIGURES, TABLE_FIGURES
+from posefit.report.columns import (
+    COLUMNS,
+    FIGURES,
+    SEARCH_COLUMNS,
+    SEARCH_SCORE,
+    TABLE_FIGURES,
+    TRACK_SCORE,
+    Column,
+)
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
 from posefit.statistics.profiles import hits
 from posefit.suites.running import SuiteRun
-from posefit.sweep.cell import settings_text
+from posefit.sweep.cell import setting_text, settings_text
 from posefit.sweep.table import is_search, search_run
 from posefit.uncertainty.calibration import BINS
 
@@ -67,8 +75,18 @@ class Runs:
         return len(self.keys)
 
     @property
+    def score(self) -> dict[str, Any]:
+        """The figure by which methods are ordered, and the texts that depend on it."""
+        return SEARCH_SCORE if self.is_search else TRACK_SCORE
+
+    @property
+    def columns(self) -> dict[str, Column]:
+        """All figures of a row."""
+        return SEARCH_COLUMNS if self.is_search else COLUMNS
+
+    @property
     def table_figures(self) -> list[str]:
-        """The figures that tables show: optional ones only if a row has them."""
+        """The figures of a track that tables show: optional ones only if a row has them."""
         return [
             name for name in TABLE_FIGURES if not COLUMNS[name].optional or bool(np.isfinite(self.figures[name]).any())
         ]
@@ -218,14 +236,14 @@ def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
     return {name: spec[name] for name in _METHOD_FIELDS}
 
 
-def _variation(variant: Mapping[str, Any]) -> list[str]:
-    """Return the words that may distinguish a method from others of the same name."""
-    if "budget" in variant:
-        words = [f"{variant['budget']:g} evaluations for each dimension", f"infeasible: {variant['infeasible']}"]
-    else:
-        count = variant["hypotheses"]
-        words = [f"{variant['evaluations']} evaluations", f"{count} {'hypothesis' if count == 1 else 'hypotheses'}"]
-    return [*settings_text(variant["settings"]), *words, *variant["version"].split(", ")]
+def _variation(variant: Mapping[str, Any]) -> dict[str, str]:
+    """Return what may distinguish a method from others of the same name: values by the names of what is chosen."""
+    chosen = {name: setting_text(value) for name, value in variant["settings"].items()}
+    for name in ("evaluations", "budget", "hypotheses", "infeasible"):
+        if name in variant:
+            chosen[name] = variant[name] if isinstance(variant[name], str) else f"{variant[name]:g}"
+    posefit, *plugins = variant["version"].split(", ")
+    return {**chosen, "posefit": posefit, **{name: version for name, _, version in (p.partition(" ") for p in plugins)}}
 
 
 def _place(spec: Mapping[str, Any]) -> dict[str, Any]:
@@ -259,27 +277,38 @@ def _place_name(place: Mapping[str, Any]) -> str:
     return ", ".join([f"{place['motion']}, view {directions}", *damage(place), f"instance {place['instance']}"])
 
 
-def _place_details(place: Mapping[str, Any]) -> list[str]:
+def _place_details(place: Mapping[str, Any]) -> dict[str, str]:
     fields = _PROBLEM_FIELDS[:3] if "suite" in place else _NAMED_FIELDS
-    return [f"{name} {_text(value)}" for name, value in place.items() if name not in fields]
+    return {name: _text(value).strip('"') for name, value in place.items() if name not in fields}
 
 
-def distinct(names: Sequence[str], details: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """Return names; those that occur twice have the details added that differ."""
-    by_name: dict[str, list[Sequence[str]]] = {}
-    for name, words in zip(names, details, strict=True):
-        by_name.setdefault(name, []).append(words)
-    common = {name: set(several[0]).intersection(*several[1:]) for name, several in by_name.items()}
-    longer = [
-        ", ".join([name, *(word for word in words if word not in common[name])])
-        for name, words in zip(names, details, strict=True)
-    ]
+def distinct(names: Sequence[str], details: Sequence[Mapping[str, str]]) -> tuple[str, ...]:
+    """Return names; those that occur twice have in brackets what differs, such as `sapso@pca (cooling 0.9)`.
+
+    A setting stands without its plugin, `sapso.cooling`, where no other that differs has the same name.
+    """
+    by_name: dict[str, list[Mapping[str, str]]] = {}
+    for name, values in zip(names, details, strict=True):
+        by_name.setdefault(name, []).append(values)
+    differing = {name: _differing(several) for name, several in by_name.items()}
+    longer = []
+    for name, values in zip(names, details, strict=True):
+        words = [f"{short} {values[field]}" for field, short in differing[name].items() if field in values]
+        longer.append(f"{name} ({', '.join(words)})" if words else name)
     counts, numbered = Counter(longer), Counter[str]()
     for k, name in enumerate(longer):
         if counts[name] > 1:
             numbered[name] += 1
             longer[k] = f"{name} ({numbered[name]})"
     return tuple(longer)
+
+
+def _differing(several: Sequence[Mapping[str, str]]) -> dict[str, str]:
+    """Return the fields whose values are not the same in all mappings, with the short names of these fields."""
+    fields = dict.fromkeys(field for values in sorted(several, key=len, reverse=True) for field in values)
+    differ = [field for field in fields if len({values.get(field) for values in several}) > 1]
+    plain = [field.rpartition(".")[2] for field in differ]
+    return {field: short if plain.count(short) == 1 else field for field, short in zip(differ, plain, strict=True)}
 
 
 def _text(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""The sentences of a report's first screen: the leader, and how certain that is."""
+"""The sentences of a report's first screen: what leads, by how much, and how certain that is."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,37 +12,34 @@ from posefit.tracking.measures import BASELINES
 
 NAMED = 4  # names that a sentence lists; of more it gives the number
 
-Rows = Sequence[Mapping[str, Any]]
-Tests = Mapping[str, Any] | None  # of `paired_tests`; None where there are too few methods or blocks
+Row = Mapping[str, Any]
 
 
-def leader_sentence(contest: Contest, board: Rows, baselines: Rows, tests: Tests) -> str:
-    """Return the first sentences of a report, given the leaderboard, the baselines' rows and the paired tests.
+def leader_sentences(contest: Contest, board: Sequence[Row], baselines: Sequence[Row]) -> list[str]:
+    """Return the sentences of a report, given the leaderboard and the baselines' rows.
 
-    The leader has the lowest interquartile mean of errors, or the highest share of targets. Another method is *not
-    shown to be worse* if Wilcoxon's signed ranks over paired runs have a p of at least 0.05 after Holm.
+    The first says what leads and by how much, the next ones how certain that is: Wilcoxon's signed ranks over paired
+    runs show a difference if p is below 0.05 after Holm.
     """
-    first, alone = board[0], len(contest.methods) == 1
-    searches = contest.runs.is_search
-    unit, digits, name, paired = (" %", 1, "reached", "instances") if searches else ("°", 2, "error", "runs")
-    score = f"{first[name]:.{digits}f}{unit}"
-    score = f"{score} of all targets reached" if searches else f"an error of {score}"
+    first, *others = (row for row in board if row["taking_part"])
+    searches, score = contest.runs.is_search, contest.runs.score
+    name, digits, unit = score["name"], score["digits"], score["unit"]
+    value = f"{first[name]:.{digits}f}{unit}"
+    value = f"{value} of all targets reached" if searches else f"an error of {value}"
     if first["low"] is not None and np.isfinite(first["low"]):
-        score += f" (95 % interval {first['low']:.{digits}f}{unit} to {first['high']:.{digits}f}{unit})"
-    ahead = "" if alone or searches else _ahead(board)
+        value += f" (95 % interval {first['low']:.{digits}f}{unit} to {first['high']:.{digits}f}{unit})"
+    if others:
+        lead = abs(round(others[0][name], digits) - round(first[name], digits))
+        value += f", {lead:.{digits}f}{score['points']} ahead of {others[0]['name']},"
     where = _problems(contest) if searches else _motions(contest)
-    others = "; no other method shares its runs"
-    if not alone:
-        others = others_clause(contest.runs.methods, first["method"], tests, paired)
-    sentence = f"{first['name']} {'has' if alone else 'leads with'} {score}{ahead} on {where}{others}."
+    sentences = [f"{first['name']} {'leads with' if others else 'has'} {value} on {where}."]
+    sentences += _certainty(contest, others)
     if searches:
         if is_random(contest.runs, first["method"]):
-            return f"{sentence} That is random search: no method does better."
-        return sentence + "".join(f" Random search reached {row['reached']:.1f} %." for row in baselines)
-    compared = [row for row in board if row["method"] in contest.methods]
-    close = {*(row["method"] for row in compared[:2]), *not_worse(tests, first["method"])}
-    rows = [row for row in compared if row["method"] in close]
-    return sentence + _lost_sentence(contest, rows[:NAMED]) + _baseline_sentence(first, baselines)
+            return [*sentences, "That is random search: no method does better."]
+        return [*sentences, *(f"Random search reached {row['reached']:.1f} %." for row in baselines)]
+    close = [first, *(row for k, row in enumerate(others) if k == 0 or _is_open(row))]
+    return [*sentences, *_lost_sentence(close[:NAMED]), *_baseline_sentence(first, baselines)]
 
 
 def _motions(contest: Contest) -> str:
@@ -64,76 +61,73 @@ def _seeds(contest: Contest) -> str:
     return "one seed" if seeds == 1 else f"{seeds} seeds each"
 
 
-def _ahead(board: Rows) -> str:
-    """Return by how much the first of a leaderboard is ahead of the second, with the table's digits."""
-    first, second = (round(float(row["error"]), 2) for row in board[:2])
-    return f", {second - first:.2f}° ahead of {board[1]['name']},"
+def _is_open(row: Row) -> bool:
+    """Return whether no test distinguishes a method from the leader."""
+    return row["p"] is None or bool(row["p"] >= LEVEL)
 
 
-def _lost_sentence(contest: Contest, rows: Rows) -> str:
-    """Return how many of all compared tracks of some methods lost frames; "" if none did."""
-    lost = contest.runs.figures["lost"][contest.blocks] > 0.0
-    counts = {row["name"]: int(lost[contest.methods.index(row["method"])].sum()) for row in rows}
-    by = _series([f"{name} in {count}" for name, count in counts.items()])
-    return f" Frames are lost by {by} of {counted(lost[0].size, 'track')}." if any(counts.values()) else ""
+def _certainty(contest: Contest, others: Sequence[Row]) -> list[str]:
+    """Return how the other methods compare with the leader, those that differ from it first."""
+    score, count = contest.runs.score, len(contest.comparisons)
+    paired, digits, points = score["paired"], score["digits"], score["points"]
+    if not others:
+        return ["No other method shares its runs."]
+    if not count:
+        return [f"One shared {paired[:-1]} is too few to distinguish it from any other method."]
+    blocks = contest.tested_errors()[0].size
+
+    def effect(row: Row) -> str:
+        """Return by how much a method is behind, with the interval and the p."""
+        low, high = (f"{row[end]:+z.{digits}f}" for end in ("behind_low", "behind_high"))
+        ends = f", {low} to {high}" if np.isfinite(row["behind_low"]) else ""
+        p = "p < 0.001" if row["p"] < 0.001 else f"p = {row['p']:.2g}"
+        behind = f"{row['behind']:+z.{digits}f}{points}{ends}".replace("-", "−")
+        return f"{row['name']} ({behind}, {p})"
+
+    # the least p, after Holm, that so few blocks can give the first of so many pairs: m 2 / 2^n
+    least_p = min(1.0, float(count * 2.0 ** (1 - blocks)))
+    unclear = [row for row in others if _is_open(row)]
+    worse, better = ([row for row in others if not _is_open(row) and sign * row["behind"] > 0] for sign in (1, -1))
+    sentences = []
+    if least_p >= LEVEL and len(unclear) == len(others):
+        sentences.append(
+            f"These are too few {paired} to show any difference: over {blocks} paired {paired} Wilcoxon's p cannot be "
+            f"below {least_p:.2g} after Holm over {counted(count, 'pair')}. The next one is {effect(others[0])}."
+        )
+        unclear = []
+    elif len(worse) == len(others):
+        sentences.append(f"Every other method is worse, the next one is {effect(worse[0])}.")
+    elif worse:
+        sentences.append(f"It is better than {listed([row['name'] for row in worse])}.")
+    if better:
+        sentences.append(f"On most {paired} it is worse than {listed([*map(effect, better)])}.")
+    if unclear:
+        sentences.append(f"These {paired} are too few to tell it from {listed([*map(effect, unclear)])}.")
+    return [
+        *sentences,
+        f"In brackets: median of {blocks} paired differences, its 95 % interval, and Wilcoxon's p after Holm, below "
+        "0.05 where a difference is shown.",
+    ]
 
 
-def _baseline_sentence(first: Mapping[str, Any], baselines: Rows) -> str:
-    """Return the best baseline; "" if there is none."""
+def _lost_sentence(rows: Sequence[Row]) -> list[str]:
+    """Return in how many of their tracks some methods lost frames; none if none did."""
+    by = _series([f"{row['lost_tracks']} by {row['name']}" for row in rows])
+    return (
+        [f"Tracks with lost frames, of {rows[0]['runs']} each: {by}."]
+        if any(row["lost_tracks"] for row in rows)
+        else []
+    )
+
+
+def _baseline_sentence(first: Row, baselines: Sequence[Row]) -> list[str]:
+    """Return the best baseline; none if there is none."""
     known = [row for row in baselines if row["error"] is not None]
     if not known:
-        return ""
+        return []
     best = min(known, key=lambda row: float(row["error"]))
     text = f"best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°."
-    return f" The {text}" if best["error"] > first["error"] else f" It does not beat the baselines: the {text}"
-
-
-def others_clause(names: Sequence[str], method: int, tests: Tests, paired: str) -> str:
-    """Return how all other methods compare with the leader, from a semicolon on.
-
-    `names` are those of methods by their numbers; `paired` is what was paired, such as "runs".
-    """
-    if tests is None:
-        return f"; one shared {paired[:-1]} is too few to distinguish it from any other method"
-    same, worse, better = ([names[m] for m in side] for side in _sides(tests, method))
-    blocks = f"{tests['blocks']} paired {paired}"
-    # the least p, after Holm, that so few blocks can give the first of so many pairs: m 2 / 2^n
-    least_p = min(1.0, float(len(tests["pairs"]) * 2.0 ** (1 - tests["blocks"])))
-    if least_p >= LEVEL and all(adjusted >= LEVEL for _, _, _, _, adjusted, *_ in tests["pairs"]):
-        return (
-            f"; too few {paired} to show any difference (over {blocks} Wilcoxon's p cannot be below {least_p:.2g} "
-            f"after Holm over {counted(len(tests['pairs']), 'pair')}, and must be below 0.05)"
-        )
-    clause = "; all others differ"
-    if same:
-        clause = f"; {listed(same)} {_are(same)} not shown to be worse"
-    if better:
-        clause += f", and on most {paired} {listed(better)} {_are(better)} better"
-    if worse and (same or better):
-        named = listed(worse) if len(worse) <= NAMED else counted(len(worse), "other")
-        clause += f", and {named} {_are(worse)} worse"
-    elif worse:
-        clause = "; every other method is worse"
-    return f"{clause} (Wilcoxon's signed ranks over {blocks}, after Holm, at 5 %)"
-
-
-def not_worse(tests: Tests, method: int) -> list[int]:
-    """Return the methods that no paired test distinguishes from one; none where there are no tests."""
-    return [] if tests is None else _sides(tests, method)[0]
-
-
-def _sides(tests: Mapping[str, Any], method: int) -> tuple[list[int], list[int], list[int]]:
-    """Return the methods that do not differ significantly from one, those that are worse, and those that are better."""
-    place = tests["methods"].index(method)
-    same: list[int] = []
-    worse: list[int] = []
-    better: list[int] = []
-    for first, second, difference, _, adjusted, *_ in tests["pairs"]:
-        if place in (first, second):
-            ahead = (difference if first == place else -difference) < 0.0
-            side = same if adjusted >= LEVEL else worse if ahead else better
-            side.append(tests["methods"][second if first == place else first])
-    return same, worse, better
+    return [f"The {text}" if best["error"] > first["error"] else f"It does not beat the baselines: the {text}"]
 
 
 def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
@@ -168,14 +162,12 @@ def unpaired_sentence(contest: Contest) -> str:
 def listed(names: Sequence[str]) -> str:
     """Return names as a sentence lists them; of many the first and how many others."""
     if len(names) > NAMED:
-        return f"{', '.join(names[: NAMED - 1])} and {len(names) - NAMED + 1} others"
+        return _series([*names[: NAMED - 1], f"{len(names) - NAMED + 1} others"])
     return _series(names)
 
 
 def _series(values: Sequence[Any]) -> str:
-    texts = [str(value) for value in values]
-    return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))
-
-
-def _are(names: Sequence[str]) -> str:
-    return "is" if len(names) == 1 else "are"
+    """Return values as a list in a sentence; where they have commas themselves, semicolons separate them."""
+    *texts, last = map(str, values)
+    comma = "; " if any(", " in text for text in (*texts, last)) else ", "
+    return f"{comma.join(texts)}{';' if texts and comma == '; ' else ''} and {last}" if texts else last

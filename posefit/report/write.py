@@ -14,8 +14,10 @@ from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
+from posefit.tracking.measures import BASELINES
 
 MAX_MISSING = 20  # instances that are named if they are not compared
+SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
 
@@ -67,44 +69,57 @@ def write_report(
 
 def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leader, what is left out, the leaderboard, and the page's place."""
-    board = report.get("leaderboard") or []
-    lines = [report["answer"]] if report.get("answer") else []
+    lines = [*report["answer"]] if report.get("leaderboard") else []
     lines += _gap_lines(report["header"])
-    lines += _board_lines(board)
+    lines += _board_lines(report)
     return lines if report["out"] is None else [*lines, f"written to {report['out']}: open it in any browser"]
 
 
-def _board_lines(board: list[dict[str, Any]]) -> list[str]:
+def _board_lines(report: dict[str, Any]) -> list[str]:
+    """Return the leaderboard and, below it, the baselines that skills compare with."""
+    board = report.get("leaderboard") or []
     if not board:
         return []
-    searches = "reached" in board[0]
-    score, digits, head = ("reached", 1, "targets %") if searches else ("error", 2, "error deg")
-    others = {"above": ("above", 2, 1.0)}
-    if not searches:
-        others = {"lost %": ("lost", 1, 100.0), "skill": ("skill_mean_pose", 2, 1.0)}
-    lines = [f"{'':32} {head:>9} {'95 % interval':>15}{''.join(f'{title:>8}' for title in others)}"]
+    score, digits = ("reached", 1) if "reached" in board[0] else ("error", 2)
+
+    def number(name: str, digits: int, factor: float = 1.0) -> Callable[[dict[str, Any]], str]:
+        return lambda row: "-" if row.get(name) is None else f"{factor * row[name]:z.{digits}f}"
+
+    def interval(row: dict[str, Any]) -> str:
+        return "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
+
+    columns: dict[str, Callable[[dict[str, Any]], str]] = {
+        {"error": "error deg", "reached": "targets %"}[score]: number(score, digits),
+        "  95 % interval": interval,
+        "  behind": number("behind", digits),
+        "      p": number("p", 3),
+    }
+    if score == "reached":
+        columns["   above"] = number("above", 2)
+    else:
+        columns[" lost in"] = lambda row: f"{row['lost_tracks']}/{row['runs']}"
+        columns |= {"  lost %": number("lost", 1, 100.0), "   skill": number(f"skill_{SKILL_OF}", 2)}
+    width = max(len(BASELINES[SKILL_OF]), *(len(row["name"]) for row in board))
+    lines = [f"{'':{width}} {' '.join(columns)}"]
     for row in board:
-        ends = "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
-        value = "-" if row[score] is None else f"{row[score]:.{digits}f}"
-        figures = [
-            "-" if row[name] is None else f"{factor * row[name]:.{places}f}" for name, places, factor in others.values()
-        ]
-        lines.append(f"{row['name'][:32]:32} {value:>9} {ends:>15}{''.join(f'{figure:>8}' for figure in figures)}")
-    return lines
+        cells = [f"{show(row):>{len(title)}}" for title, show in columns.items()]
+        lines.append(f"{row['name']:{width}} {' '.join(cells)}")
+    compared = [row for row in report["baselines"] if row["baseline"] == SKILL_OF and row["error"] is not None]
+    return lines + [f"{BASELINES[SKILL_OF]:{width}} {row['error']:9.2f}" for row in compared]
 
 
 def _gap_lines(header: dict[str, Any]) -> list[str]:
     """Return the lines about failures, and the instances that are therefore not compared."""
     lines = []
     if header["failed"]:
-        by = ", ".join(f"{method} {count}" for method, count in header["failed_by"].items())
+        by = "; ".join(f"{method} {count}" for method, count in header["failed_by"].items())
         lines.append(f"{counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
         lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
     lines += [header["unpaired"]] if header["unpaired"] else []
     if gaps := header["dropped"]:
         lines.append(f"left out of the comparison, for every method: {counted(len(gaps), 'instance')}")
         for gap in gaps[:MAX_MISSING]:
-            why = f"no run of {', '.join(gap['missing'])}" if gap["missing"] else "no seed in common"
+            why = f"no run of {'; '.join(gap['missing'])}" if gap["missing"] else "no seed in common"
             lines.append(f"  {gap['instance']}: {why}")
         lines += [f"  and {len(gaps) - MAX_MISSING} more"] if len(gaps) > MAX_MISSING else []
     return lines

@@ -22,8 +22,6 @@ from posefit.sweep.cell import settings_text
 if TYPE_CHECKING:
     import pandas as pd
 
-    from posefit.sweep.ledger import Ledger
-
 ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
 _TEXTS = (
     "key",
@@ -89,16 +87,16 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def search_runs(ledger: "Ledger") -> Iterator[SuiteRun]:
-    """Yield the runs of a ledger. Raises ValueError where it holds none, or something else."""
+def search_runs(rows: Iterable[Mapping[str, Any]], path: object) -> Iterator[SuiteRun]:
+    """Yield the runs of a ledger's rows. Raises ValueError, naming its path, where there are none, or other ones."""
     count = 0
-    for row in ledger.rows():
+    for row in rows:
         if not is_search(row["spec"]):
-            raise InputError(f"{ledger.path}: expected a ledger of single searches, got one of tracks: posefit report")
+            raise InputError(f"{path}: expected a ledger of single searches, got one of tracks: posefit report")
         count += 1
         yield search_run(row)
     if not count:
-        raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+        raise InputError(f"{path}: expected a ledger with finished rows, got one with none")
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:

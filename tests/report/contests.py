@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard, paired_tests
+from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard
 from posefit.report.runs import runs_of
-from posefit.report.summary import leader_sentence
+from posefit.report.summary import leader_sentences
 from posefit.sweep.cell import CellResult
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result
@@ -48,8 +48,6 @@ def three_methods() -> Errors:
     return errors | {("c", i, s): errors["a", i, s] + 0.001 * (-1) ** i for i in range(6) for s in range(2)}
 
 
-def sentence(contest: Contest) -> str:
-    """Return the first sentences of a report."""
-    tests = paired_tests(contest) if contest.testable else None
-    board = leaderboard(contest)
-    return leader_sentence(contest, board, baseline_rows(contest, board), tests)
+def sentences(contest: Contest) -> list[str]:
+    """Return the sentences of a report."""
+    return leader_sentences(contest, leaderboard(contest), baseline_rows(contest))

@@ -44,15 +44,48 @@ def test_the_leaderboard_has_interquartile_means_and_baselines_have_skills_too(t
     assert row["error"] == pytest.approx(2.5)  # of four runs the first and the last are left out
     assert row["skill_mean_pose"] == pytest.approx(1.0 - 2.5 / 4.0)
     assert np.isnan(row["low"])  # one seed gives no interval
-    assert [(base["error"], base["skill_nearest"]) for base in baseline_rows(contest, [])] == [(4.0, 0.0)] * 3
+    assert [(base["error"], base["skill_nearest"]) for base in baseline_rows(contest)] == [(4.0, 0.0)] * 3
+
+
+def test_a_skill_is_that_of_the_errors_that_are_shown(tmp_path: Path) -> None:
+    # the middle halves are of instances 1 and 2 for the method, and 0 and 3 for the baselines
+    errors, baselines = [1.0, 2.0, 3.0, 9.0], [4.0, 1.0, 16.0, 8.0]
+    made = [
+        result(replace(FIRST, method=method, instance=i), scale * error, baselines_degrees={"mean_pose": baselines[i]})
+        for method, scale in (("a", 1.0), ("b", 2.0))
+        for i, error in enumerate(errors)
+    ]
+    late = result(replace(FIRST, method="late", instance=7), 3.0, baselines_degrees={"mean_pose": 4.0})
+    contest = contest_of_results(tmp_path, [*made, late])
+    shown = {row["baseline"]: row["error"] for row in baseline_rows(contest)}
+    assert shown == {"mean_pose": 6.0, "persistence": None, "nearest": None}
+    board = {row["name"]: row for row in leaderboard(contest)}
+    assert [board[name]["skill_mean_pose"] for name in "ab"] == pytest.approx([1.0 - 2.5 / 6.0, 1.0 - 5.0 / 6.0])
+    assert board["late"]["skill_mean_pose"] == pytest.approx(1.0 - 3.0 / 4.0)  # on its own run
+    assert board["a"]["skill_nearest"] is None
+
+
+def test_rows_have_their_effect_and_how_many_tracks_lost_frames(tmp_path: Path) -> None:
+    board = leaderboard(contest_of_errors(tmp_path, three_methods()))
+    assert [row["name"] for row in board] == ["a", "c", "b"]
+    assert [board[0][name] for name in ("behind", "behind_low", "behind_high", "p")] == [None] * 4
+    # c is 0.001 behind and ahead in turn: of twelve differences the third lowest and the third highest
+    ends = [board[1][name] for name in ("behind", "behind_low", "behind_high")]
+    assert ends == pytest.approx([0.0, -0.001, 0.001], abs=1e-9)
+    assert board[2]["behind"] == pytest.approx(1.0)
+    assert board[2]["p"] == pytest.approx(3 * 2 / 2**12)
+    rates = {0: 0.0, 1: 0.2, 2: 0.01}
+    made = [result(replace(FIRST, instance=i), 1.0, lost_rate=rate) for i, rate in rates.items()]
+    (row,) = leaderboard(contest_of_results(tmp_path / "lost", made))
+    assert (row["lost_tracks"], row["runs"]) == (2, 3)
 
 
 def test_pairs_have_probabilities_of_improvement(tmp_path: Path) -> None:
     tests = paired_tests(contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0}, instances=3, seeds=3)))
-    assert tests["ranks"].tolist() == [1.0, 2.0]
-    ((first, second, difference, p, adjusted, better, low, high),) = tests["pairs"]
+    assert tests is not None
+    ((first, second, *effect, p, adjusted, better, low, high),) = tests["pairs"]
     assert (first, second, better, low, high) == (0, 1, 1.0, 1.0, 1.0)
-    assert difference == pytest.approx(-1.0)
+    assert effect == pytest.approx([-1.0, -1.0, -1.0])  # the median of differences that are all the same
     assert p == adjusted == pytest.approx(2.0 / 2**9)  # all nine differences have one sign, either of two
 
 
@@ -125,7 +158,8 @@ def test_one_lost_run_takes_one_block_from_the_tests_and_not_a_seed_of_every_ins
     assert contest.blocks.shape == (5, 11)
     assert contest.left_out == 4  # the other methods' runs of the lost instance and seed
     tests = paired_tests(contest)
+    assert tests is not None
     assert tests["blocks"] == 11
     # all eleven differences have one sign; of eight, ten pairs after Holm could never fall below 10 x 2 / 2^8 = 0.078
-    assert [pair[4] for pair in tests["pairs"]] == pytest.approx([10 * 2 / 2**11] * 10)
+    assert [pair[6] for pair in tests["pairs"]] == pytest.approx([10 * 2 / 2**11] * 10)
     assert [row["letters"] for row in leaderboard(contest)] == list("abcde")

@@ -33,20 +33,34 @@ def test_methods_of_one_name_are_named_by_what_they_differ_in_and_come_best_firs
     )
     assert runs.methods == (
         "random@pca",
-        "sapso@pca, sapso.cooling=0.9, 2440 evaluations",
-        "sapso@pca, 2440 evaluations",
-        "random@pca, posefit-spiral 1.2",
-        "sapso@pca, sapso.cooling=0.9, 400 evaluations",
+        "sapso@pca (cooling 0.9, evaluations 2440)",
+        "sapso@pca (evaluations 2440)",
+        "random@pca (posefit-spiral 1.2)",
+        "sapso@pca (cooling 0.9, evaluations 400)",
     )
     assert runs.variants[1]["settings"] == "sapso.cooling=0.9"
+
+
+def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
+    several = [
+        {"sapso.seed": 1, "pca.seed": 2, "sapso.cooling": 0.9},
+        {"sapso.seed": 1, "pca.seed": 2},
+        {"pca.seed": 3},
+    ]
+    runs = read(tmp_path, *(result(replace(SAPSO, settings=s), 1.0 + k) for k, s in enumerate(several)))
+    assert runs.methods == (
+        "sapso@pca (pca.seed 2, cooling 0.9, sapso.seed 1)",
+        "sapso@pca (pca.seed 2, sapso.seed 1)",
+        "sapso@pca (pca.seed 3)",
+    )
 
 
 def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -> None:
     changes: list[dict[str, Any]] = [{"corruption": {"holes": 0.5}}, {"instance": 2}, {"frames": 30}, {}, {"seed": 1}]
     runs = read(tmp_path, *(result(replace(FIRST, **change), 1.0) for change in changes))
     assert runs.instances == (
-        "walk, view 45°, instance 0, frames 30",
-        "walk, view 45°, instance 0, frames 60",
+        "walk, view 45°, instance 0 (frames 30)",
+        "walk, view 45°, instance 0 (frames 60)",
         "walk, view 45°, instance 2",
         "walk, view 45°, holes 0.5, instance 0",
     )

@@ -86,6 +86,17 @@ def test_wilcoxon_by_hand():
     assert pair.p_value == pair.adjusted == pytest.approx(0.0625)
 
 
+def test_a_medians_interval_is_that_of_the_sign_test():
+    # of ten ordered differences the second and the ninth: P(at most one of ten below) = 11 / 1024 on either side
+    values = np.arange(10.0)
+    (pair,) = wilcoxon(np.stack([values, np.zeros(10)])[:, :, None])
+    assert (pair.difference, pair.low, pair.high) == (4.5, 1.0, 8.0)
+    interval = stats.quantile_test(values, q=0, p=0.5).confidence_interval(0.95)
+    assert (pair.low, pair.high) == (interval.low, interval.high)
+    (pair,) = wilcoxon(np.stack([values, np.zeros(10)])[:, :5, None])  # 2 / 2**5 is more than 5 %
+    assert np.isnan([pair.low, pair.high]).all()
+
+
 def test_wilcoxon_is_scipys_and_its_adjustment_holms():
     errors = np.random.default_rng(0).gamma(2.0, size=(4, 3, 5)) * np.array([1.0, 1.2, 2.0, 3.0])[:, None, None]
     pairs = wilcoxon(errors)

@@ -156,7 +156,10 @@ def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not
 
 
 def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_path: Path) -> None:
-    runs = {(run.method, run.function, run.dimension, run.instance): run for run in search_runs(Ledger(results))}
+    runs = {
+        (run.method, run.function, run.dimension, run.instance): run
+        for run in search_runs(Ledger(results).rows(), results)
+    }
     assert len(runs) == 12
     problem = posefit.suite("posefit-2026.3", 1, 3, 9)
     expected = run_on(problem, "pso", {"population_size": 20}, evaluations=90)
@@ -248,7 +251,7 @@ def test_cocopp_reads_every_run(results: Path, tmp_path: Path) -> None:
     cocopp = pytest.importorskip("cocopp", reason="it is in the extra dev")
     done = run("suite", "table", results, "--coco", tmp_path / "coco")
     assert done.exit_code == 0, done.stderr
-    runs = list(search_runs(Ledger(results)))
+    runs = list(search_runs(Ledger(results).rows(), results))
     for folder in (tmp_path / "coco").iterdir():
         for read in cocopp.load(str(folder)):
             place = folder.name.split("-")[0], read.funcId, read.dim  # in the name, settings follow a hyphen

@@ -7,7 +7,7 @@
 | charts: curves over evaluations, errors of joints, calibration | curves.js |
 | the first screen: all methods, three tracks of the leader, failures | first.js |
 | the tables: leaderboard, all runs, running times, failures; the command that runs a cell again | tables.js |
-| ranks, paired tests, one method against all others | compare.js |
+| paired tests: one method against all others | compare.js |
 | cards and the window that plays a track | gallery.js |
 | the order in which everything is drawn | main.js |
 

@@ -17,7 +17,6 @@ function spaced(values, of, gap, first = -Infinity) {
   });
 }
 
-const shortened = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
 const measuring = document.createElement("canvas").getContext("2d");
 
 // The width in pixels of a text of a figure, as base.css has it.
@@ -26,11 +25,14 @@ function textWidth(text, weight = 400) {
   return measuring.measureText(text).width;
 }
 
-// A text, shortened until it is at most so many pixels wide.
-function fitted(text, room) {
-  let length = text.length;
-  while (length > 4 && textWidth(shortened(text, length)) > room) length -= 1;
-  return shortened(text, length);
+// The lines of a text, each at most so many pixels wide where it can be broken.
+function wrapped(text, room, weight) {
+  const lines = [""];
+  for (const word of text.match(/\S{1,36}\s*/g)) {
+    if (lines.at(-1) && textWidth((lines.at(-1) + word).trimEnd(), weight) > room) lines.push("");
+    lines.push(lines.pop() + word);
+  }
+  return lines;
 }
 
 function curves() {
@@ -44,7 +46,7 @@ function curves() {
       const all = visible().map(([m, place]) => ({ m, values: [], ...about.series[place] }));
       const series = all.filter((one) => one.values.filter(given).length > 1); // one point is no curve
       const without = all.filter((one) => !series.includes(one)).map(({ m }) => METHODS[m]);
-      note.textContent = without.length ? `Without a curve: ${without.join(", ")}.` : "";
+      note.textContent = without.length ? `Without a curve: ${without.join("; ")}.` : "";
       return chart(width, series, about);
     });
   }
@@ -59,19 +61,20 @@ function usualMost(values) {
 // A chart of series {m, values, low, high} over D.evaluations, on a logarithmic scale.
 function chart(width, series, { label, under, most, stepped }) {
   const height = between(240, 380, 0.62 * width);
-  const named = width >= 420 && series.length > 0 && series.length <= LABELLED;
+  const longest = Math.max(0, ...series.map((one) => textWidth(METHODS[one.m])));
+  const named = series.length > 0 && series.length <= LABELLED && longest < 0.3 * width;
   const to = most ?? 1.05 * usualMost(series.flatMap((one) => one.values));
   const used = D.evaluations;
   const x = { from: used[0], to: used.at(-1), log: true, label: under, show: whole };
-  const across = (value) => ((width - 170) * Math.log(value / x.from)) / Math.max(Math.log(x.to / x.from), 1e-9);
+  const across = (value) => ((width - 58 - longest * named) * Math.log(value / x.from)) / Math.max(Math.log(x.to / x.from), 1e-9);
   x.marks = spaced(logSteps(x.from, x.to), across, 44);
-  const box = { width, height, left: 46, right: named ? 124 : 12, top: 24, bottom: 40, name: `${label} over ${under}` };
+  const box = { width, height, left: 46, right: named ? longest + 16 : 12, top: 24, bottom: 40, name: `${label} over ${under}` };
   const frame = axes(box, x, { to, marks: steps(0, to, 5), show: rounded, label });
   frame.svg.append(...series.map((one, order) => curve(frame, one, order, stepped)));
   if (named) {
     const ends = series.map((one) => frame.up(one.values.findLast(given)));
     spread(ends, 14, 30, height - 42).forEach((y, k) =>
-      frame.svg.append(drawText(width - 116, y + 4, fitted(METHODS[series[k].m], 112), { class: "name" })),
+      frame.svg.append(drawText(width - longest - 8, y + 4, METHODS[series[k].m], { class: "name" })),
     );
   }
   return frame.svg;
@@ -112,31 +115,11 @@ function spread(wanted, gap, low, high) {
   return places;
 }
 
-// The body of a method from in front, at rest, each joint as large as its error; the person's left is on the right.
-function errorBody(m, values, most) {
-  const [left, top] = [0, 1].map((k) => Math.max(...D.rest.map((point) => point[k])));
-  const at = ([x, y]) => [90 * (left + x) + 8, 90 * (top - y) + 10];
-  const height = 90 * (top - Math.min(...D.rest.map(([, y]) => y))) + 20;
-  const bones = BONES.map(([parent, joint]) =>
-    drawLine(...at(D.rest[parent]), ...at(D.rest[joint]), { class: "axis" }),
-  );
-  const marks = D.rest.map((point, j) =>
-    mark(m, ...at(point), 1 + (7 * values[j]) / most, `${METHODS[m]}, ${D.joints[j]}: ${number(values[j], 1)} mm`),
-  );
-  const width = 180 * left + 16;
-  const sides = [drawText(0, height - 8, "right", { class: "soft" }), drawText(width, height - 8, "left", END)];
-  const svg = drawing(width, height, `errors of ${METHODS[m]} on a body`);
-  svg.append(...bones, ...marks, ...sides);
-  return make("figure", {}, svg, make("figcaption", {}, METHODS[m]));
-}
-
 function joints() {
   drawn($("joint-errors"), (width) => {
     const shown = visible();
     const row = 20;
     const to = 1.05 * Math.max(1, ...shown.flatMap(([, place]) => [...D.joint_errors[place].values]));
-    const bodies = shown.map(([m, place]) => errorBody(m, D.joint_errors[place].values, to));
-    $("joint-bodies").replaceChildren(...bodies);
     const box = { width, height: row * D.joints.length + 44, left: 112, right: 14, top: 4, bottom: 40 };
     const x = { to, marks: steps(0, to, Math.max(3, width / 110)), show: whole, label: "mm", rules: true };
     const { svg, at } = axes({ ...box, name: "error of each joint" }, x);

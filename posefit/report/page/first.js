@@ -1,54 +1,42 @@
 // The first screen: all methods with their intervals, three tracks of the leader, failures.
-const MAX_METHODS = 20; // of the figure
+const MAX_METHODS = 12; // of the figure
 const MAX_MISSING = 20; // instances that a note names
 const MAX_WARNINGS = 5; // that it names
 
 function firstScreen() {
-  chips();
-  $("standing-note").textContent = D.score.caption;
-  drawn($("standing"), standing);
-  const more = D.leaderboard.filter((row) => row.taking_part).length - MAX_METHODS;
-  if (more > 0) $("standing-note").append(` The ${MAX_METHODS} best; ${whole(more)} more are in the table.`);
+  const { caption, alone, baseless } = D.score;
+  const rows = D.leaderboard.filter((row) => row.taking_part && given(row[D.score.name]));
+  const bases = D.baselines.filter((row) => given(row[D.score.name]));
+  const notes = [caption];
+  if (rows.some((row) => given(row.p)))
+    notes.push("Beside a name: how far it is behind the leader, the median of paired runs, with its 95 % interval and p.");
+  if (!rows.some((row) => given(row.low))) notes.push(alone);
+  if (!bases.length) notes.push(baseless);
+  if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
+  $("standing-note").textContent = notes.join(" ");
+  const lines = bases.map((row) => ({ ...row, name: D.baseline_names[row.baseline] }));
+  lines.sort((a, b) => a[D.score.name] - b[D.score.name]);
+  drawn($("standing"), (width) => forest(width, rows.slice(0, MAX_METHODS), lines));
   examples();
 }
 
-// The leader, who may be as good, and the baseline, each in a few words.
-function chips() {
-  const { name: of, digits, better } = D.score;
-  const [first] = D.leaderboard;
-  const ends = given(first.low) ? ` (${number(first.low, digits)} to ${number(first.high, digits)})` : "";
-  const sign = better === "more" ? -1 : 1;
-  const [base] = D.baselines.filter((row) => given(row[of])).sort((a, b) => sign * (a[of] - b[of]));
-  const all = [
-    ["leader", `${first.name} ${scored(first[of])}${ends}`],
-    ["not shown to be worse", D.not_worse.map((m) => METHODS[m]).join(", ")],
-    ["best baseline", base ? `${D.baseline_names[base.baseline]} ${scored(base[of])}` : ""],
-  ];
-  for (const [about, text] of all)
-    if (text) $("chips").append(make("li", {}, make("small", {}, about), make("strong", {}, text)));
+// How far a method is behind the leader, how certain that is, and in how many tracks it loses frames.
+function behind(row) {
+  const { digits, points, name } = D.score;
+  const signed = (value) => `${value > 0 ? "+" : ""}${number(value, digits)}`;
+  const ends = given(row.behind_low) ? ` (${signed(row.behind_low)} to ${signed(row.behind_high)})` : "";
+  const lost = row.lost_tracks ? `lost in ${row.lost_tracks} of ${counted(row.runs, "track")}` : null;
+  const effect = given(row.p) ? `${signed(row.behind)}${points}${ends}, p ${probability(row.p)}` : null;
+  return name in row ? [effect, lost].filter(Boolean).join("; ") : "";
 }
 
-function standing(width) {
-  const { name: of } = D.score;
-  const rows = D.leaderboard.filter((row) => row.taking_part && given(row[of])).slice(0, MAX_METHODS);
-  const bases = D.baselines
-    .filter((row) => given(row[of]))
-    .map((row) => ({ ...row, name: D.baseline_names[row.baseline] }))
-    .sort((a, b) => a[of] - b[of]);
-  const best = (row, k) => k === 0 || D.not_worse.includes(row.method);
-  return forest(width, rows, bases, best);
-}
-
-// A row a method with its interval, and a line a baseline; `end` is the scale's where it is not of these rows.
-function forest(width, rows, bases, isBest, end) {
+// A row a method with its interval, the first one in bold, and a line a baseline; `end` is the scale's where it is not
+// of these rows.
+function forest(width, rows, bases, end) {
   const { name: of, digits, unit, better } = D.score;
-  const narrow = width < 480;
-  const step = narrow ? 38 : 26;
-  const left = narrow ? 14 : 24 + Math.max(...rows.map((row) => textWidth(shortened(row.name, 27), 700)));
-  const lost = (row) => (D.columns.lost && given(row.lost) ? ` ${shownAs("lost", row.lost)} % lost` : "");
-  const right = narrow ? 12 : 66 + Math.max(...rows.map((row) => textWidth(lost(row))));
+  const [left, right, line] = [14, 12, 15];
   // a logarithmic scale where less is better and the worst is far from the best
-  const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((one) => one > 0));
+  const values = [...rows, ...bases].flatMap((row) => [row[of], row.low, row.high].filter((value) => value > 0));
   const [least, most] = [Math.min(...values), Math.max(...values)];
   const log = better === "less" && most > 15 * least;
   const [from, to] = log ? [0.8 * least, 1.15 * most] : [0, end ?? (1.05 * most || 1)];
@@ -60,7 +48,20 @@ function forest(width, rows, bases, isBest, end) {
     return `${row.name} ${number(row[of], digits)}${ends}`;
   });
   const top = 16 * bases.length + 10;
-  const bottom = top + step * rows.length;
+  const room = width - left - 4;
+  let bottom = top;
+  const places = rows.map((row, k) => {
+    const names = wrapped(`${row.name} ${scored(row[of])}`, room, 700);
+    const more = behind(row) ? wrapped(behind(row), room) : [];
+    const beside = more.length === 1 && textWidth(names.at(-1), 700) + textWidth(more[0]) + 24 < room;
+    const texts = names.map((text, at) => [left, line * (at + 1), text, k ? "over" : "over best"]);
+    const shift = names.length - (beside ? 1 : 0);
+    for (const [at, text] of more.entries())
+      texts.push([beside ? left + textWidth(names.at(-1), 700) + 14 : left, line * (shift + at + 1), text, "over soft"]);
+    const start = bottom;
+    bottom += line * (shift + more.length || names.length) + 19;
+    return { start, texts, y: bottom - 10 };
+  });
   const name = `${D.score.label} with 95 % intervals: ${titles.join("; ")}`;
   const { svg, at } = axes({ width, height: bottom + 40, left, right, top, bottom: 40, name }, x);
   // a baseline's name stands to the right of its line, in a row of its own
@@ -71,17 +72,8 @@ function forest(width, rows, bases, isBest, end) {
     svg.append(drawText(place, y + 12, text, { class: "soft over" }));
   });
   rows.forEach((row, k) => {
-    const y = top + step * (k + 0.5) + (narrow ? 8 : 0);
-    const best = isBest(row, k) ? "best" : "";
-    const short = shortened(row.name, narrow ? 34 : 27);
-    if (narrow)
-      svg.append(drawText(left, y - 11, `${short}  ${scored(row[of])}${lost(row)}`, { class: `over ${best}` }));
-    else
-      svg.append(
-        drawText(left - 12, y + 4, short, { "text-anchor": "end", class: best }),
-        drawText(width - right + 12, y + 4, scored(row[of]), { class: best }),
-        drawText(width - 4, y + 4, lost(row), { "text-anchor": "end", class: "soft" }),
-      );
+    const { start, texts, y } = places[k];
+    svg.append(...texts.map(([across, down, text, kind]) => drawText(across, start + down, text, { class: kind })));
     if (given(row.low))
       svg.append(drawLine(at(row.low), y, at(row.high), y, { ...stroke(row.method, 3), "stroke-dasharray": null }));
     svg.append(mark(row.method, at(row[of]), y, 5.5, titles[k]));
@@ -96,7 +88,7 @@ function functionShares() {
     const box = make("div", { class: "chart" });
     $("functions").append(make("figure", {}, make("figcaption", {}, name), box));
     const named = rows.slice(0, MAX_METHODS).map((row) => ({ ...row, name: METHODS[row.method] }));
-    drawn(box, (width) => forest(width, named, [], (_, k) => k === 0, 1.05 * most));
+    drawn(box, (width) => forest(width, named, [], 1.05 * most));
   }
 }
 
@@ -142,7 +134,7 @@ function trouble() {
     $("trouble").append(make("div", { class: `note ${kind}` }, ...text, list(items), ...more));
   if (H.failed) {
     const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
-    const text = `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join(", ")}. `;
+    const text = `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join("; ")}. `;
     const reasons = H.reasons.map(([reason, count]) => `${whole(count)} × ${reason}`);
     note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
   }

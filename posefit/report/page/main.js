@@ -8,7 +8,6 @@ const SECTIONS = {
   certainty,
   times: runningTimes,
   gallery,
-  author,
   rows: allRows,
   failures,
 };
@@ -16,10 +15,9 @@ const SECTIONS = {
 document.title = `posefit: ${D.title}`;
 $("title").textContent = D.title;
 $("made").textContent = D.made;
-const [first, ...because] = D.headline.split("; ");
-$("headline").textContent = because.length ? `${first}.` : first;
-$("whole").textContent = D.headline;
-if (!because.length) $("verdict-whole").remove();
+const [first, ...because] = D.answer;
+$("headline").textContent = first;
+$("because").textContent = because.join(" ");
 $("summary").textContent = D.header.summary;
 details(D.header);
 trouble();

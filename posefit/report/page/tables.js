@@ -1,6 +1,5 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
 const PAGE = 50; // rows
-const FIRST_FIGURES = ["lost", "mpjpe", "above"]; // of the leaderboard, before more columns are asked for
 
 // A column: its title, or one for screen readers alone, `of` to sort by, and what is shown of it. `of` is a name in a
 // row, or a function of the row.
@@ -17,9 +16,9 @@ const methodColumn = (of) => {
 };
 const seedColumn = (of) => column("seed", of, (seed) => String(D.seeds[seed]));
 const buttonColumn = (unseen, show) => ({ unseen, text: true, show });
-const intervalColumn = (about, of, digits, none) => {
-  const ends = (row) => `${number(row.low, digits)} – ${number(row.high, digits)}`;
-  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row.low) ? ends(row) : none(row)) };
+const intervalColumn = (about, of, digits, none, [low, high] = ["low", "high"]) => {
+  const ends = (row) => `${number(row[low], digits)} – ${number(row[high], digits)}`;
+  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : none(row)) };
 };
 const badColumn = (title, value, about) => {
   const show = (row) => (row.base ? "" : make("span", { class: value(row) ? "bad" : null }, String(value(row))));
@@ -70,8 +69,7 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
 
   function cell(one, row) {
     const content = one.show(row);
-    const title = one.text && typeof content === "string" ? content : null;
-    return make("td", { class: kinds(one), title }, ...[content].flat());
+    return make("td", { class: kinds(one), "data-title": one.title }, ...[content].flat());
   }
 
   function show() {
@@ -99,7 +97,7 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
 function leaderboard() {
   $("leaderboard-note").textContent = `${D.score.leaderboard}A column's title sorts by it.`;
   const [score, ...figures] = Object.keys(D.columns);
-  const { digits, alone, paired } = D.score;
+  const { digits, points, paired } = D.score;
   const warned = METHODS.map(() => 0);
   for (const row of Object.keys(D.warned)) warned[D.rows.method[row]] += 1;
   const bases = score === "error" ? D.baselines.map((row) => ({ ...row, base: true })) : [];
@@ -107,20 +105,24 @@ function leaderboard() {
   const settings = (row) => make("small", {}, D.methods[row.method].settings || "default settings");
   const method = (row) => (row.base ? name(row) : [swatch(row.method), row.name, settings(row)]);
   const width = (row) => (given(row.low) ? row.high - row.low : null);
-  const pairs = counted((D.taking_part.length * (D.taking_part.length - 1)) / 2, "pair");
-  const tested = `Wilcoxon's signed ranks over ${paired}, Holm over ${pairs}, 5 %`;
-  const about = `Methods that share a letter do not differ significantly: ${tested}`;
+  const about = "Methods that share a letter do not differ significantly";
   const letters = (row) => row.letters ?? "";
   const more = (one) => ({ ...one, more: true });
+  const lost = (row) => (row.base ? "" : `${row.lost_tracks} of ${row.runs}`);
   const columns = [
     textColumn("method", name, method),
     figure(score),
-    intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : alone)),
-    textColumn("group", letters, letters, { about }),
-    ...figures.filter((one) => FIRST_FIGURES.includes(one)).map((one) => figure(one)),
+    intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : "–")),
+    column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), {
+      about: `The median of the differences from the leader in paired ${paired}`,
+    }),
+    column("p", "p", probability, { about: "Of that difference: Wilcoxon's signed ranks, after Holm over all pairs" }),
+    ...(D.columns.lost ? [{ title: "lost in", about: "Tracks that lost frames", value: (row) => row.lost_tracks, show: lost }] : []),
     badColumn("failed", (row) => row.failed),
     ...(D.warnings.length ? [badColumn("warned", (row) => warned[row.method], "Runs with a warning")] : []),
-    ...figures.filter((one) => !FIRST_FIGURES.includes(one)).map((one) => more(figure(one))),
+    ...(D.columns.above ? [figure("above")] : []),
+    more(textColumn("group", letters, letters, { about })),
+    ...figures.filter((one) => one !== "above").map((one) => more(figure(one))),
     more({ title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) }),
   ];
   const box = $("leaders");
