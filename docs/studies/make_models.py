@@ -2,9 +2,8 @@
 
 Ridge regression of how the quaternions go on to the next frame, "zero" as the patent writes it and "identity" as ours;
 what is stored are its coefficients, the covariance of what it leaves, means of similar poses and a hundred captured
-ones. `vsmm.models` takes the file of another `--ridge-lambda` and `--out`. Every clip is also used mirrored. Printed,
-and stored beside each model, are its errors one and ten frames ahead on clips that were not used, against standing
-still.
+ones; `--ridge-lambda` and `--out` make others. Every clip is also used mirrored. Printed, and stored beside each model,
+are its errors one and ten frames ahead on clips that were not used, against standing still.
 """
 
 import json

@@ -31,12 +31,12 @@ from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of, nearer_mirrored, poses_apart, second_side
 from posefit_exemplars.lost_model import Calibration, evidence, none_features
+from posefit_exemplars.tracker import POSTERIOR_TEMPERATURE
 from posefit_reproduce.jobs import Progress, each
 from scores import auroc, calibration_error, conformal_factor
 from table import WORKERS, bar, markdown
 
 FRAMES = 50
-TEMPERATURE = 8.0  # of the posterior
 DANCES, EVERYDAY = "dances", "everyday"
 # clips that other measurements do not use, by group
 MORE = {
@@ -70,8 +70,7 @@ class Case(NamedTuple):
     @property
     def spec(self) -> dict[str, Any]:
         """The fields of the cell."""
-        settings = {"exemplars.posterior_temperature": TEMPERATURE}
-        fields = {"method": METHOD, "translation": self.translation, "settings": settings}
+        fields = {"method": METHOD, "translation": self.translation}
         fields |= HARD if self.hard else {}
         return cell_fields(self.clip, self.views, FRAMES, **fields)
 
@@ -399,7 +398,7 @@ def posterior(
             calibration = calibration_of([features for features in sampling if _person(features) != person])
             evaluations += [evaluated(calibration, features) for features in sampling if _person(features) == person]
         if table is not None:
-            fitted = {"temperature": TEMPERATURE, **_rounded(vars(calibration_of(sampling)))}
+            fitted = {"temperature": POSTERIOR_TEMPERATURE, **_rounded(vars(calibration_of(sampling)))}
             table.write_text(json.dumps(fitted) + "\n", encoding="utf-8")
     left_out = [evaluation.features for evaluation in evaluations]
     return {

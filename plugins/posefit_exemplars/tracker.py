@@ -31,9 +31,8 @@ SEARCHED_GROUPS = 40  # those that fit best anywhere, whose poses are evaluated;
 FIRST_SEARCHED_GROUPS = 200
 GROUP_POSES = 20  # drawn at random, that stand for a group in a search everywhere
 YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
+POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
 WRONG_YAW_COST = 4.0  # over the temperature, of a state whose yaw is off by twice as much, for a thirtieth of a second
-
-
 SIMILAR_DISTANCE = 0.06  # metres: standard deviation of the codes of states that are averaged
 SIMILAR_YAW = np.radians(20.0)
 
@@ -58,7 +57,6 @@ class ExemplarTracker:
         fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
         samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
-        posterior_temperature: divides silhouette costs in that posterior; above 0.
     """
 
     def __init__(
@@ -72,11 +70,9 @@ class ExemplarTracker:
         fitted: bool = True,
         smoothing: float = 1.0,
         samples: int = 24,
-        posterior_temperature: float = 8.0,
     ) -> None:
         positive("spread", spread)
         positive("temperature", temperature)
-        positive("posterior_temperature", posterior_temperature)
         at_least("smoothing", smoothing, 0)
         at_least("lag", lag, 0)
         at_least("samples", samples, 0)
@@ -90,7 +86,7 @@ class ExemplarTracker:
         self.smoothing = smoothing * task.fps / 30.0  # frames
         self.lag, self.ahead = lag, min(math.ceil(FILTER_REACH * self.smoothing), lag)  # the latter for smoothing alone
         self.delay, self.evaluations = lag - self.ahead, float(task.evaluations)  # of the beam
-        self.sampling = markov.Sampling(samples, temperature / posterior_temperature)
+        self.sampling = markov.Sampling(samples, temperature / POSTERIOR_TEMPERATURE)
         self.hypotheses: hypotheses.HypothesisFilter | None = None
         share = FIT_SHARE * task.evaluations
         if fitted and share >= hypotheses.MIN_EVALUATIONS:

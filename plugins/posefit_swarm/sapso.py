@@ -1,6 +1,6 @@
 """Simulated-annealed particle swarm optimisation: Algorithm 1 of Li, Sun, Chen and Li (2012), as ask and tell.
 
-Attributes have the paper's letters; a comment `# SAPSO (n)` marks its equation n. Where the paper is silent, an
+Attributes have the paper's letters; comments such as SAPSO (1) mark its equations. Where it is silent, an
 Interpretation is named, see docs/background/interpretations.md; `posefit_reproduce.sapso.letter` is the paper's letter.
 """
 

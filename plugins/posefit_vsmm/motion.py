@@ -5,6 +5,7 @@ body's, its origin the root, so that places and directions do not matter. Length
 them; the models that the package carries are fitted to CMU clips by docs/studies/make_models.py.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,10 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.errors import InputError
 from posefit.geometry.skeleton import BONES as SKELETON_BONES
 from posefit.geometry.skeleton import Skeleton
-from posefit.reading import parsed_json, read_text
 from posefit_vsmm.state import (
     STATE,
     TURNS,
@@ -37,7 +36,6 @@ FPS = 30.0  # the rate that the models were fitted at (Interpretation V6)
 CLIP_FPS = 120.0  # the rate of the clips that they were fitted to
 LAMBDA = 0.15
 STIFF = 1e-3  # of the deviation of an axis that a joint may turn about: that of one that it may not
-SIZE_LIMIT = 10_000_000  # bytes of a file of models
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,25 +137,20 @@ class Library(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def library(path: str = "", literal: bool = False) -> Library:
-    """Return the models of a file that docs/studies/make_models.py wrote; without one, those that the package carries.
+def library(literal: bool = False) -> Library:
+    """Return the models of the package's file, which docs/studies/make_models.py wrote.
 
-    Literal ones are shrunk towards zero, as in the patent; else towards the identity. Interpretation V5. Raises
-    ValueError naming the file where it holds no such models.
+    Literal ones are shrunk towards zero, as in the patent; else towards the identity. Interpretation V5.
     """
-    try:
-        text = read_text(path, SIZE_LIMIT) if path else (files("posefit_vsmm") / "models.json").read_text("utf-8")
-        stored = parsed_json(text)
-        models: dict[str, Any] = stored["models"]
-        fits = [model["zero" if literal else "identity"] for model in models.values()]
-        matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
-        poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
-        turns = captured.reshape(*captured.shape[:2], TURNS, 4)
-        captured = (turns / lengths(turns)).reshape(captured.shape)
-        dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
-        reports = {name: model["report"] for name, model in models.items()}
-    except (FileNotFoundError, LookupError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: expected motion models as make_models.py writes them, got {error!r}") from None
+    stored = json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8"))
+    models: dict[str, Any] = stored["models"]
+    fits = [model["zero" if literal else "identity"] for model in models.values()]
+    matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
+    poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
+    turns = captured.reshape(*captured.shape[:2], TURNS, 4)
+    captured = (turns / lengths(turns)).reshape(captured.shape)
+    dependent = DependentJoints(*(np.array(stored["dependent_joints"][key]) for key in ("matrix", "offset")))
+    reports = {name: model["report"] for name, model in models.items()}
     return Library(MotionModels(tuple(models), matrices, offsets, noises, poses, captured), dependent, reports)
 
 

@@ -198,7 +198,6 @@ class VSMM:
         variant: "default", or the "patent"'s letter. Interpretations V4 to V6, V8, V9, V11, V14 and V15.
         structure: "variable", one group at a time and two while it changes; "all" models always, a plain IMM.
         groups: path of a TOML file of groups and neighbours; "" is the package's own. Step 4, Interpretation V1.
-        models: path of a file of models, with another lambda; "" is the package's own. Step 3, Interpretation V5.
         process_noise (Q): of the models, as a multiple of their residuals' covariance, above 0. Interpretation V7.
         joint_noise (R): of the detected joints, as a multiple of their variances, above 0. Interpretation V7.
         recovery: whether a lost pose is estimated again and a lost limb sought all around; by default yes, and no in
@@ -211,7 +210,6 @@ class VSMM:
     variant: Literal["default", "patent"] = "default"
     structure: Structure = "variable"
     groups: str = ""
-    models: str = ""
     process_noise: float = 1.0
     joint_noise: float = 1.0
     recovery: bool | None = None
@@ -220,7 +218,7 @@ class VSMM:
         choices(VSMM, vars(self))
         positive("process_noise", self.process_noise)
         positive("joint_noise", self.joint_noise)
-        self.library = library(self.models, self.variant == "patent")
+        self.library = library(self.variant == "patent")
         self.topology = read_topology(self.groups, self.library.models.names)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:

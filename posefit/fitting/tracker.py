@@ -15,7 +15,7 @@ from posefit.fitting.check import at_least, between, choices, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
-from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATION_RANGE, SearchSpace, Translation
+from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace, Translation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -115,7 +115,6 @@ class Prediction:
         floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Interpretation S5.
         root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
         tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Interpretation S16.
-        translation_range: metres that are searched to either side of the last place, where it is searched. Ours.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
         variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
@@ -126,7 +125,6 @@ class Prediction:
     floor: float = FLOOR
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
     tilt: Literal["learned", "box"] = "learned"
-    translation_range: tuple[float, float, float] = TRANSLATION_RANGE
     beta: float = BETA
     relocalise_gap: int | None = None
     variant: Literal["default", "paper"] = "default"
@@ -136,7 +134,7 @@ class Prediction:
         choices(Prediction, vars(self))
         positive("floor", self.floor)
         between("beta", self.beta, 0.0, 1.0)
-        for name in ("spread", "root_range_degrees", "translation_range"):
+        for name in ("spread", "root_range_degrees"):
             for value in np.atleast_1d(getattr(self, name)):
                 at_least(name, value, 0.0)
         whole("relocalise_gap", self.relocalise_gap or 0, 0)
@@ -169,7 +167,6 @@ class Follower:
             reach,
             task.anchor,
             task.translation,
-            np.array(prediction.translation_range),
             tilt=self._tilt,
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )

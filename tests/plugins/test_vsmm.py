@@ -196,7 +196,6 @@ def test_an_activity_is_as_probable_as_its_models_together() -> None:
         ("vsmm", "structure=some", "structure must be"),
         ("vsmm", "joint_noise=0", "joint_noise must be above 0, got 0"),
         ("vsmm", "groups=no.toml", "no.toml: expected a file of groups, got none"),
-        ("vsmm", "models=no.json", "no.json: expected motion models as make_models.py writes them"),
         ("vsmm:letter", "structure=all", "variant must be one of default, patent, got 'letter'"),
         ("sapso+vsmm", "weight=0", "weight must be"),
         ("sapso+vsmm", "optimiser=spaso", "optimiser must be"),
