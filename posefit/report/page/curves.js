@@ -66,9 +66,18 @@ function chart(width, series, { label, under, most, stepped }) {
   const to = most ?? 1.05 * usualMost(series.flatMap((one) => one.values));
   const used = D.evaluations;
   const x = { from: used[0], to: used.at(-1), log: true, label: under, show: whole };
-  const across = (value) => ((width - 58 - longest * named) * Math.log(value / x.from)) / Math.max(Math.log(x.to / x.from), 1e-9);
+  const across = (value) =>
+    ((width - 58 - longest * named) * Math.log(value / x.from)) / Math.max(Math.log(x.to / x.from), 1e-9);
   x.marks = spaced(logSteps(x.from, x.to), across, 44);
-  const box = { width, height, left: 46, right: named ? longest + 16 : 12, top: 24, bottom: 40, name: `${label} over ${under}` };
+  const box = {
+    width,
+    height,
+    left: 46,
+    right: named ? longest + 16 : 12,
+    top: 24,
+    bottom: 40,
+    name: `${label} over ${under}`,
+  };
   const frame = axes(box, x, { to, marks: steps(0, to, 5), show: rounded, label });
   frame.svg.append(...series.map((one, order) => curve(frame, one, order, stepped)));
   if (named) {

@@ -9,7 +9,9 @@ function firstScreen() {
   const bases = D.baselines.filter((row) => given(row[D.score.name]));
   const notes = [caption];
   if (rows.some((row) => given(row.p)))
-    notes.push("Beside a name: how far it is behind the leader, the median of paired runs, with its 95 % interval and p.");
+    notes.push(
+      "Beside a name: how far it is behind the leader, the median of paired runs, with its 95 % interval and p.",
+    );
   if (!rows.some((row) => given(row.low))) notes.push(alone);
   if (!bases.length) notes.push(baseless);
   if (rows.length > MAX_METHODS) notes.push(`The table has ${counted(rows.length - MAX_METHODS, "more method")}.`);
@@ -57,7 +59,12 @@ function forest(width, rows, bases, end) {
     const texts = names.map((text, at) => [left, line * (at + 1), text, k ? "over" : "over best"]);
     const shift = names.length - (beside ? 1 : 0);
     for (const [at, text] of more.entries())
-      texts.push([beside ? left + textWidth(names.at(-1), 700) + 14 : left, line * (shift + at + 1), text, "over soft"]);
+      texts.push([
+        beside ? left + textWidth(names.at(-1), 700) + 14 : left,
+        line * (shift + at + 1),
+        text,
+        "over soft",
+      ]);
     const start = bottom;
     bottom += line * (shift + more.length || names.length) + 19;
     return { start, texts, y: bottom - 10 };

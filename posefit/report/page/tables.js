@@ -117,7 +117,9 @@ function leaderboard() {
       about: `The median of the differences from the leader in paired ${paired}`,
     }),
     column("p", "p", probability, { about: "Of that difference: Wilcoxon's signed ranks, after Holm over all pairs" }),
-    ...(D.columns.lost ? [{ title: "lost in", about: "Tracks that lost frames", value: (row) => row.lost_tracks, show: lost }] : []),
+    ...(D.columns.lost
+      ? [{ title: "lost in", about: "Tracks that lost frames", value: (row) => row.lost_tracks, show: lost }]
+      : []),
     badColumn("failed", (row) => row.failed),
     ...(D.warnings.length ? [badColumn("warned", (row) => warned[row.method], "Runs with a warning")] : []),
     ...(D.columns.above ? [figure("above")] : []),
