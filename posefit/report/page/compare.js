@@ -13,8 +13,8 @@ function duelsOf(m) {
     .filter((pair) => pair.slice(0, 2).includes(place))
     .map(([first, second, difference, from, to, p, adjusted, better, low, high]) => {
       if (first === place) return { other: P.methods[second], difference, from, to, p, adjusted, better, low, high };
-      const turned = { difference: -difference, from: minus(to), to: minus(from), p, adjusted };
-      return { other: P.methods[first], ...turned, better: not(better), low: not(high), high: not(low) };
+      const opposite = { difference: -difference, from: minus(to), to: minus(from), p, adjusted };
+      return { other: P.methods[first], ...opposite, better: not(better), low: not(high), high: not(low) };
     });
 }
 
