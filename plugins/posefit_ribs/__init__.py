@@ -1,4 +1,4 @@
-"""Niching by pyribs for posefit: `ribs`, evolution strategies on an archive of dominated novelty search.
+"""Pyribs for posefit: `ribs`, evolution strategies on an archive of dominated novelty search.
 
 B. Tjanaka et al., pyribs: a bare-bones Python library for quality diversity optimization, GECCO 2023; R. Bahlous-Boldi,
 M. Faldor et al., Dominated novelty search: rethinking local competition in quality-diversity, arXiv:2502.00593, 2025;
