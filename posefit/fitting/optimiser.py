@@ -116,7 +116,7 @@ def populations(
     used = 0
     while len(proposals := optimiser.ask()) and used + len(proposals) <= evaluations:
         used += len(proposals)
-        costs = evaluate(proposals)
+        costs = evaluate(proposals)  # SAPSO A1.2a
         if not isinstance(costs, np.ndarray) or costs.shape != (len(proposals),):
             came = f"shape {costs.shape}" if isinstance(costs, np.ndarray) else type(costs).__name__
             raise TypeError(f"evaluate must return an array of costs of shape ({len(proposals)},), got {came}")
@@ -159,9 +159,9 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
             lowest = np.where(np.isnan(costs), np.inf, costs).argmin()
             least = float(costs[lowest])
         if best is None or math.isnan(cost) or least < cost:
-            best, cost = proposals[lowest].copy(), least
+            best, cost = proposals[lowest].copy(), least  # SAPSO (5)
         history.append(cost)
         spent.append(used)
     if best is None or math.isnan(cost):
         raise InputError(f"costs must be numbers, got nan for all {used} proposals")
-    return Minimum(best, cost, used, np.array(history), np.array(spent))
+    return Minimum(best, cost, used, np.array(history), np.array(spent))  # SAPSO A1.3

@@ -95,7 +95,7 @@ class PoseProblem:
             return self._cost_on_device(proposals)
         parts = parts_of(len(proposals), self.threads)
         if len(parts) == 1:
-            return self._cost(*self.decode(proposals))  # SAPSO (5)
+            return self._cost(*self.decode(proposals))
         costs = np.empty(len(proposals))
 
         def count(part: slice, poses: Array, translations: Array) -> None:

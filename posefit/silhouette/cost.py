@@ -62,7 +62,7 @@ def areas(
     drawing = drawing_of(body, camera, silhouette)
     parts = parts_of(len(poses), threads)
     if len(parts) == 1:
-        kernels.count_areas(*drawing, poses, translations, out)  # SAPSO (3)
+        kernels.count_areas(*drawing, poses, translations, out)
         return out
 
     def count(_part: slice, *rows: NDArray[Any]) -> None:

@@ -77,7 +77,7 @@ def count_areas(chain, radii, view, observed, images, poses, translations, areas
                     for k in range(image.shape[1]):
                         images[i, strip, k] = image[strip, k]
             body, overlap = count(image, person, valid, box)
-            areas[i, 0] = silhouette - overlap
+            areas[i, 0] = silhouette - overlap  # SAPSO (3)
             areas[i, 1] = body - overlap
             areas[i, 2] = overlap
 

@@ -319,6 +319,26 @@ def judged(cost: float, chance: float, temperature: float = 1.0) -> tuple[bool, 
     return bool(swarm.x[0, 0] == 0.7), float(swarm.x[0, 0]), float(swarm.pbest[0, 0])
 
 
+def test_a1_2a_every_particle_is_evaluated_once_in_each_iteration() -> None:  # SAPSO A1.2a
+    sizes: list[int] = []
+
+    def evaluate(proposals: Array) -> Array:
+        sizes.append(len(proposals))
+        return bowl(proposals)
+
+    optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=7, iterations=5)
+    minimise(evaluate, optimiser, 7 * 6, budget_known=True)
+    assert sizes == [7] * 6
+
+
+def test_a1_3_the_output_is_the_swarms_best() -> None:  # SAPSO A1.3
+    optimiser = SAPSO(line_space(), np.random.default_rng(0), population_size=7, iterations=5)
+    best = minimise(bowl, optimiser, 7 * 6, budget_known=True)
+    leader = optimiser.pbest_cost.argmin()
+    assert best.cost == optimiser.pbest_cost[leader]
+    np.testing.assert_array_equal(best.proposal, optimiser.pbest[leader])
+
+
 def test_a1_2b_a_personal_best_changes_only_for_a_lower_cost() -> None:  # SAPSO A1.2b
     assert judged(1.0, 0.5)[2] == 0.7
     assert judged(1.8, 0.5)[2] == 0.5
