@@ -27,6 +27,7 @@ KERNEL_TESTS = {  # which tests notice a change of a package's kernels
     "posefit/silhouette": ["tests/silhouette"],
     "posefit/geometry": ["tests/geometry", "tests/silhouette/test_kernels.py"],
     "posefit/fitting": ["tests/fitting"],
+    "posefit/tracking/smoothing": ["tests/tracking/test_contours.py"],
     "plugins/posefit_exemplars": ["tests/sources", "tests/exemplars"],
 }
 
@@ -88,7 +89,7 @@ def survives(mutant: Mutant, copy: Path) -> bool:
     words = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", *mutant.tests]
     try:
         ran = subprocess.run(words, cwd=copy, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, timeout=900)
-        if ran.returncode not in (0, 1):
+        if ran.returncode > 1:  # below 0 a signal ended it: a kernel that writes beyond its arrays
             raise RuntimeError(f"tests must pass or fail, got\n{ran.stdout.decode()}{ran.stderr.decode()}")
         return ran.returncode == 0
     except subprocess.TimeoutExpired:
