@@ -232,3 +232,13 @@ def test_clips_are_cut_to_the_frames_that_are_asked_for(cmu: Path) -> None:
     # 16_35 has 162 frames at 120 Hz, 81 at 60 Hz, the first of which is left out
     assert [len(motions[name].test) for name in ("walk", "turn", "run")] == [100, 100, 80]
     assert all(one.test.fps == 60.0 for one in motions.values())
+
+
+def test_the_walk_with_a_turn_turns_and_the_others_do_not(cmu: Path) -> None:
+    for clips in (cmu, None):
+        for name, motion in paper_motions(clips, 100).items():
+            yaw = np.degrees(np.unwrap(motion.test.poses[:, 0]))
+            if name == "turn":
+                assert abs(yaw[-1] - yaw[0]) > 80.0
+            else:
+                assert np.ptp(yaw) < 30.0

@@ -24,7 +24,9 @@ CLIPS = {
     "turn": ("16/16_17", ("16/16_15",)),
     "run": ("16/16_35", ("09/09_01", "127/127_03")),
 }
-BROKEN = 1  # frames left out at the start of every clip: 16_15 begins with an arm held out that is gone 1/60 s later
+# the first frame that is followed: 16_15 begins with an arm held out that is gone 1/60 s later, and the person of 16_17
+# walks straight on for two seconds before turning by a quarter
+FIRST = {"walk": 1, "turn": 120, "run": 1}
 LABELS = {"walk": "walk", "turn": "walk with a turn", "run": "run"}
 
 
@@ -42,7 +44,7 @@ class PaperMotion:
 
 
 def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotion]:
-    """Return the three motions, each of its first `frames` or as many as there are.
+    """Return the three motions, each of so many `frames` or as many as there are.
 
     Raises ValueError where `clips` is no folder with the CMU clips that are wanted.
     """
@@ -57,8 +59,8 @@ def _from_clips(folder: str | Path, name: str) -> PaperMotion:
         if not path.is_file():
             raise InputError(f"clips must be a folder of CMU clips such as {clip}.amc, got {folder}, which has none")
     motions = [load_motion(path, FPS) for path in paths]
-    motions = [motion.frames(BROKEN, len(motion)) for motion in motions]
-    return PaperMotion(motions[0], motions[1:])
+    first, *others = motions
+    return PaperMotion(first.frames(FIRST[name], len(first)), [motion.frames(1, len(motion)) for motion in others])
 
 
 def _built_in(name: str, frames: int) -> PaperMotion:
