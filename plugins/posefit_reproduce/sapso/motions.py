@@ -13,7 +13,7 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.source import load_motion
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
-from posefit_reproduce.sapso.paper import TRAINING_FRAMES, FirstYaw
+from posefit_reproduce.sapso.paper import TRAINING_FRAMES
 
 SIZE = (320, 240)  # pixels
 FPS = 60.0  # not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a run nearly
@@ -73,10 +73,9 @@ def _built_in(name: str, frames: int) -> PaperMotion:
     return PaperMotion(test, [built_in.motion(style, frames=count, fps=FPS) for style in styles])
 
 
-def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None), first_yaw: FirstYaw = "known") -> Scene:
-    """Return a motion as a camera sees it. Interpretation S17."""
-    scene = synthetic(motion.test, [view], SIZE, [], frames)
-    return scene if first_yaw == "known" else replace(scene, yaw=None)
+def paper_scene(motion: PaperMotion, view: float, frames: Range = (None, None)) -> Scene:
+    """Return a motion as a camera sees it."""
+    return synthetic(motion.test, [view], SIZE, [], frames)
 
 
 def turned(motion: Motion, degrees: float) -> Motion:
