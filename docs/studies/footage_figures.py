@@ -43,10 +43,11 @@ from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands import CLIPS
-from posefit_reproduce.sapso.experiment import estimate_images
+from posefit_reproduce.sapso.experiment import estimate_images, options_of
+from posefit_reproduce.sapso.methods import LABELS as METHOD_LABELS
+from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
 from posefit_reproduce.sapso.motions import paper_motions
 from posefit_reproduce.sapso.paper import FRAMES as FRAMES_OF_THE_PAPER
-from posefit_reproduce.sapso.paper import METHODS, OURS, PAPER, settings_of
 
 Activity = Literal["walk", "run"]
 ACTIVITIES: dict[str, Activity] = {"walking": "walk", "jogging": "run", "jog": "run", "running": "run"}
@@ -58,7 +59,8 @@ TALL = 300  # pixels of a picture in a figure
 SQUARE = 0.65  # of the person's height in pixels: half the side of such a picture
 SOLID = 0.65  # how much of the film the body hides
 SINGLE = "PCA + SAPSO, images"
-LABELS = {SINGLE: SINGLE} | {name: f"{METHODS[name].label}, tracked" for name in PAPER}
+TRACKED = (*PAPER, LETTER)
+LABELS = {SINGLE: SINGLE} | {name: f"{METHOD_LABELS[name]}, tracked" for name in TRACKED}
 Estimates = dict[int, Frame]  # the poses of some frames of a scene
 
 
@@ -141,9 +143,9 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     and nothing is smoothed.
     """
     estimates: dict[str, Estimates] = {}
-    for name in PAPER:
-        how = TrackOptions(method=name, iterations=iterations, seed=seed, smooth=False, body_frames=0)
-        track = track_scene(replace(scene, yaw=None), training, how.changed(settings=settings_of(name)))
+    for name in TRACKED:
+        how = TrackOptions(**options_of(name, training, iterations), seed=seed, smooth=False, body_frames=0)
+        track = track_scene(replace(scene, yaw=None), training, how)
         estimates[name] = dict(enumerate(track.estimates))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]

@@ -54,7 +54,7 @@ def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> No
 @WORKERS
 @JSON
 def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int, as_json: bool) -> None:
-    """A walk, a walk with a turn and a run: the experiments of Acta Automatica Sinica 38(5), and what each part adds."""
+    """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
     from posefit_reproduce.sapso.experiment import QUICK, Scale, paper_experiment
 
     _print(paper_experiment(clips, QUICK if quick else Scale(seeds)), out, workers, as_json)

@@ -23,8 +23,8 @@ _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right kne
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 Structure = Literal["variable", "all"]
 MOST = 3  # of the four lower limbs. Interpretation V15
-FIRST_CYCLES = 10  # over all models before a group is chosen; the patent's
-FIRST_SECONDS = 1.0  # the default's: after ten cycles a first pose that is a little off still decides. Interpretation V21
+FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
+FIRST_SECONDS = 1.0  # by default: within ten cycles a first pose that is a little off still decides. Interpretation V19
 ENDED = 0.9  # the ratio, new to old, below which a new group ends
 
 
@@ -82,7 +82,8 @@ class Switching:
         self.topology, self.groups = topology, topology.groups
         self.models = models.of(topology.union(topology.groups))
         self._patent, self._structure, self._filter = patent, structure, lru_cache(self._filter_of)
-        self._first_cycles = FIRST_CYCLES if patent else max(FIRST_CYCLES, round(FIRST_SECONDS * FPS / self.models.share))
+        second = round(FIRST_SECONDS * FPS / self.models.share)
+        self._first_cycles = FIRST_CYCLES if patent else max(FIRST_CYCLES, second)
         self.restart()
 
     def restart(self) -> None:

@@ -55,7 +55,7 @@ class Analysis:
     def errors(self, motion: str, method: str = OURS, kind: str = "track", free: bool = False) -> Array:
         """Return the mean errors (8) of runs in degrees, (views, seeds). Interpretation S18."""
         away = self.away(motion, method, kind)
-        return np.asarray((away[..., self.free(motion)] if free else away).mean(axis=(2, 3)))  # SAPSO (9)
+        return np.asarray((away[..., self.free(motion)] if free else away).mean(axis=(2, 3)))
 
     def spread(self, motion: str, method: str) -> Array:
         """Return the deviations (10) of runs in degrees, (views, seeds)."""
