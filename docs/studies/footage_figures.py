@@ -43,6 +43,7 @@ from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands import CLIPS
+from posefit_reproduce.experiment import Table
 from posefit_reproduce.sapso.experiment import estimate_images, options_of
 from posefit_reproduce.sapso.methods import LABELS as METHOD_LABELS
 from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
@@ -150,7 +151,7 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
     images = {k: replace(scene.observations[k], yaw=None) for k in chosen}
-    single = estimate_images(scene, images, training, OURS, iterations, seed)  # last: its seconds have no compiling
+    single = estimate_images(scene, images, training, OURS, iterations, seed)
     return {SINGLE: dict(zip(chosen, single, strict=True)), **estimates}
 
 
@@ -162,7 +163,6 @@ def figures_of(estimates: Estimates, scene: Scene) -> dict[str, float]:
         "usable": len(usable),
         "iou": float(np.mean([metrics.iou(frame.areas)[0] for frame in usable])),
         "cost": float(np.mean([frame.cost for frame in usable])),
-        "seconds_per_frame": float(np.mean([frame.seconds for frame in usable])),
     }
 
 
@@ -198,17 +198,13 @@ def _square(image: Any, silhouette: Silhouette) -> Image:
     return square
 
 
-def lines_of(name: str, film: dict[str, Any]) -> list[str]:
-    """Return what is printed of a film."""
-    first, stop = film["frames"]
-    lines = [
-        f"{name}: {film['activity']}, frames {first} to {stop - 1}, camera {film['camera']}",
-        f"{'':24}{'frames':>8}{'usable':>8}{'IoU':>8}{'cost':>8}{'s':>8}",
+def table_of(name: str, film: dict[str, Any]) -> Table:
+    """Return what is known of a film's estimates, without a truth."""
+    rows = [
+        [LABELS[method], *(str(row[key]) for key in ("frames", "usable")), f"{row['iou']:.3f}", f"{row['cost']:.2f}"]
+        for method, row in film["estimates"].items()
     ]
-    for method, row in film["estimates"].items():
-        figures = f"{row['iou']:8.3f}{row['cost']:8.2f}{row['seconds_per_frame']:8.3f}"
-        lines.append(f"  {LABELS[method]:22}{row['frames']:8}{row['usable']:8}{figures}")
-    return lines + [f"  {warning}" for warning in film["warnings"]]
+    return Table(name, ["method", "frames", "usable", "IoU with the mask", "cost (4)"], rows)
 
 
 @click.command(cls=Command)
@@ -261,13 +257,17 @@ def main(
             shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
             for figure, each in (("figure-8", single), ("figure-10", estimates)):
                 cv2.imwrite(str(folder / f"{figure}-{recording.name}.png"), picture(scene, each, shown, first))
+            table = table_of(recording.name, rows[recording.name])
+            (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
         report = {"seed": seed, "iterations": iterations, "films": rows}
         (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     if as_json:
         click.echo(json.dumps(report))
         return
     for name, film in rows.items():
-        click.echo("\n".join(lines_of(name, film)))
+        first, stop = film["frames"]
+        click.echo(f"{name}: {film['activity']}, frames {first} to {stop - 1}, camera {film['camera']}\n")
+        click.echo("\n".join([f"{table_of(name, film)}\n", *film["warnings"]]))
     click.echo(f"written to {out}")
 
 
