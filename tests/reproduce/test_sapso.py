@@ -36,6 +36,7 @@ FIGURES = {
     "figure-9-frames.png",
 }
 TABLES = {
+    "motions",
     "table-1",
     "table-1-errors",
     "table-2-walk",

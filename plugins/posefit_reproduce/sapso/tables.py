@@ -24,6 +24,7 @@ from posefit_reproduce.sapso.paper import (
     TABLE_1_JOINTS,
     TABLE_2,
     TRACK_DEGREES,
+    TRAINING_FRAMES,
     VARIANCE,
 )
 
@@ -77,6 +78,7 @@ class Analysis:
 def paper_tables(results: Results, motions: Mapping[str, PaperMotion]) -> Iterator[Table]:
     """Yield all tables: the paper's, its claims, by view, what each part is worth, the turn."""
     analysis = Analysis(results, motions)
+    yield motions_table(analysis)
     yield table_1(analysis)
     yield table_1_errors(analysis)
     yield from (table_2(analysis, motion) for motion in motions)
@@ -84,6 +86,20 @@ def paper_tables(results: Results, motions: Mapping[str, PaperMotion]) -> Iterat
     yield by_view(analysis)
     yield parts(analysis)
     yield turn(analysis)
+
+
+def motions_table(analysis: Analysis) -> Table:
+    """Return what is followed and learned from, and how many seeds there are."""
+    rows = []
+    for name, motion in analysis.motions.items():
+        yaw = np.degrees(np.unwrap(motion.test.poses[:, 0]))
+        counts = [f"{len(motion.test)}", f"{yaw[-1] - yaw[0]:.0f}", f"{len(motion.angles)}", f"{TRAINING_FRAMES[name]}"]
+        seeds = [str(analysis.results.of("poses", kind, name, OURS).shape[1]) for kind in ("track", "image")]
+        rows.append(
+            [MOTIONS[name], motion.test.name, ", ".join(clip.name for clip in motion.training), *counts, *seeds]
+        )
+    heads = ["motion", "followed", "learned from", "frames", "turns by, degrees", "training frames", "the paper's"]
+    return Table("motions", [*heads, "seeds of tracks", "of images"], rows, 3)
 
 
 def table_1(analysis: Analysis) -> Table:
