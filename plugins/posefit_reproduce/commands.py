@@ -30,7 +30,7 @@ CLIPS = click.option(
     "--clips",
     envvar="POSEFIT_CMU",
     metavar="CMU_DIR",
-    help="Folder of CMU clips; by default POSEFIT_CMU, else built-in.",
+    help="Folder of CMU clips; by default POSEFIT_CMU, else the library.",
 )
 
 

@@ -161,7 +161,7 @@ def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run, 
 
 
 def paper_experiment(clips: str | Path | None, scale: Scale) -> Experiment:
-    """Return the experiment on CMU clips of a folder, or on built-in motions. Raises InputError where clips lack."""
+    """Return the experiment on CMU clips of a folder, or of the library. Raises InputError where clips lack."""
     motions = loaded(clips, scale.frames)
 
     def tables(results: Results) -> Any:
