@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.tracker import Frame, Task
 from posefit.motion import built_in
@@ -24,6 +23,7 @@ from posefit_vsmm.motion import library
 TUNED = 5  # films on which defaults were chosen
 WARMING = 3  # frames that are tracked beforehand, so that no frame's time is that of compiling
 LABELS = ("walk", "arms-out", "jacks", "squat", "jump")  # of the film's activities; a jump is none of them
+DETAILS = ("lost", "joints", "confidence", "filter_seconds", "detection_seconds")  # of frames that are stored
 MODELS = library().models.names
 GROUPS = tuple(read_topology("", MODELS).groups.items())
 METHODS: dict[str, TrackOptions] = {
@@ -32,16 +32,12 @@ METHODS: dict[str, TrackOptions] = {
     "all six models": TrackOptions(method="vsmm", settings={"vsmm.structure": "all"}),
     "patent, all six": TrackOptions(method="vsmm:patent", settings={"vsmm.structure": "all"}),
 }
-SEARCHES: dict[str, TrackOptions] = {
-    "sapso@loose": TrackOptions(method="sapso@loose"),
-    "sapso+vsmm": TrackOptions(method="sapso+vsmm"),
-}
 # One setting each otherwise than by default, on the films that defaults are chosen on.
 ALTERNATIVES: dict[str, TrackOptions] = {
     f"{name}={value}": TrackOptions(method="vsmm", settings={f"vsmm.{name}": value})
     for name, value in {"recovery": False, "process_noise": 2.0, "joint_noise": 2.0}.items()
 }
-ALL = METHODS | SEARCHES | ALTERNATIVES
+ALL = METHODS | ALTERNATIVES
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ class Scale:
         if self.films < 1:
             raise InputError(f"films must be at least 1, got {self.films}")
         for seed in range(TUNED, TUNED + self.films):
-            yield from (Run("reported", "film", method, seed=seed) for method in (*METHODS, *SEARCHES))
+            yield from (Run("reported", "film", method, seed=seed) for method in METHODS)
         for seed in range(TUNED):
             yield from (Run("tuned", "film", method, seed=seed) for method in ("default", *ALTERNATIVES))
 
@@ -76,37 +72,25 @@ def perform(run: Run) -> Arrays:
         for observations in (film.observations[:WARMING], film.observations):
             tracker = prepare(options, task).tracker(task)
             frames = list(tracker.track(observations, np.random.default_rng(run.seed)))
-    arrays = {
-        "poses": np.array([frame.pose for frame in frames]),
-        "translations": np.array([frame.translation for frame in frames]),
-        "areas": np.array([frame.areas[0] for frame in frames]),
-        "cpu_seconds": np.array([frame.cpu_seconds for frame in frames]),
-    }
-    return arrays | (states(frames) if "probabilities" in frames[-1].details else {})
+    return arrays_of(frames)
 
 
-def states(frames: list[Frame]) -> dict[str, Array]:
+def arrays_of(frames: list[Frame]) -> Arrays:
     """Return what a tracker with models holds in every frame: -1 is no group, no newcomer, no label."""
     probabilities = np.zeros((len(frames), len(MODELS)))
     for row, frame in zip(probabilities, frames, strict=True):
         row[[MODELS.index(name) for name in frame.details["models"]]] = frame.details.get("probabilities", 0.0)
-    names = [name for name, _ in GROUPS]
-
-    def number(names: list[str] | tuple[str, ...], name: str | None) -> int:
-        return -1 if name is None else names.index(name)
-
-    return {
-        "probabilities": probabilities,
-        "group": np.array([number(names, frame.details["group"]) for frame in frames]),
-        "newcomer": np.array([number(names, frame.details["newcomer"]) for frame in frames]),
-        "label": np.array([number(LABELS, frame.activity) for frame in frames]),
-        "lost": np.array([bool(frame.details["lost"]) for frame in frames]),
-        **{name: np.array([frame.details[name] for frame in frames]) for name in ("joints", "confidence")},
-        **{
-            f"{name}_seconds": np.array([frame.details[f"{name}_seconds"] for frame in frames])
-            for name in ("filter", "detection")
-        },
+    groups = [None, *(name for name, _ in GROUPS)]
+    series: dict[str, list[Any]] = {
+        "poses": [frame.pose for frame in frames],
+        "translations": [frame.translation for frame in frames],
+        "areas": [frame.areas[0] for frame in frames],
+        "cpu_seconds": [frame.cpu_seconds for frame in frames],
+        "label": [[None, *LABELS].index(frame.activity) - 1 for frame in frames],
+        **{name: [groups.index(frame.details[name]) - 1 for frame in frames] for name in ("group", "newcomer")},
+        **{name: [frame.details[name] for frame in frames] for name in DETAILS},
     }
+    return {"probabilities": probabilities, **{name: np.array(values) for name, values in series.items()}}
 
 
 def patent_experiment(scale: Scale) -> Experiment:
