@@ -256,7 +256,8 @@ def main(
             }
             shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
             for figure, each in (("figure-8", single), ("figure-10", estimates)):
-                cv2.imwrite(str(folder / f"{figure}-{recording.name}.png"), picture(scene, each, shown, first))
+                image = picture(scene, each, shown, first)
+                cv2.imwrite(str(folder / f"{figure}-{recording.name}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 85])
             table = table_of(recording.name, rows[recording.name])
             (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
         report = {"seed": seed, "iterations": iterations, "films": rows}

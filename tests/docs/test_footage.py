@@ -127,6 +127,6 @@ def test_a_film_gives_figures_8_and_10(tmp_path: Path) -> None:
     assert film["frames"] == [5, 40]
     assert all(row["iou"] > 0.5 for row in film["estimates"].values())
     for figure, rows in (("figure-8", 2), ("figure-10", 5)):
-        image = cv2.imread(str(tmp_path / "out" / f"{figure}-{name}.png"))
+        image = cv2.imread(str(tmp_path / "out" / f"{figure}-{name}.jpg"))
         assert image is not None
         assert image.shape == (rows * TALL, 6 * TALL, 3)
