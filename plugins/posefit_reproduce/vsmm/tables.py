@@ -11,7 +11,7 @@ from posefit.fitting import metrics
 from posefit.geometry.skeleton import JOINTS
 from posefit_reproduce.experiment import Arrays, Claim, Results, Table, bounded, claims_table, interval
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film, film_of
-from posefit_reproduce.vsmm.experiment import ALTERNATIVES, GROUPS, LABELS, METHODS, MODELS
+from posefit_reproduce.vsmm.experiment import ALTERNATIVES, BEST, GROUPS, LABELS, METHODS, MODELS
 from posefit_vsmm.motion import library
 from posefit_vsmm.state import AT
 
@@ -126,7 +126,7 @@ def patent_tables(results: Results) -> Iterator[Table]:
     rows: dict[str, dict[int, dict[str, float]]] = {}
     for run in sorted(results.runs, key=lambda run: run.seed):
         rows.setdefault(f"{run.kind} {run.method}", {})[run.seed] = film_figures(run.seed, results.runs[run])
-    yield compared("compared", {name: rows[f"reported {name}"] for name in METHODS})
+    yield compared("compared", {name: rows[f"reported {name}"] for name in (*METHODS, BEST)})
     for name in ("default", "patent"):
         yield by_film(f"films-{name}", rows[f"reported {name}"])
     yield claims_table("claims", list(claims({name: rows[f"reported {name}"] for name in METHODS})))
