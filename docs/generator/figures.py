@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
+from posefit.evaluation.measures import BASELINES, FRAME, MEASURES, Measure
 from posefit.measuring.centres import PLACES
-from posefit.tracking.measures import BASELINES, FRAME, MEASURES, Measure
 
 # How a value stands in a file whose table shows it times a factor.
 RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}

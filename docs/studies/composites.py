@@ -30,6 +30,7 @@ from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
+from posefit.evaluation.errors import LOST
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
 from posefit.fitting.metrics import LOST_MM
@@ -44,7 +45,6 @@ from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
 from posefit.sweep.engine import Limits
-from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
 from posefit.tracking.result import Track
 from posefit_reproduce.jobs import each

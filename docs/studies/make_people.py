@@ -10,9 +10,9 @@ import numpy as np
 
 from clips import GROUPS, METHOD, SIDES, Clip, cell_fields, track_of
 from posefit.arrays import Array
+from posefit.output.drawing import BACKGROUND, TEXT, draw_body, write
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
-from posefit.tracking.drawing import BACKGROUND, TEXT, draw_body, write
 
 STILLS = 4  # of the film, between the best and the worst frame
 SIDE = 208  # pixels of a still

@@ -15,8 +15,8 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.motion.asf import write_asf
 from posefit.motion.motion import Motion
+from posefit.output.drawing import draw_body
 from posefit.reading import parsed_json
-from posefit.tracking.drawing import draw_body
 from tests.cases import each
 
 SIZE = (160, 120)

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from posefit.fitting.tracker import Frame
+from posefit.output.folder import OutputFolder
+from posefit.output.identity import digest_of
 from posefit.sweep.ledger import FILE, NAMES, Writer
-from posefit.tracking.identity import digest_of
-from posefit.tracking.outputs import OutputFolder
 from posefit.uncertainty.modes import Posterior
 from tests.report.browser import result
 from tests.report.searched import cell as search_cell

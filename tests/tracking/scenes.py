@@ -15,10 +15,10 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.output.folder import OutputFolder
 from posefit.progress import Progress
 from posefit.silhouette.cost import areas
 from posefit.tracking import method
-from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track
 from posefit.uncertainty.calibration import Recalibration

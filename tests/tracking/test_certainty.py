@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from posefit.evaluation.errors import evaluated
+from posefit.evaluation.measures import Measures
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
-from posefit.tracking.evaluation import evaluated
-from posefit.tracking.measures import Measures
-from posefit.tracking.outputs import OutputFolder
-from posefit.tracking.table import table
+from posefit.output.folder import OutputFolder
+from posefit.output.text import table
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.files import arrays
@@ -128,7 +128,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
 def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(scene: Scene) -> None:
     frames = uncertain_frames(scene, CERTAIN, turned=0.25, coherent=True)
     track = tracked(scene, frames)
-    for estimate, frame in zip(track.estimates, frames, strict=True):
+    for estimate, frame in zip(track.frames, frames, strict=True):
         assert [mode.weight for mode in estimate.modes] == pytest.approx([0.75, 0.25])
         np.testing.assert_array_equal(estimate.modes[0].pose, frame.pose)
     assert track.summary["modes"] == pytest.approx([0.75, 0.25])
@@ -137,14 +137,14 @@ def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(sce
     assert "left and right: unknown in 6 of 6 frames" in table(track.summary)
     assert "frames lost" not in table(track.summary)
     apart = tracked(scene, uncertain_frames(scene, CERTAIN, turned=0.25))  # whose posteriors are no trajectories
-    assert len(apart.estimates[0].modes) == 2
+    assert len(apart.frames[0].modes) == 2
     assert (apart.modes, apart.summary["modes"]) == ([], None)
     for k, frame in enumerate(frames):
         assert frame.posterior is not None
         frames[k] = replace(frame, posterior=replace(frame.posterior, recalibration=Recalibration(none=0.1 * k)))
     doubtful = tracked(scene, frames)
     assert doubtful.summary["none_of_modes"] == pytest.approx(0.25)
-    assert [mode.weight for mode in doubtful.estimates[5].modes] == pytest.approx([0.375, 0.125])
+    assert [mode.weight for mode in doubtful.frames[5].modes] == pytest.approx([0.375, 0.125])
 
 
 def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp
         track = tracked(scene, frames, output=output)
     assert track.summary["unknown_sides"] == track.summary["lost_frames"] == list(range(FRAMES))
     assert track.summary["modes"] is None  # it is unknown which new trajectory continues which old one
-    for frame, estimate in zip(frames, track.estimates, strict=True):
+    for frame, estimate in zip(frames, track.frames, strict=True):
         assert frame.posterior is not None
         assert estimate.posterior is not None
         np.testing.assert_allclose(estimate.posterior.poses, frame.posterior.poses, atol=1e-6)

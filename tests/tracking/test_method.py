@@ -170,7 +170,7 @@ def test_a_scene_is_tracked_as_it_is() -> None:
     how = {"method": "sapso", "train": built_in.other_styles("walk"), "evaluations": 200}
     result, by_name = posefit.track(scene, **how), posefit.track(motion, **how, size=(120, 90))
     np.testing.assert_array_equal(result.motion.poses, by_name.motion.poses)
-    assert [frame.cost for frame in result.estimates] == [row["cost"] for row in result.frames]
+    assert [frame.cost for frame in result.frames] == [row["cost"] for row in result.frames]
     with pytest.raises(ValueError, match="a scene must be tracked as it is, got fps"):
         posefit.track(scene, fps=20.0)
     with pytest.raises(ValueError, match="a scene must be of a known motion, got walk, whose truth is unknown"):

@@ -11,8 +11,8 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses
-from posefit.tracking.drawing import FAINTEST, MISSED, OTHER, draw_body, opacities
-from posefit.tracking.picture import PANEL, Painter
+from posefit.output.drawing import FAINTEST, MISSED, OTHER, draw_body, opacities
+from posefit.output.picture import PANEL, Painter
 from posefit.uncertainty.modes import Mode
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, walk

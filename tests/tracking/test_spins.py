@@ -12,10 +12,10 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
+from posefit.output.folder import Output
 from posefit.progress import Progress
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.outputs import Output
 from posefit.tracking.pipeline import follow
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
