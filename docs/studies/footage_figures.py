@@ -142,7 +142,7 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     """
     estimates: dict[str, Estimates] = {}
     for name in PAPER:
-        how = TrackOptions(method=name, iterations=iterations, seed=seed, smooth=False, body_frames=0)
+        how = TrackOptions(method=name, evaluations=40 * (iterations + 1), seed=seed, smooth=False, body_frames=0)
         track = track_scene(replace(scene, yaw=None), training, how.changed(settings=settings_of(name)))
         estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]

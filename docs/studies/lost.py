@@ -328,9 +328,9 @@ def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
         "views_degrees": list(track.views),
         "condition": track.condition,
         "fps": scene.fps,
-        "mpjpe_mm": [round(frame["mpjpe_mm"], 2) for frame in result.frames],
+        "mpjpe_mm": result.table["mpjpe_mm"].round(2).tolist(),
         "mirrored_gain_mm": [round(gain, 1) for gain in gains.tolist()],
-        "cost": [round(frame["cost"], DIGITS) for frame in result.frames],
+        "cost": result.table["cost"].round(DIGITS).tolist(),
     }
     evidence = [frame.details.get("evidence", {}) for frame in result.frames]
     if all(evidence):

@@ -25,7 +25,7 @@ def strip(clip: Clip) -> Array:
     cell = cell_of(cell_fields(clip, SIDES[1], clip.frames, method=METHOD))
     scene = cell_scene(cell)
     track = track_of(cell, scene)
-    errors = np.array([row["mpjpe_mm"] for row in track.frames])
+    errors = track.table["mpjpe_mm"]
     film = np.linspace(0, len(errors) - 1, STILLS + 2).astype(int)[1:-1]
     named = [("best", errors.argmin()), *((f"{k / scene.fps:.1f} s", k) for k in film), ("worst", errors.argmax())]
     stills = []

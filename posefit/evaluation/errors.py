@@ -33,6 +33,7 @@ FRAME = {
     measure.name: measure
     for measure in (
         Measure("frame", "frame", "", 0, "number of the frame, from 0"),
+        Measure("seconds", "seconds", "s", 2, "time of the frame, from 0"),
         Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
         Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
         Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
@@ -47,7 +48,7 @@ FRAME = {
         Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
         Measure("interval_mm", "80 % interval", "mm", 0, "its radius, the mean over joints; blank where not estimated"),
         Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
-        Measure("seconds", "time", "ms", 1, "wall time since the frame before was estimated", 1e3),
+        Measure("wall_seconds", "time", "ms", 1, "that the estimate took, since that of the frame before", 1e3),
         Measure("activity", "activity", "", 0, "what the person does, a word; blank where not estimated"),
     )
 }
@@ -77,13 +78,14 @@ def evaluated(
     evaluations = np.array([float(frame.evaluations) for frame in frames])
     table = {
         "frame": np.arange(len(frames)),
+        "seconds": np.arange(len(frames)) / scene.fps,
         "cost": cost,
         "iou": iou,
         "usable": 1.0 - held,
         **errors,
         **certainty,
         "evaluations": evaluations,
-        "seconds": np.array([frame.seconds for frame in frames]),
+        "wall_seconds": np.array([frame.seconds for frame in frames]),
     }
     seconds, cpu_seconds = clock.tolist()
     measures = Measures(

@@ -102,7 +102,7 @@ def _warm_up(method: Method, task: Task, scene: Scene) -> None:
     population_size = method.settings.get("optimiser", {}).get("population_size", POPULATION_SIZE)
     few = replace(task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size))
     with suppress(ValueError):  # what fails for want of evaluations is reported where it fails with all of them
-        next(method.build(few).track([next(iter(scene.observations))], np.random.default_rng(0)))
+        next(method.follow(few, [next(iter(scene.observations))], np.random.default_rng(0)))
 
 
 @contextmanager

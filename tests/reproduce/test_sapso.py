@@ -221,7 +221,7 @@ def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
         settings={"tracker.tilt": "box"},  # Interpretation S16
         seed=1,
     )
-    np.testing.assert_array_equal(seen.history, again.frames[0].history)
+    np.testing.assert_array_equal(seen.history, again.frames[0].trace[:, 1])
     # the best pose of all iterations is the search's result
     best = [poses[k] for poses, k in zip(seen.poses, seen.best, strict=True)]
     assert any(np.array_equal(one, again.motion.poses[0]) for one in best)

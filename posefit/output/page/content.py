@@ -26,7 +26,7 @@ from posefit.version import __version__
 TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
 COLUMN = ("label", "unit", "digits", "factor")  # of a figure, as the page has it
-CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
+CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "wall_seconds")
 MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
     "held": lambda table: table["usable"] == 0.0,
     "lost": lambda table: table["lost"] >= LOST,
