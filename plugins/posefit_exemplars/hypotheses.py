@@ -28,7 +28,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
-from posefit_exemplars.contours import STEP_EVALUATIONS, precisions
+from posefit_exemplars.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate, clocks
@@ -187,7 +187,7 @@ class HypothesisFilter:
         noise = self._noise(frame_costs, poses, places)
         weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
         if contours is not None:
-            poses, places = contours.fitted(task, poses, places, poses, weights, FRESH_REACHES)
+            poses, places = fitted(task.body, contours, (poses, places), poses, weights, FRESH_REACHES)
             evaluations += len(poses) * FRESH_EVALUATIONS
         parents = np.full(len(poses), -1)
         if before is not None and rows is not None:
@@ -196,7 +196,7 @@ class HypothesisFilter:
                 moved, shifted = before.hypotheses.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)
                 means, pulls = self._pulled(moved, weights, noise)
-                moved, shifted = contours.fitted(task, moved, shifted, means, pulls, CONTINUED_REACHES)
+                moved, shifted = fitted(task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
                 evaluations += len(rows) * CONTINUED_EVALUATIONS
             poses, places = np.concatenate([poses, moved]), np.concatenate([places, shifted])
             parents = np.concatenate([parents, rows])

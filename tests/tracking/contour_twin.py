@@ -35,16 +35,14 @@ def pulled(numbers: Array, mask: tuple, scale: float) -> tuple[Array, Array]:
     return curves, slopes
 
 
-def pull_of_view(
-    view: MaskContours, k: int, here: Array, there: Array, reach: float, every: int = 1
-) -> tuple[Array, Array]:
+def pull_of_view(view: MaskContours, k: int, here: Array, there: Array, reach: float) -> tuple[Array, Array]:
     """Return half the second derivatives (n, n) and half the gradient (n,) by n parameters, in frame k.
 
     The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
     """
     root = view.metres[k]
-    points = view.points[view.starts[k] : view.starts[k + 1]][::every]
-    mask = view.fields[k], view.corners[k], view.sizes[k], np.ascontiguousarray(points), every * view.step
+    points = view.points[view.starts[k] : view.starts[k + 1]]
+    mask = view.fields[k], view.corners[k], view.sizes[k], np.ascontiguousarray(points), view.step
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
     worth = 1.0 / (root**3 * kernels.CORRELATION_LENGTH * deviation)

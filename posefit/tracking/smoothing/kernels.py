@@ -372,29 +372,38 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, out):
     """Add the squares of one view of T frames, with joints (T, 27, 4, 3), to those of the bones, see `add_view`.
 
     `contours` are the fields (T, h, w), corners and sizes (T, 2), points and starts (T + 1,) of `MaskContours`, and the
-    pixels that a point stands for; `grown` is as in `add_view`, its joints (T, F, 27, 3). `out` is curves
-    (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
+    pixels that a point stands for, or those of one frame that all T meet; `grown` is as in `add_view`, its joints
+    (T, F, 27, 3). `out` is curves (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
     """
     fields, corners, sizes, points, starts, step = contours
     wider, larger, growth = grown
     curves, forces = out
-    for k in range(len(frames)):
+    for i in range(len(frames)):
+        k = min(i, len(starts) - 2)
         if starts[k] < starts[k + 1]:
             contour = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step
-            grows, sums = (wider[k], larger, growth), (curves[k], forces[k])
-            add_view(parents, radii, camera, frames[k], contour, reach, grows, sums)
+            grows, sums = (wider[i], larger, growth), (curves[i], forces[i])
+            add_view(parents, radii, camera, frames[i], contour, reach, grows, sums)
 
 
 @jit
-def add_all_bones(chain, frames, sines, cosines, curves, forces, matrices, slopes):
-    """Write `add_bones` of T frames, which `place_frames` wrote.
+def add_all_bones(chain, placed, bones, free, out):
+    """Write what `add_bones` sums up in T frames, of those numbers of a frame, `free` (m,), that may change.
 
-    They go to matrices (T, 69, 69) and slopes (T, 69, 1 + F).
+    `placed` are frames, sines and cosines of `place_frames`, and `bones` curves and forces. `out` are second
+    derivatives (T, m, m) and gradients with derivatives by factors (T, m, 1 + F).
     """
-    screws = np.empty((NUMBERS, 6))
+    frames, sines, cosines = placed
+    curves, forces = bones
+    matrices, slopes = out
+    all_screws, screws = np.empty((NUMBERS, 6)), np.zeros((NUMBERS, 6))
+    matrix, slope = np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, slopes.shape[2]))
     for k in range(len(frames)):
-        write_screws(chain, frames[k], sines[k], cosines[k], screws)
-        add_bones(chain, screws, curves[k], forces[k], matrices[k], slopes[k])
-        for a in range(NUMBERS):
-            for c in range(a):
-                matrices[k, c, a] = matrices[k, a, c]
+        write_screws(chain, frames[k], sines[k], cosines[k], all_screws)
+        for a in free:
+            screws[a] = all_screws[a]
+        add_bones(chain, screws, curves[k], forces[k], matrix, slope)
+        for i in range(len(free)):
+            slopes[k, i] = slope[free[i]]
+            for j in range(i + 1):
+                matrices[k, i, j] = matrices[k, j, i] = matrix[free[i], free[j]]
