@@ -22,6 +22,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Task
+from posefit.fitting.weights import logistic
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.geometry.symmetry import facing
@@ -30,7 +31,6 @@ from posefit.uncertainty.modes import Posterior, second_side
 from posefit_exemplars.frame_costs import FrameCosts
 
 MIN_COST, MIN_SPREAD = 0.1, 0.002  # per cent, and metres
-MAX_LOG_ODDS = 30.0  # logarithm
 LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
 MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known
 
@@ -45,11 +45,6 @@ def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float,
 def none_features(log: float) -> Array:
     """Return the predictors (3,) of no mode being right: 1, the logarithm of the expected error, and its square."""
     return np.array([1.0, log, log * log])
-
-
-def probability_of(odds: float) -> float:
-    """Return the probability for a logarithm of odds, which is clipped to `MAX_LOG_ODDS`."""
-    return 1.0 / (1.0 + math.exp(-min(max(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,7 +67,7 @@ class Calibration:
     def recalibration(self, log: float) -> Recalibration:
         """Return the recalibration of a frame, from the logarithm of its expected error."""
         spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
-        none = probability_of(float(self.none @ none_features(log)))
+        none = float(logistic(self.none @ none_features(log)))
         return Recalibration(*spreads, self.joint_factors, self.angle_factors, sharpness=self.sharpness, none=none)
 
 
@@ -175,7 +170,7 @@ class LogisticModel(NamedTuple):
 
     def probability(self, features: Array) -> float:
         """Return the probability for a frame with these features (3 E,)."""
-        return probability_of(float(features[self.rows] @ self.weights) + self.bias)
+        return float(logistic(features[self.rows] @ self.weights + self.bias))
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:

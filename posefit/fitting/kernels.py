@@ -85,17 +85,6 @@ def add_components(latents, components, angles):
 
 
 @jit
-def spreads_away(latents, spread, away):
-    """Write the distance of latents (n, m) from the middle (n,), in spreads (m,)."""
-    for i in range(latents.shape[0]):
-        total = 0.0
-        for m in range(latents.shape[1]):
-            scaled = latents[i, m] / spread[m]
-            total += scaled * scaled
-        away[i] = np.sqrt(total)
-
-
-@jit
 def unpack_proposals(proposals, centre, half, anchor, mean, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
 
@@ -117,21 +106,3 @@ def unpack_proposals(proposals, centre, half, anchor, mean, poses, translations,
         poses[i, 1] += min(max(pitch, mean[0, 0]), mean[1, 0])
         poses[i, 2] += min(max(roll, mean[0, 1]), mean[1, 1])
     return np.isfinite(total)
-
-
-@jit
-def within(proposals, centre, half, inside, latents):
-    """Write which proposals (n, d) lie in the box (n,), and the latents (n, m), their last coordinates, of all.
-
-    Returns whether all lie in it.
-    """
-    d = centre.size
-    first, everyone = d - latents.shape[1], True
-    for i in range(inside.size):
-        inside[i] = True
-        for j in range(d):
-            inside[i] &= abs(proposals[i, j]) <= 1.0
-        for j in range(first, d):
-            latents[i, j - first] = centre[j] + half[j] * proposals[i, j]
-        everyone &= inside[i]
-    return everyone

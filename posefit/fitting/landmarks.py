@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.weights import logistic
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR, Skeleton
 from posefit.silhouette.rasteriser import NEAR
@@ -32,11 +33,10 @@ def landmark_likelihoods(
         pixels, depths = camera.project(joints)
         metres = np.maximum(depths, NEAR) / np.sqrt(camera.focal.prod())  # of a pixel
         for group in GROUPS:
-            both = [
-                np.log1p(0.5 * (_distances(pixels[:, group], view[same]) * metres[:, group] / DEVIATION) ** 2)
-                @ view[same, 2]
-                for same in (group, MIRRORED[group])
-            ]
+            both = []
+            for same in (group, MIRRORED[group]):
+                off = np.linalg.norm(pixels[:, group] - view[same, :2], axis=-1) * metres[:, group]
+                both.append(np.log1p(0.5 * (off / DEVIATION) ** 2) @ view[same, 2])
             groups.append(-np.stack(both, axis=-1))
     return np.stack(groups, axis=1)
 
@@ -65,8 +65,7 @@ def exchanged_next(exchanged: Array, seconds: float) -> Array:
 
 def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
     """Return how likely groups (..., K) are exchanged, by `landmark_likelihoods` and how likely they were before."""
-    odds = np.log1p(-exchanged) - np.log(exchanged) + likelihoods[..., 0] - likelihoods[..., 1]
-    return np.asarray(1.0 / (1.0 + np.exp(np.clip(odds, -30.0, 30.0))))
+    return logistic(np.log(exchanged) - np.log1p(-exchanged) + likelihoods[..., 1] - likelihoods[..., 0])
 
 
 def side_odds(likelihoods: Array) -> float:
@@ -78,7 +77,3 @@ def side_odds(likelihoods: Array) -> float:
     limbs = np.arange(len(likelihoods)) % len(GROUPS) <= ARMS
     usual, own = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
     return float(landmark_costs(own[:, ::-1], usual) - landmark_costs(own, usual))
-
-
-def _distances(pixels: Array, landmarks: Array) -> Array:
-    return np.asarray(np.linalg.norm(pixels - landmarks[:, :2], axis=-1))

@@ -128,12 +128,6 @@ class Tilt:
         rows = middle + mean.min(axis=0), middle + mean.max(axis=0), base, slopes
         return cls(np.vstack(rows), np.where(whole, -np.pi, low), np.where(whole, np.pi, high))
 
-    def at(self, latents: Array) -> Array:
-        """Return the mean pitch and roll (n, 2) that go with latents (n, m)."""
-        low, high, base = self.mean[:3]
-        tilt: Array = np.clip(base + latents @ self.mean[3:], low, high)
-        return tilt
-
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of the box around what was added last (2,).
 

@@ -123,10 +123,6 @@ class PoseProblem:
         poses, translations = self.space.decode(proposals)
         return poses, self._aligned(poses, translations)
 
-    def placed(self, poses: Array) -> Array:
-        """Return the translations (n, 3) of poses (n, 66): the space's anchor, or aligned from there."""
-        return self._aligned(poses, np.repeat(self.space.anchor[None], len(poses), axis=0))
-
     def cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of poses (n, 66) with their root at translations (n, 3)."""
         return self.cost_and_areas(poses, translations)[0]

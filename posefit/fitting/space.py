@@ -10,7 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.check import one_of
-from posefit.fitting.kernels import unpack_proposals, within
+from posefit.fitting.kernels import unpack_proposals
 from posefit.fitting.prior import Latents, Tilt
 from posefit.geometry.rotation import wrapped, yaw_first
 from posefit.geometry.skeleton import ANGLES
@@ -120,12 +120,9 @@ class SearchSpace:
 
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
-        proposals = writeable(proposals)
-        n = len(proposals)
-        inside, latents = np.empty(n, dtype=bool), np.empty((n, len(self.prior.low)))
-        everyone = within(proposals, self.centre, self.half, inside, latents)
-        allowed = self.prior.feasible(latents)
-        return allowed if everyone else allowed & inside
+        latents = slice(self.dimensions - len(self.prior.low), None)
+        allowed = self.prior.feasible(self.centre[latents] + self.half[latents] * proposals[:, latents])
+        return np.asarray(allowed & (np.abs(proposals) <= 1.0).all(axis=1))
 
     def moved(self, proposals: Array, origin: "SearchSpace") -> Array:
         """Return the proposals (n, d), the nearest in the box, that mean here what these mean in `origin`."""
