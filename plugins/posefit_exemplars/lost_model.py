@@ -5,7 +5,7 @@ they give a frame's expected error, in metres; standard deviations of joints and
 
 The probabilities are those of two logistic models of the same evidence: what the pose costs, the cost ratios of its
 mirrored and reflected poses, the spread of the sampled tracks, how many of them have the other side, whether the person
-moves where they face, the angle of view and the number of cameras. Each value stands beside its means over a moment and
+moves where they face, the angle of view and the number of cameras. Each value is used with its means over a moment and
 over a second: a lost track stays lost for a while, and masks that never fit mean less than one that fits worse now.
 """
 
@@ -98,8 +98,8 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
     "mirrored": math.log,  # the cost of the mirror image, over the cost
     "farthest": lambda value: math.log(max(value, 0.0) + 0.01),  # metres to the farthest sampled track
     "second": float,  # weight of the tracks that have left and right exchanged
-    "ahead": float,  # metres a second by which the root goes where it faces
-    "speed": float,  # metres a second by which it goes anywhere
+    "ahead": float,  # metres a second that the root moves in the direction it faces
+    "speed": float,  # metres a second that it moves in any direction
     "across": float,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
     "views": math.log2,  # cameras that show something of the person, at most `MAX_VIEWS`
 }
@@ -132,9 +132,9 @@ def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: b
     """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places."""
     if len(places) < 2:
         return {}
-    way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
-    ahead = float(way @ [math.sin(yaw), math.cos(yaw)])
-    return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(float(np.linalg.norm(way)), MAX_SPEED)}
+    velocity = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
+    ahead, speed = float(velocity @ [math.sin(yaw), math.cos(yaw)]), float(np.linalg.norm(velocity))
+    return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(speed, MAX_SPEED)}
 
 
 def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
@@ -215,7 +215,7 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
         known = exchanged < classifier.unknown
-        if (odds := frame.details.get("sides")) is not None:  # landmarks know better
+        if (odds := frame.details.get("sides")) is not None:  # landmarks are better evidence
             side_sums = decay * side_sums + [odds, 1.0]
             known = bool(side_sums[0] >= MIN_SIDE_ODDS * side_sums[1])
         recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))

@@ -118,7 +118,7 @@ def first_that_works(attempts: Array, works: NDArray[np.bool_], otherwise: Array
 
 
 def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array:
-    """Return proposals (count, d) from the start or uniform, in the box, whatever the prior says of them."""
+    """Return proposals (count, d) from the start or uniform, in the box, feasible or not."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
     drawn = wrap(space, rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
@@ -134,7 +134,7 @@ def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: 
 def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
     """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
 
-    A coordinate that leaves the box is folded back into it, as at a mirror; what the prior refuses is redrawn
+    A coordinate that leaves the box is folded back into it, as at a mirror; what is infeasible is redrawn
     at most 100 times and then stays at its mean.
     """
     spread = np.broadcast_to(spread, means.shape)

@@ -17,7 +17,7 @@ GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
 DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
 EXCHANGED = np.array([0.3, 0.13, 0.35])  # share of the frames in which left and right of each group are exchanged
-PERSISTENCE = 0.5  # correlation of that a thirtieth of a second later
+PERSISTENCE = 0.5  # correlation of exchanges a thirtieth of a second apart
 
 
 def landmark_likelihoods(
@@ -58,7 +58,7 @@ def landmark_costs(likelihoods: Array, exchanged: Array | None = None) -> Array:
 
 
 def exchanged_next(exchanged: Array, seconds: float) -> Array:
-    """Return how likely groups (..., K) are exchanged `seconds` later, where they are now with a probability."""
+    """Return how likely groups (..., K) are exchanged `seconds` later, by how likely they are now."""
     usual = np.tile(EXCHANGED, exchanged.shape[-1] // len(GROUPS))
     return np.asarray(usual + PERSISTENCE ** (30.0 * seconds) * (exchanged - usual))
 
@@ -69,11 +69,10 @@ def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
 
 
 def side_odds(likelihoods: Array) -> float:
-    """Return the logarithm of the odds that legs and arms are on the sides of a pose, not on the other ones.
+    """Return the logarithm of the odds that legs and arms are on the sides of a pose, by its likelihoods (K, 2).
 
-    Of its `landmark_likelihoods` (K, 2). What says nothing adds 0, and each limb of each view at most the odds of its
-    usual share of exchanges.
+    Unknown landmarks add 0, and each limb of each view at most the odds of its usual share of exchanges.
     """
     limbs = np.arange(len(likelihoods)) % len(GROUPS) <= ARMS
-    usual, own = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
-    return float(landmark_costs(own[:, ::-1], usual) - landmark_costs(own, usual))
+    usual, limb_likelihoods = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
+    return float(landmark_costs(limb_likelihoods[:, ::-1], usual) - landmark_costs(limb_likelihoods, usual))

@@ -52,13 +52,13 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
     """
     target = truth - truth.mean(axis=1, keepdims=True)
     source = joints - joints.mean(axis=1, keepdims=True)
-    left, spread, right = np.linalg.svd(np.swapaxes(source, 1, 2) @ target)
-    sign = np.sign(np.linalg.det(left @ right))
-    left[:, :, -1] *= sign[:, None]  # a rotation, never a reflection
+    u, spread, vh = np.linalg.svd(np.swapaxes(source, 1, 2) @ target)
+    sign = np.sign(np.linalg.det(u @ vh))
+    u[:, :, -1] *= sign[:, None]  # a rotation, never a reflection
     spread[:, -1] *= sign
     size = (source**2).sum(axis=(1, 2))
     scale = spread.sum(axis=1) / np.where(size > 0.0, size, 1.0)
-    moved = scale[:, None, None] * (source @ left @ right)
+    moved = scale[:, None, None] * (source @ u @ vh)
     return np.asarray(1e3 * np.linalg.norm(target - moved, axis=-1).mean(axis=1))
 
 

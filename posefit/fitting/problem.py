@@ -36,7 +36,7 @@ def align(
 
     Each border of a box says where the outermost disc of the body must touch, and that is linear in the translation:
     `focal (x + t_x) +- focal radius = (border - centre) (z + t_z)`. All borders of all views are solved for together,
-    by least squares, starting from anchors (n, 3). A border at the image's edge says nothing and is left out.
+    by least squares, starting from anchors (n, 3). A border at the image's edge is unknown and does not count.
     """
     translations = writeable(anchors.copy())
     move_to_borders(
@@ -56,7 +56,7 @@ def align(
 class PoseProblem:
     """One observation, from one camera or several, and the space in which its pose is searched. SAPSO (5).
 
-    `evaluate` is pure: a proposal's cost has the same bits whatever stands beside it and however many threads work.
+    `evaluate` is pure: a proposal's cost has the same bits whatever the others are and however many threads work.
     """
 
     body: Body = field(repr=False)
@@ -114,12 +114,12 @@ class PoseProblem:
                 self,
                 cameras=[coarser_camera(camera, factor) for camera in self.cameras],
                 silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in self.silhouettes],
-                blank=True,  # nothing of a small silhouette may be left
+                blank=True,  # a small silhouette may be empty
             )
         return self._coarser[factor]
 
     def decode(self, proposals: Array) -> tuple[Array, Array]:
-        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space asks it."""
+        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space says so."""
         poses, translations = self.space.decode(proposals)
         return poses, self._aligned(poses, translations)
 

@@ -26,7 +26,9 @@ def pulled(numbers: Array, mask: tuple, scale: float) -> tuple[Array, Array]:
     """Return half the second derivatives (106, 106) and half the gradient (106,) by the numbers of a drawn body."""
     centres, radii = numbers[: 2 * len(JOINTS)].reshape(-1, 2), numbers[2 * len(JOINTS) :].reshape(-1, 2)
     blocks, forces = np.zeros((len(BONES), 6, 6)), np.zeros((len(BONES), 6))
-    kernels.pull(BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), mask, scale, blocks, forces)
+    kernels.add_pulls(
+        BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), mask, scale, blocks, forces
+    )
     curves, slopes = np.zeros((COUNT, COUNT)), np.zeros(COUNT)
     for b, parent in enumerate(BONE_STARTS):
         rows = [2 * parent, 2 * parent + 1, 2 * b + 2, 2 * b + 3, *(2 * (len(JOINTS) + b) + np.arange(2))]

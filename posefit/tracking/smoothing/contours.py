@@ -1,7 +1,7 @@
 """Poses, path and build whose contours are those of the masks, by least squares over all frames at once.
 
-A tracker's estimate is a pose among those that it knows, and a search of each frame shakes. Here every angle gives way
-a little, and smoothly, to where the contours of the masks are, and the build, the same in all frames, with them.
+A tracker's estimate is one of the poses that it knows, and a search in each frame makes it shake. Here every angle
+gives way a little, and smoothly, to the contours of the masks; so does the build, which is the same in all frames.
 """
 
 from collections.abc import Sequence
@@ -161,19 +161,19 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     return np.stack(joints, axis=1) / DIFFERENCE, np.stack([grown.radii - body.radii for grown in bodies]) / DIFFERENCE
 
 
-# metres, step by step: what is farther off counts less, and at last is another person's, or a bag's
+# metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
 ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
 ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
 MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
-BUILD_FRAMES = 2.0  # for each of which the build is held once more: errors of contours are correlated, and add up
+BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
 WINDOW_FRAMES, OVERLAP_FRAMES = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A window of a track, as far as it is fitted."""
+    """A window of a track, before its fit or after some of its steps."""
 
     estimate: Motion  # before it is fitted
     fitted: Motion
@@ -190,7 +190,7 @@ def fit_contours(
     """Return a steady motion fitted to the borders of a scene's masks, and the build fitted with it.
 
     The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long
-    track is fitted in the window with most usable frames. A result that costs more than its start is not kept. A
+    track is fitted in the window with most usable frames. A result that costs more than its start is discarded. A
     motion of fewer than 3 frames is returned as it is.
     """
     if len(motion) < 3 or not visibility.usable.any():
@@ -205,9 +205,9 @@ def fit_contours(
             fitted[best] = part
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for k, (rows, kept) in enumerate(parts):
+    for k, (rows, inner) in enumerate(parts):
         part = fitted.get(k) or _fitted(scene, motion, visibility, rows, body, None, beta)
-        poses[rows[kept]], places[rows[kept]] = part.fitted.poses[kept], part.fitted.translations[kept]
+        poses[rows[inner]], places[rows[inner]] = part.fitted.poses[inner], part.fitted.translations[inner]
     return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
 
 
@@ -220,7 +220,7 @@ def _fitted(
     shape: Shape | None,
     beta: float,
 ) -> _Part:
-    """Return some frames of a motion as the best step fits them; the build too where there is a shape to begin with."""
+    """Return some frames of a motion as the best step fits them, with the build where there is a shape to fit."""
     estimate = replace(motion, skeleton=body.skeleton, poses=motion.poses[rows], translations=motion.translations[rows])
     observations = [scene.observations[k] for k in rows.tolist()]
     places = estimate.translations
@@ -245,34 +245,34 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
-    """Return a window one step of Gauss and Newton farther, towards the borders of all views."""
+    """Return a window after a step of Gauss and Newton to the borders of all views."""
     fitted, estimate, factors, spread = part.fitted, part.estimate, len(part.factors), part.spread
     angles = np.flatnonzero(fitted.skeleton.free).tolist()
     poses, places, numbers = fitted.poses, fitted.translations, 3 + len(angles)
     grown = growth(part.body, part.height, fitted) if factors else None
     curves, slopes, mixed, curve, slope = contour_squares(part.body, borders, poses, places, scale, grown)
-    squares, some, turns = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
+    squares, some, changes = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
     squares.add(slice(None), curves, slopes)
     add_root(squares, estimate, part.visibility, ROOT_DEVIATION, places - estimate.translations)
     change = wrapped(poses - estimate.poses)[:, angles]
     squares.add(some, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
     squares.add_bends(some, change, fitted.fps**2 / ANGLE_ACCELERATION)
-    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.eyes), angles)
+    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.viewpoints), angles)
     if not factors:
-        way = squares.least()
+        steps = squares.least()
     else:
         solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
-        way, answers = solved[..., 0], solved[..., 1:]
+        steps, by_factor = solved[..., 0], solved[..., 1:]
         held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
         known = held / SPREAD**2
-        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, answers)
-        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, way)
-        turns = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
-        turns = part.factors - np.clip(part.factors - turns, -REACH * SPREAD, REACH * SPREAD)
-        way = way - answers @ turns
+        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, by_factor)
+        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, steps)
+        changes = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
+        changes = part.factors - np.clip(part.factors - changes, -REACH * SPREAD, REACH * SPREAD)
+        steps = steps - by_factor @ changes
         spread = np.sqrt(held * np.diag(np.linalg.inv(curve)))
     poses = poses.copy()
-    poses[:, angles] -= np.clip(way[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    body = shaped(part.body, np.exp(-turns), part.height) if factors else part.body
-    fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - way[:, :3])
-    return replace(part, fitted=fitted, body=body, factors=part.factors - turns, spread=spread)
+    poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
+    body = shaped(part.body, np.exp(-changes), part.height) if factors else part.body
+    fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3])
+    return replace(part, fitted=fitted, body=body, factors=part.factors - changes, spread=spread)
