@@ -49,9 +49,6 @@ class Prior(Latents, Protocol):
 
     It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods beside `fit` may be used
     only after `fit`.
-
-    A prior whose joint angles are affine in the latents may have an attribute `affine`: the weights (m, 63) of the
-    latents, and the angles (63,) where all of these are 0. Where a GPU draws, it then decodes as well.
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:

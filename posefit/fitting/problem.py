@@ -21,7 +21,6 @@ from posefit.silhouette.cost import (
     costs_in,
     drawing_of,
     known_views,
-    mean_cost,
     mean_over_views,
     pose_costs,
 )
@@ -92,7 +91,7 @@ class PoseProblem:
         if proposals.shape[1:] != (self.space.dimensions,):
             self.space.decode(proposals)  # raises
         if self.on_device:
-            return self._cost_on_device(proposals)
+            return self.cost_and_areas(*self.decode(proposals))[0]
         parts = parts_of(len(proposals), self.threads)
         if len(parts) == 1:
             return self._cost(*self.decode(proposals))
@@ -123,10 +122,6 @@ class PoseProblem:
         poses, translations = self.space.decode(proposals)
         return poses, self._aligned(poses, translations)
 
-    def cost(self, poses: Array, translations: Array) -> Array:
-        """Return the cost (n,) of poses (n, 66) with their root at translations (n, 3)."""
-        return self.cost_and_areas(poses, translations)[0]
-
     def areas(self, poses: Array, translations: Array) -> Areas:
         """Return R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
         return self.cost_and_areas(poses, translations)[1]
@@ -153,15 +148,6 @@ class PoseProblem:
     def _cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
         return mean_over_views([costs_in(*view, poses, translations, self.beta) for view in self._drawings])
-
-    def _cost_on_device(self, proposals: Array) -> Array:
-        """Return the cost (n,) of proposals (n, d), which a GPU decodes where it can."""
-        from posefit.fitting.cuda import areas_of_proposals, decodes
-
-        if decodes(self.space):
-            counts = areas_of_proposals(self.body, self.cameras, self.silhouettes, self.space, proposals)
-            return mean_cost(counts, self.silhouettes, self.beta)
-        return self.cost(*self.decode(proposals))
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
         """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""

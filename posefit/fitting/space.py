@@ -71,11 +71,6 @@ class SearchSpace:
         """How many coordinates a proposal has."""
         return len(self.centre)
 
-    @property
-    def tilt_mean(self) -> Array:
-        """Pitch and roll by the latents (3 + m, 2), as a `Tilt` has them; 0 where there is none."""
-        return np.zeros((3 + len(self.prior.low), 2)) if self.tilt is None else self.tilt.mean
-
     def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
         """Return the space whose yaw range, and searched translation, are centred on coordinates (d,).
 
@@ -110,8 +105,8 @@ class SearchSpace:
             raise InputError(f"proposals must have shape (n, {d}), got {proposals.shape}")
         n = len(proposals)
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
-        box = self.centre, self.half, self.anchor, self.tilt_mean
-        if not unpack_proposals(proposals, *box, poses, translations, latents):
+        tilt = np.zeros((3 + m, 2)) if self.tilt is None else self.tilt.mean
+        if not unpack_proposals(proposals, self.centre, self.half, self.anchor, tilt, poses, translations, latents):
             raise InputError("proposals must be finite, got nan or infinity")
         if self.root_order == "xyz":
             poses[:, :3] = yaw_first(poses[:, :3])
