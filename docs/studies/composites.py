@@ -47,6 +47,7 @@ from posefit.silhouette.cost import project
 from posefit.sweep.engine import Limits
 from posefit.tracking.front import track
 from posefit.tracking.result import Track
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_reproduce.jobs import each
 from table import WORKERS, earlier, kept, markdown
 
@@ -84,7 +85,7 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
     away = 1e3 * np.linalg.norm(joints[:, 0] - true_joints[:, 0], axis=1)
     facing = np.cos(estimate.poses[:, 0] - actor.motion.poses[:, 0]) > 0.0
     said = {name: track.table[name] for name in ("lost", "unknown_sides")}
-    swapped = metrics.swapped(true_joints, joints)
+    swapped = nearer_mirrored(true_joints, joints)
     known = seen & (said["unknown_sides"] == 0.0)
     lengths = [np.linalg.norm(motion.skeleton.offsets, axis=1) for motion in (actor.motion, estimate)]
     off = np.abs(lengths[1] / lengths[0] - 1.0)

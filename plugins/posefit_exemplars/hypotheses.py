@@ -5,7 +5,7 @@ person leans or faces. So each frame has several hypotheses. Some are fresh: the
 beam, and reflections of these. The others continue those of the frame before at their speed. Each is fitted to the
 contours by a few steps of Gauss and Newton, which may turn every joint. A hypothesis costs what its silhouette does,
 and its distance from the poses of clips; a step costs the distance of the trunk and of each limb from where their
-motion leads. The likeliest sequence is Viterbi's: a wrong pose may fit one frame, but hardly ever twenty.
+motion leads. The likeliest sequence is Viterbi's: a wrong pose may fit one frame, but hardly twenty.
 
 Masks of a camera and a fitted body are less precise than clean ones. Where even the best frames cost more, the contours
 of a single view count for less against the poses that a fit starts with and those of clips: nothing else keeps a body
@@ -28,7 +28,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
-from posefit_exemplars.contours import STEP_EVALUATIONS, precisions
+from posefit_exemplars.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate
@@ -186,7 +186,7 @@ class HypothesisFilter:
         noise = self._noise(frame_costs, poses, places)
         weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
         if contours is not None:
-            poses, places = contours.fitted(task, poses, places, poses, weights, FRESH_REACHES)
+            poses, places = fitted(task.body, contours, (poses, places), poses, weights, FRESH_REACHES)
             evaluations += len(poses) * FRESH_EVALUATIONS
         parents = np.full(len(poses), -1)
         if before is not None and rows is not None:
@@ -195,7 +195,7 @@ class HypothesisFilter:
                 moved, shifted = before.hypotheses.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)
                 means, pulls = self._pulled(moved, weights, noise)
-                moved, shifted = contours.fitted(task, moved, shifted, means, pulls, CONTINUED_REACHES)
+                moved, shifted = fitted(task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
                 evaluations += len(rows) * CONTINUED_EVALUATIONS
             poses, places = np.concatenate([poses, moved]), np.concatenate([places, shifted])
             parents = np.concatenate([parents, rows])
@@ -252,10 +252,9 @@ class HypothesisFilter:
         if not frame_costs.usable or count <= 0:
             return poses, places
         likeliest = (poses, places) if before is None or rows is None else before.hypotheses.continued(rows)
-        reflectable, beside = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
+        reflectable, place = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
         reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
-        beside = np.resize(beside, (len(reflected), 3))
-        return np.concatenate([poses, reflected]), np.concatenate([places, beside])
+        return np.concatenate([poses, reflected]), np.concatenate([places, np.resize(place, (len(reflected), 3))])
 
     def _pulled(self, poses: Array, weights: Array, noise: float) -> tuple[Array, Array]:
         """Return what poses (n, 66) are pulled to, between themselves and similar poses of clips, and how (69,)."""

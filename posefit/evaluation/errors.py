@@ -20,7 +20,7 @@ from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL
 from posefit.uncertainty.intervals import joint_intervals
-from posefit.uncertainty.modes import unknown_sides
+from posefit.uncertainty.modes import nearer_mirrored, unknown_sides
 
 MAX_FULL_SIZE_POSES = 8_000  # training poses, more than which are not all drawn at full size in every frame
 SMALL_STRIDE = 4  # of so many poses each is drawn in a small picture
@@ -126,7 +126,7 @@ def _errors(
         "geodesic_degrees": metrics.geodesic_degrees(truth, poses),
         "mpjpe_mm": metrics.mpjpe_mm(true_joints, joints),
         "pa_mpjpe_mm": metrics.pa_mpjpe_mm(true_joints, joints),
-        "swapped": metrics.swapped(true_joints, joints).astype(np.float64),
+        "swapped": nearer_mirrored(true_joints, joints).astype(np.float64),
     }
     means = {name: float(values.mean()) for name, values in columns.items()}
     errors = columns["error_degrees"]

@@ -166,7 +166,10 @@ _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15."""
+    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15.
+
+    In a side view a pose and its mirror image have nearly one silhouette.
+    """
     return mirrored_gain(targets, joints) > 0.0
 
 

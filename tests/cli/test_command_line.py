@@ -100,10 +100,7 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
 
 
 def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
-    tracks = [
-        posefit.track("walk", frames=(0, 4), evaluations=240, seed=3, threads=threads)
-        for threads in (1, 2)
-    ]
+    tracks = [posefit.track("walk", frames=(0, 4), evaluations=240, seed=3, threads=threads) for threads in (1, 2)]
     np.testing.assert_array_equal(tracks[0].motion.poses, tracks[1].motion.poses)
     other = posefit.track("walk", frames=(0, 4), evaluations=240, seed=4)
     assert np.abs(other.motion.poses - tracks[0].motion.poses).max() > 0.0
@@ -111,7 +108,9 @@ def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None
 
 def test_the_command_is_the_typed_call() -> None:
     summary = printed("track", "walk", "--frames", "0:3", "--seed", "7", *QUICK)
-    called = posefit.track("walk", frames=(0, 3), seed=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90)).summary
+    called = posefit.track(
+        "walk", frames=(0, 3), seed=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90)
+    ).summary
     for key in KEYS - TIMES:
         assert summary[key] == called[key]
 

@@ -26,6 +26,7 @@ from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.sapso.motions import PaperMotion, paper_scene
 from posefit_reproduce.sapso.paper import (
@@ -188,7 +189,7 @@ def estimate_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
         estimate.poses,
         float(np.mean([frame.seconds for frame in frames])),
         float(np.mean([frame.evaluations for frame in frames])),
-        float(metrics.swapped(truth, joints).mean()),
+        float(nearer_mirrored(truth, joints).mean()),
         float((metrics.mpjpe_mm(truth, joints) > metrics.LOST_MM).mean()),
     )
 

@@ -46,7 +46,7 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     from scipy.ndimage import gaussian_filter1d
 
     angles = gaussian_filter1d(np.unwrap(motion.poses, axis=0), STEADY_SECONDS * motion.fps, axis=0, mode="nearest")
-    return replace(motion, poses=np.where(np.isfinite(visibility.eyes[:, :1]), angles, motion.poses))
+    return replace(motion, poses=np.where(np.isfinite(visibility.viewpoints[:, :1]), angles, motion.poses))
 
 
 def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float, fitted: bool) -> Frame:
