@@ -129,8 +129,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._episodes: dict[int, Episode] = {}
         self._truths = np.empty((num_envs, ANGLES))
 
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[misc, override]
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The random generator of each environment."""
         return tuple(self._generator(i) for i in range(self.num_envs))
 
