@@ -148,6 +148,28 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     assert len({float(pose[0]) for pose in poses}) == 3  # the box moved on with each frame
 
 
+def test_numbers_of_numpy_are_taken_as_arguments() -> None:
+    arguments: dict[str, Any] = {
+        "instance": np.int64(3), "size": np.array([64, 48]), "view_degrees": np.array([0.0, 90.0]),
+        "mismatch_percent": np.float32(2.0), "noise": {"holes": np.float32(0.5)}, "errors": np.True_,
+    }  # fmt: skip
+    plain = {"instance": 3, "size": (64, 48), "view_degrees": [0.0, 90.0], "mismatch_percent": 2.0}
+    plain |= {"noise": {"holes": 0.5}, "errors": True}
+    own: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+        "posefit/FitState-v0": (
+            {"image": np.True_, "max_evaluations": np.int64(9)},
+            {"image": True, "max_evaluations": 9},
+        ),
+        "posefit/Race-v0": (
+            {"generations": np.array([3, 6]), "searches": np.int8(2)},
+            {"generations": (3, 6), "searches": 2},
+        ),
+    }
+    for name, (numbers, same) in own.items():
+        first, second = (gym.make(name, **more).reset(seed=1) for more in ({**arguments, **numbers}, {**plain, **same}))
+        assert data_equivalence(first, second)
+
+
 TWO = r"generations must be two whole numbers such as \(100, 220\), got "
 WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
     "posefit/Track-v0": [
