@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.optimiser import check_tell, finite_costs
+from posefit.reading import cut
 
 ALPHA_COV = 2.0
 LAG = 0.1  # of the decomposition, appendix B.2
@@ -73,6 +75,8 @@ class Strategy:
 
     def __init__(self, mean: Array, spread: Array, population: int) -> None:
         """Start around `mean` (d,) with standard deviations `spread` (d,), generations of `population` proposals."""
+        if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
+            raise InputError(f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}")
         d = len(mean)
         self.mean, self.sigma = np.array(mean, dtype=np.float64), math.sqrt(float((spread**2).mean()))
         self.covariance = np.diag(np.maximum(spread / self.sigma, 1e-6) ** 2)  # the least is ours

@@ -1,7 +1,7 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -51,8 +51,7 @@ def initialise(
     scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress
 ) -> tuple[Task, Shape | None]:
     """Return a task with its first pose, where restarts search it, and the person's build, where it is fitted."""
-    with _compiling_announced(progress.log):
-        looks_ahead = _warm_up(method, task, scene)
+    looks_ahead = _warm_up(method, task, scene)
     footage = scene.truth is None
     restarts = (RESTARTS if footage and not looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
@@ -103,23 +102,3 @@ def _warm_up(method: Method, task: Task, scene: Scene) -> bool:
         tracker = method.tracker(few, COMPILE_SECONDS)
         next(tracker.track([first], np.random.default_rng(0)))
     return getattr(tracker, "lag", None) is not None
-
-
-@contextmanager
-def _compiling_announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Announce once that something is compiled that is not in numba's cache."""
-    from numba.core import event
-
-    class Once(event.Listener):  # type: ignore[misc]
-        announced = False
-
-        def on_start(self, _event: event.Event) -> None:
-            if not self.announced:
-                self.announced = True
-                say("compiling the kernels, once on this machine; this takes ten seconds or more ...")
-
-        def on_end(self, _event: event.Event) -> None:
-            pass
-
-    with event.install_listener("numba:compile", Once()):
-        yield
