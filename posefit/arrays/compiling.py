@@ -6,13 +6,17 @@ version. It is in NUMBA_CACHE_DIR where that is set, else in the user's cache.
 """
 
 import hashlib
+import logging
+import multiprocessing
 import os
+import pickle
 import shutil
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from posefit.version import NOT_IN_RESULTS, source_digest
@@ -21,8 +25,43 @@ config: Any = numba.config
 MAX_FOLDERS = 32  # of a user's cache: those of older sources are removed
 
 
+class _Announcement(event.Listener):  # type: ignore[misc]
+    """Logs once that a function of posefit's is compiled, but not in a process that another one started."""
+
+    announced = multiprocessing.parent_process() is not None
+
+    def on_start(self, event: Any) -> None:
+        """Log a warning, which is printed on stderr unless logging is configured otherwise."""
+        if not self.announced and event.data["dispatcher"].py_func.__module__.startswith("posefit"):
+            self.announced = True
+            message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
+            logging.getLogger("posefit").warning(message)
+
+    def on_end(self, event: Any) -> None:
+        """Say nothing."""
+
+
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+
+
+class CheckedFile(IndexDataCacheFile):
+    """A file of numba's cache that begins with a digest of the rest: what is damaged is never run."""
+
+    def _save_data(self, name: str, data: Any) -> None:
+        dumped = self._dump(data)  # type: ignore[no-untyped-call]
+        with self._open_for_write(self._data_path(name)) as file:  # type: ignore[no-untyped-call]
+            file.write(hashlib.sha256(dumped).digest() + dumped)
+
+    def _load_data(self, name: str) -> Any:
+        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
+        digest, dumped = content[:32], content[32:]
+        if hashlib.sha256(dumped).digest() != digest:
+            raise ValueError(f"{name} is damaged")
+        return pickle.loads(dumped)
+
+
 class TolerantCache(FunctionCache):
-    """numba's cache, for which a file that is empty, cut off or cannot be written is a miss.
+    """numba's cache, for which a file that is damaged, or cannot be read or written, is a miss.
 
     Each signature has an index of its own: of one index two processes may write, one loses what the other compiled.
     """
@@ -31,7 +70,7 @@ class TolerantCache(FunctionCache):
         """Use the index of a signature."""
         base = f"{self._impl.filename_base}-{hashlib.sha256(str(sig).encode()).hexdigest()[:12]}"
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = IndexDataCacheFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
+        self._cache_file = CheckedFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled for a signature; None where it is not there."""
