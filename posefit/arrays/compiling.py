@@ -96,7 +96,7 @@ def _folder(module: str) -> str:
 
     That is the module's source, the constants that it imports, and the same of the modules whose functions it imports.
     """
-    digest, modules = hashlib.sha256(numba.__version__.encode()), [module]
+    digest, modules, own = hashlib.sha256(numba.__version__.encode()), [module], ("posefit", module.partition(".")[0])
     for name in modules:
         loaded = sys.modules[name]
         digest.update(Path(str(loaded.__file__)).read_bytes())
@@ -105,7 +105,7 @@ def _folder(module: str) -> str:
                 digest.update(key.encode() + value.tobytes())
             elif isinstance(value, int | float | str | tuple | np.generic) and not key.startswith("__"):
                 digest.update(f"{key} {value!r}".encode())
-            elif (owner := getattr(value, "__module__", None)) and owner.startswith("posefit") and owner not in modules:
+            elif (owner := getattr(value, "__module__", None)) and owner.startswith(own) and owner not in modules:
                 modules.append(owner)
     return f"{module}-{digest.hexdigest()[:16]}"
 
