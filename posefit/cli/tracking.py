@@ -107,7 +107,7 @@ def _print(
 @click.argument("video")
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
 @options(EXTRACTION)
-@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Of the segmenter; repeatable.")
+@click.option("--set", "settings", multiple=True, metavar="[NAME.]SETTING=VALUE", help="Of the segmenter; repeatable.")
 @FRAMES
 @JSON
 def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
+from posefit.fitting.driving import clocks
 from posefit.footage.readers import IMAGES, name_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
@@ -73,7 +74,10 @@ def track(
         recorder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
     with recorder:
         with progress.phase("masks"):
+            start = clocks()
             scene = scene or scene_of(sources, progress, **chosen.view)
+            seconds, cpu_seconds = (clocks() - start).tolist()
+            scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
         training = training_motions(clips, scene.fps)
         track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
         names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]

@@ -165,7 +165,8 @@ def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any
 def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
-    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`. Raises InputError where a
+    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
+    left out where it alone has such a setting. Raises InputError where a
     text has another form, names a plugin that is not among `offers` or a setting that it does not know, or where a
     value does not fit.
     """
@@ -174,7 +175,10 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
     for item in given:
         left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
         name, dot, setting = left.partition(".")
-        if not (equals and dot):
+        if not dot:  # the name may be left out where one plugin alone has the setting
+            having = [name for name, (_, factory) in places.items() if left in settings.names(factory)]
+            name, setting = (having[0], left) if len(having) == 1 else ("", "")
+        if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
             known = ", ".join(places)

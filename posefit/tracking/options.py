@@ -158,9 +158,9 @@ class TrackOptions:
     prior: "Prior | None" = option(None, "A prior that has learned instead of a name.", flag="")
     settings: Mapping[str, Any] | Sequence[str] = option(
         (),
-        "Of a plugin, such as sapso.cooling=0.9; repeatable.",
+        "Of a plugin, such as sapso.cooling=0.9 or, where one alone has it, cooling=0.9; repeatable.",
         None,
-        "NAME.SETTING=VALUE",
+        "[NAME.]SETTING=VALUE",
         "set",
         repeated=True,
     )
