@@ -76,8 +76,9 @@ def track(
         with progress.phase("masks"):
             start = clocks()
             scene = scene or scene_of(sources, progress, **chosen.view)
-            seconds, cpu_seconds = (clocks() - start).tolist()
-            scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
+            if scene.truth is None:  # a known motion is drawn frame by frame, as it is tracked
+                seconds, cpu_seconds = (clocks() - start).tolist()
+                scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
         training = training_motions(clips, scene.fps)
         track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
         names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]
