@@ -30,16 +30,22 @@ function stillOf(row) {
   return { scene, track, camera, size: 2.08 * Math.max(...far, 1) };
 }
 
-function paintStill(canvas, { scene, track, camera, size }, time) {
-  const frame = time % scene.frames;
-  const { pen, width, height } = sheet(canvas, 1);
-  const scale = width / size;
-  const [truth, estimate] = [scene.joints(frame), track.joints(frame)].map((points) => projected(camera, points));
-  pen.translate(width / 2 - scale * truth[0][0], height / 2 - scale * truth[0][1]);
-  pen.scale(scale, scale);
-  if (scene.radii.length) silhouette(pen, camera, truth, scene.radii, "--truth", 0.35);
-  else sticks(pen, truth, ink("--truth"), 5 / scale);
-  sticks(pen, estimate, limbs(), 2.2 / scale);
+// Adds a button with a small picture that opens a track; returns what paints its picture at a time.
+function addStill(box, row, kind, ...words) {
+  const canvas = make("canvas", { "aria-hidden": "true" });
+  box.append(button([canvas, make("span", {}, ...words)], () => openTrack(row), { class: kind }));
+  const { scene, track, camera, size } = stillOf(row);
+  return (time) => {
+    const frame = time % scene.frames;
+    const { pen, width, height } = sheet(canvas, 1);
+    const scale = width / size;
+    const [truth, estimate] = [scene.joints(frame), track.joints(frame)].map((points) => projected(camera, points));
+    pen.translate(width / 2 - scale * truth[0][0], height / 2 - scale * truth[0][1]);
+    pen.scale(scale, scale);
+    if (scene.radii.length) silhouette(pen, camera, truth, scene.radii, "--truth", 0.35);
+    else sticks(pen, truth, ink("--truth"), 5 / scale);
+    sticks(pen, estimate, limbs(), 2.2 / scale);
+  };
 }
 
 function silhouette(pen, camera, pixels, radii, name, opacity) {
@@ -62,12 +68,8 @@ function gallery() {
   const cards = [...best].sort((a, b) => a[0] - b[0]);
   const add = () => {
     for (const [instance, row] of cards.splice(0, CARDS)) {
-      const canvas = make("canvas", { "aria-hidden": "true" });
       const small = make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`);
-      const words = make("span", {}, INSTANCES[instance], small);
-      $("cards").append(button([canvas, words], () => openTrack(row), { class: "card" }));
-      const still = stillOf(row);
-      paintStill(canvas, still, Math.floor(still.scene.frames / 2));
+      addStill($("cards"), row, "card", INSTANCES[instance], small)(Math.floor(sceneOf(row).frames / 2));
     }
     $("more-cards").hidden = !cards.length;
   };

@@ -1,5 +1,6 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
-const PAGE = 50; // rows
+const PAGE = 25; // rows
+const FEW = ["error", "lost", "ms"]; // figures of a run that need no button
 
 // A column: its title, or one for screen readers alone, `of` to sort by, and what is shown of it. `of` is a name in a
 // row, or a function of the row.
@@ -9,16 +10,16 @@ const column = (title, of, show, more) => {
   return { title, value, show: (row) => (given(value(row)) ? show(value(row)) : "–"), ...more };
 };
 const textColumn = (title, of, show = pick(of), more = {}) => ({ title, text: true, value: pick(of), show, ...more });
-const namedColumn = (title, names, of) => textColumn(title, of, (row) => names[of(row)]);
+const namedColumn = (title, names, of) => textColumn(title, of, (row) => names[pick(of)(row)]);
 const methodColumn = (of) => {
   const name = (row) => METHODS[pick(of)(row)];
   return textColumn("method", name, (row) => [swatch(pick(of)(row)), name(row)]);
 };
 const seedColumn = (of) => column("seed", of, (seed) => String(D.seeds[seed]));
 const buttonColumn = (unseen, show) => ({ unseen, text: true, show });
-const intervalColumn = (about, of, digits, none, [low, high] = ["low", "high"]) => {
+const intervalColumn = (about, of, digits, [low, high] = ["low", "high"]) => {
   const ends = (row) => `${number(row[low], digits)} – ${number(row[high], digits)}`;
-  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : none(row)) };
+  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : "–") };
 };
 const badColumn = (title, value, about) => {
   const show = (row) => (row.base ? "" : make("span", { class: value(row) ? "bad" : null }, String(value(row))));
@@ -91,6 +92,13 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
   const grid = make("table", {}, make("thead", {}, make("tr", {}, ...heads)), body);
   box.replaceChildren(make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": name }, grid));
   if (rows.length > PAGE) box.append(pager);
+  if (columns.some((one) => one.more)) {
+    const toggle = button("more columns", () => {
+      toggle.textContent = box.classList.toggle("few") ? "more columns" : "fewer columns";
+    });
+    box.classList.add("few");
+    box.prepend(toggle);
+  }
   show();
 }
 
@@ -112,7 +120,7 @@ function leaderboard() {
   const columns = [
     textColumn("method", name, method),
     figure(score),
-    intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : "–")),
+    intervalColumn("Sorts by its width", width, digits),
     column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), {
       about: `The median of the differences from the leader in paired ${paired}`,
     }),
@@ -127,15 +135,9 @@ function leaderboard() {
     ...figures.filter((one) => one !== "above").map((one) => more(figure(one))),
     more({ title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) }),
   ];
-  const box = $("leaders");
-  box.classList.add("few");
-  const toggle = button("more columns", () => {
-    toggle.textContent = box.classList.toggle("few") ? "more columns" : "fewer columns";
-  });
-  box.before(toggle);
-  const order = { by: 1, down: D.score.better === "more" };
+  const order = { by: 1, down: D.score.down };
   const kind = (row) => (row.base ? "base" : null);
-  table(box, columns, [...D.leaderboard, ...bases], { name: "Leaderboard", ...order, kind });
+  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", ...order, kind });
 }
 
 // Buttons to watch a run, if it has an animation, and for the command that runs it again.
@@ -171,11 +173,11 @@ function allRows() {
   const columns = [
     buttonColumn("watch, or run again", runButtons),
     textColumn("method", of("method"), (k) => [METHODS[R.method[k]], D.warned[k] ? warningSign(k) : null]),
-    textColumn("settings", settings, (k) => settings(k) || "default"),
+    { ...textColumn("settings", settings, (k) => settings(k) || "default"), more: true },
     namedColumn("instance", INSTANCES, of("instance")),
     seedColumn(of("seed")),
-    ...Object.keys(D.columns).map((name) => figure(name, of(name))),
-    textColumn("key", of("key")),
+    ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !FEW.includes(name) })),
+    { ...textColumn("key", of("key")), more: true },
   ];
   const selects = [
     ["of-method", "all", numbered(METHODS), of("method")],
