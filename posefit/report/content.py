@@ -2,12 +2,11 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import printable
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
@@ -23,7 +22,8 @@ from posefit.statistics.intervals import RESAMPLES
 from posefit.suites.running import SHOWN
 from posefit.sweep.ledger import Ledger
 
-REASONS = 5  # of failures, the most frequent ones, that the first screen names
+REASONS = 5  # of failures and warnings, the most frequent ones, that the first screen names
+MAX_MISSING = 20  # instances that it names if they are not compared
 FEW_RUNS = 20  # of a method, below which intervals are called wide
 POINTS = max(charts.POINTS, len(JOINTS))  # at which very many runs are drawn by some of them
 
@@ -65,7 +65,7 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
 
 def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, warn: Any) -> dict[str, Any]:
     """Return what the page has of tracks alone, and their list of sections."""
-    part: dict[str, Any] = {"sections": ["gallery", "rows"] if len(runs) else []}
+    part: dict[str, Any] = {"sections": ["rows"] if len(runs) else []}
     if contest is not None:
         drawn = contest.fewer(POINTS)
         errors, certainty = charts.joint_errors(drawn), charts.certainty(contest)
@@ -79,13 +79,10 @@ def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, 
             "joint_errors": [vars(intervals) for intervals in errors],
             "certainty": certainty,
         }
-    baselines = {name: _by_instance(runs, f"baseline_{name}") for name in runs.kind.baselines}
+    numbers = [_exact(place["instance"]) for place in runs.places]
     return {
         **part,
-        "instances": [
-            {"name": name, "number": _exact(place["instance"]), **{base: means[i] for base, means in baselines.items()}}
-            for i, (name, place) in enumerate(zip(runs.instances, runs.places, strict=True))
-        ],
+        "instances": [{"name": name, "number": n} for name, n in zip(runs.instances, numbers, strict=True)],
         "rows": {
             **{name: getattr(runs, name) for name in ("method", "instance", "head", "seed")},
             **{name: runs.figures[name] for name in runs.table_figures},
@@ -110,6 +107,10 @@ def _search_part(_: Ledger, __: Runs, contest: Contest | None, *___: Any) -> dic
 
 
 def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
+    dropped = [
+        {"instance": runs.instances[i], "missing": [runs.methods[m] for m in methods]}
+        for i, methods in (contest.missing if contest else ())
+    ]
     failed = f"{counted(len(runs.failures), 'cell')} failed" if runs.failures else "no cell failed"
     facts = {"methods": runs.methods, **runs.kind.facts(runs), "posefit": runs.values("version")}
     texts = {name: fact if isinstance(fact, str) else "; ".join(map(str, fact)) for name, fact in facts.items()}
@@ -122,14 +123,38 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "done": len(runs),
         "failed": len(runs.failures),
         "failed_by": Counter(failure["method"] for failure in runs.failures),
-        "reasons": Counter(reason for failure in runs.failures for reason in failure["reasons"]).most_common(REASONS),
         "unfinished": runs.unfinished,
-        "dropped": [
-            {"instance": runs.instances[i], "missing": [runs.methods[m] for m in methods]}
-            for i, methods in (contest.missing if contest else ())
-        ],
-        "unpaired": unpaired_sentence(contest) if contest else "",
+        "dropped": dropped,
+        "trouble": _trouble(runs, dropped, unpaired_sentence(contest) if contest else ""),
     }
+
+
+def _trouble(runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str) -> list[tuple[str, list[str]]]:
+    """Return what failed, what is therefore not compared, and what warned: sentences with the most frequent details."""
+    trouble = []
+
+    def add(text: str, details: Sequence[str], most: int) -> None:
+        more = [f"and {len(details) - most:,} more"] if len(details) > most else []
+        trouble.append((text, [*details[:most], *more]))
+
+    if runs.failures:
+        by = Counter(failure["method"] for failure in runs.failures)
+        reasons = Counter(reason for failure in runs.failures for reason in failure["reasons"]).most_common()
+        text = "; ".join(f"{method} {count}" for method, count in by.items())
+        failed = counted(len(runs.failures), "cell")
+        add(f"{failed} failed, left out of all figures: {text}", [f"{n} x {reason}" for reason, n in reasons], REASONS)
+    if runs.unfinished:
+        add(f"no cell finished, so not on the leaderboard: {'; '.join(runs.unfinished)}", [], 0)
+    if unpaired:
+        add(unpaired, [], 0)
+    if dropped:
+        whys = [f"no run of {'; '.join(gap['missing'])}" if gap["missing"] else "no seed in common" for gap in dropped]
+        details = [f"{gap['instance']}: {why}" for gap, why in zip(dropped, whys, strict=True)]
+        add(f"left out of the comparison, for every method: {counted(len(dropped), 'instance')}", details, MAX_MISSING)
+    if runs.warnings:
+        texts = Counter(text for texts in runs.warnings.values() for text in texts).most_common()
+        add(f"{counted(len(runs.warnings), 'run')} with a warning", [f"{n} x {text}" for text, n in texts], REASONS)
+    return trouble
 
 
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:
@@ -180,13 +205,3 @@ def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
 def _exact(number: int) -> int | str:
     """Return a number that a browser does not round: a text, where its floats would."""
     return number if abs(number) < 2**53 else str(number)
-
-
-def _by_instance(runs: Runs, figure: str) -> Array:
-    """Return the mean of a figure on each instance (instances,), nan where no row has it."""
-    values = runs.figures[figure]
-    known = np.isfinite(values)
-    total, count = (
-        np.bincount(runs.instance[known], weights, minlength=len(runs.instances)) for weights in (values[known], None)
-    )
-    return np.asarray(np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0))

@@ -101,6 +101,7 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
             "name": name,
             "runs": len(own),
             "failed": runs.failed[m],
+            "warned": sum(k in runs.warnings for k in own.tolist()),
             "taking_part": m in contest.methods,
         }
         row |= {figure: column.average(runs.figures[figure][own]) for figure, column in runs.kind.columns.items()}
@@ -126,11 +127,12 @@ def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
     duels: dict[int, dict[str, float | None]] = {m: dict.fromkeys(names) for m in range(len(contest.runs.methods))}
     for pair in contest.comparisons:
         if place == pair.first:
-            values = -pair.difference, -pair.high, -pair.low, pair.adjusted
-            duels[contest.methods[pair.second]] = dict(zip(names, values, strict=True))
-        elif place == pair.second:
-            values = pair.difference, pair.low, pair.high, pair.adjusted
-            duels[contest.methods[pair.first]] = dict(zip(names, values, strict=True))
+            ends = -pair.difference, -pair.high, -pair.low
+        else:
+            ends = pair.difference, pair.low, pair.high
+        if place in (pair.first, pair.second):
+            other = contest.methods[pair.first + pair.second - place]
+            duels[other] = dict(zip(names, (*ends, pair.adjusted), strict=True))
     return duels
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from posefit.errors import InputError
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
-from posefit.reading import counted, cut
+from posefit.reading import cut
 from posefit.report.content import data_of
 from posefit.report.export import logged_runs, write_csv, write_iohprofiler
 from posefit.report.page import MARK, document
@@ -16,7 +16,6 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
 from posefit.tracking.measures import BASELINES
 
-MAX_MISSING = 20  # instances that are named if they are not compared
 SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
@@ -70,7 +69,8 @@ def write_report(
 def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leader, what is left out, the leaderboard, and the page's place."""
     lines = [*report["answer"]] if "leaderboard" in report else []
-    lines += _gap_lines(report["header"])
+    for text, details in report["header"]["trouble"]:
+        lines += [text, *(f"  {detail}" for detail in details)]
     lines += _board_lines(report) if "leaderboard" in report else []
     return lines if report["out"] is None else [*lines, f"written to {report['out']}: open it in any browser"]
 
@@ -100,23 +100,6 @@ def _board_lines(report: dict[str, Any]) -> list[str]:
     lines += [f"{row['name']:{width}} " + " ".join(f"{v:>{len(k)}}" for k, v in cells(row).items()) for row in board]
     compared = [row for row in report["baselines"] if row["baseline"] == SKILL_OF and row["error"] is not None]
     return lines + [f"{BASELINES[SKILL_OF]:{width}} {row['error']:9.2f}" for row in compared]
-
-
-def _gap_lines(header: dict[str, Any]) -> list[str]:
-    """Return the lines about failures, and the instances that are therefore not compared."""
-    lines = []
-    if header["failed"]:
-        by = "; ".join(f"{method} {count}" for method, count in header["failed_by"].items())
-        lines.append(f"{counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
-        lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
-    lines += [header["unpaired"]] if header["unpaired"] else []
-    if gaps := header["dropped"]:
-        lines.append(f"left out of the comparison, for every method: {counted(len(gaps), 'instance')}")
-        for gap in gaps[:MAX_MISSING]:
-            why = f"no run of {'; '.join(gap['missing'])}" if gap["missing"] else "no seed in common"
-            lines.append(f"  {gap['instance']}: {why}")
-        lines += [f"  and {len(gaps) - MAX_MISSING} more"] if len(gaps) > MAX_MISSING else []
-    return lines
 
 
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:

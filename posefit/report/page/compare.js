@@ -65,12 +65,12 @@ function against(m) {
     const [least, best] = ranked[place ? 0 : 1] ?? [null, null];
     return [{ instance, error: ranked[place][0], least, best, rank: place + 1, of: ranked.length }];
   });
-  const best = (row) => [number(row.least, 2), make("small", {}, METHODS[row.best])];
+  const best = (least, row) => [number(least, 2), make("small", {}, METHODS[row.best])];
   const columns = [
-    namedColumn("instance", INSTANCES, "instance"),
+    textColumn("instance", "instance", (k) => INSTANCES[k]),
     figure("error"),
-    { title: "rank", value: (row) => row.rank, show: (row) => `${row.rank} of ${row.of}` },
-    { title: "best other °", value: (row) => row.least, show: (row) => (given(row.least) ? best(row) : "–") },
+    column("rank", "rank", (rank, row) => `${rank} of ${row.of}`),
+    column("best other °", "least", best),
     column("behind it by °", (row) => (given(row.least) ? row.error - row.least : null), twoDigits, { down: true }),
   ];
   table($("duels"), columns, duels, { name: "Instance by instance", by: 4, down: true });

@@ -1,7 +1,5 @@
 // The first screen: all methods with their intervals, three tracks of the leader, failures.
 const MAX_METHODS = 12; // of the figure
-const MAX_MISSING = 20; // instances that a note names
-const MAX_WARNINGS = 5; // that it names
 
 // The lines of a text, each at most so many pixels wide where it can be broken.
 function wrapped(text, room, weight) {
@@ -92,7 +90,7 @@ function examples() {
   const stills = rows.map(([name, row]) => {
     const title = make("strong", {}, `${name} track: ${number(D.rows.error[row], 2)}°`);
     const about = make("small", {}, `${INSTANCES[D.rows.instance[row]]}, seed ${D.seeds[D.rows.seed[row]]}`);
-    return addStill($("three"), row, "example", title, about);
+    return addStill($("three"), row, title, about);
   });
   $("examples-of").textContent = `Three tracks of ${METHODS[D.leaderboard[0].method]}: `;
   let frame = 0;
@@ -112,27 +110,8 @@ function examples() {
 
 // What failed and what is left out, with the reasons.
 function trouble() {
-  const H = D.header;
-  const note = (kind, text, items, ...more) => {
+  for (const [text, items] of D.header.trouble) {
     const list = make("ul", {}, ...items.map((item) => make("li", {}, item)));
-    $("trouble").append(make("div", { class: `note ${kind}` }, ...text, list, ...more));
-  };
-  if (H.failed) {
-    const by = Object.entries(H.failed_by).map(([method, count]) => `${method} ${whole(count)}`);
-    const text = `${counted(H.failed, "cell")} failed, left out of all figures: ${by.join("; ")}. `;
-    const reasons = H.reasons.map(([reason, count]) => `${whole(count)} × ${reason}`);
-    note("warn", [text, make("a", { href: "#failures" }, "Which ones")], reasons, H.unpaired ? `${H.unpaired}.` : "");
+    $("trouble").append(make("div", { class: "note warn" }, text, list));
   }
-  if (H.dropped.length) {
-    const why = (gap) => (gap.missing.length ? `no run of ${gap.missing.join("; ")}` : "no seed in common");
-    const missing = H.dropped.map((gap) => `${gap.instance}: ${why(gap)}`);
-    const more = missing.length > MAX_MISSING ? [`and ${whole(missing.length - MAX_MISSING)} more`] : [];
-    const text = `${counted(missing.length, "instance")} left out of the comparison, for every method:`;
-    note("warn", [text], [...missing.slice(0, MAX_MISSING), ...more]);
-  }
-  if (H.unfinished.length)
-    note("warn", [`No cell finished, so not on the leaderboard: ${H.unfinished.join("; ")}.`], []);
-  const warned = Object.keys(D.warned).length;
-  if (warned)
-    note("", [`${counted(warned, "run")} with a warning, marked ⚠ below:`], D.warnings.slice(0, MAX_WARNINGS));
 }

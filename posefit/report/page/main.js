@@ -6,7 +6,6 @@ const SECTIONS = {
   joints,
   certainty,
   times: runningTimes,
-  gallery,
   rows: allRows,
   failures,
 };
@@ -20,6 +19,7 @@ $("because").append(...because.map((sentence) => make("p", {}, sentence)));
 $("summary").textContent = D.header.summary;
 details(D.header);
 trouble();
+viewer();
 if (D.leaderboard) firstScreen();
 else $("overview").remove();
 for (const [id, fill] of Object.entries(SECTIONS))

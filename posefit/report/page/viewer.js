@@ -1,5 +1,4 @@
-// The gallery: a card for each instance, and the window that plays its tracks.
-const CARDS = 60; // that are added at a time
+// Small pictures of tracks that move, and the window that plays one.
 const show = { row: null, frame: 0, camera: 0 };
 const pace = ({ step, fps }) => (1000 * step) / fps; // milliseconds of a frame
 const animated = D.animations ? Object.keys(D.animations.tracks).map(Number) : [];
@@ -31,9 +30,9 @@ function stillOf(row) {
 }
 
 // Adds a button with a small picture that opens a track; returns what paints its picture at a time.
-function addStill(box, row, kind, ...words) {
+function addStill(box, row, ...words) {
   const canvas = make("canvas", { "aria-hidden": "true" });
-  box.append(button([canvas, make("span", {}, ...words)], () => openTrack(row), { class: kind }));
+  box.append(button([canvas, make("span", {}, ...words)], () => openTrack(row), { class: "example" }));
   const { scene, track, camera, size } = stillOf(row);
   return (time) => {
     const frame = time % scene.frames;
@@ -55,26 +54,7 @@ function silhouette(pen, camera, pixels, radii, name, opacity) {
   pen.globalAlpha = 1;
 }
 
-function gallery() {
-  const R = D.rows;
-  const some =
-    `; ${whole(animated.length)} of ${whole(R.key.length)} runs have one, so that this file stays small. ` +
-    "A report of the ledger that a row's command makes shows that row";
-  $("gallery-note").textContent =
-    `Each instance opens an animation and a skeleton that can be turned${animated.length < R.key.length ? some : ""}.`;
-  const error = (row) => R.error[row] ?? Infinity;
-  const best = new Map(); // a row of each instance
-  for (const row of animated.toSorted((a, b) => error(b) - error(a) || b - a)) best.set(R.instance[row], row);
-  const cards = [...best].sort((a, b) => a[0] - b[0]);
-  const add = () => {
-    for (const [instance, row] of cards.splice(0, CARDS)) {
-      const small = make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`);
-      addStill($("cards"), row, "card", INSTANCES[instance], small)(Math.floor(sceneOf(row).frames / 2));
-    }
-    $("more-cards").hidden = !cards.length;
-  };
-  $("more-cards").onclick = add;
-  add();
+function viewer() {
   turnable($("turning"), paint);
   $("frame").oninput = () => {
     play(false);
