@@ -72,15 +72,8 @@ function openTrack(row) {
   show.frame = Math.min(show.frame, scene.frames - 1);
   show.camera = Math.min(show.camera, Math.max(scene.cameras.length - 1, 0));
   $("viewer-title").textContent = INSTANCES[R.instance[row]];
-  const methods = [...new Set(here.map((one) => R.method[one]))].sort((a, b) => a - b);
-  const names = methods.map((m) => [String(m), METHODS[m]]);
-  choose($("viewer-method"), names, String(R.method[row]), () => {
-    const same = here.filter((one) => R.method[one] === +$("viewer-method").value);
-    openTrack(same.find((one) => R.seed[one] === R.seed[show.row]) ?? same[0]);
-  });
-  const mine = here.filter((one) => R.method[one] === R.method[row]);
-  const seeds = mine.map((one) => [String(one), String(D.seeds[R.seed[one]])]);
-  choose($("viewer-seed"), seeds, String(row), () => openTrack(+$("viewer-seed").value));
+  const runs = here.map((one) => [String(one), `${METHODS[R.method[one]]}, seed ${D.seeds[R.seed[one]]}`]);
+  choose($("viewer-run"), runs, String(row), () => openTrack(+$("viewer-run").value));
   const cameras = scene.cameras.map((_, k) => [String(k), String(k + 1)]);
   choose($("viewer-camera"), cameras, String(show.camera), () => {
     show.camera = +$("viewer-camera").value;
