@@ -9,9 +9,9 @@ import numpy as np
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.statistics.intervals import TRIMMED
-from posefit.tracking.measures import Measure
 
 NAMED = 4  # names that a sentence lists; of more it gives the number
 _SYMBOLS = {"degrees": "°"}  # of units, where there is little room

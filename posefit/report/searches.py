@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
@@ -16,7 +17,6 @@ from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, suite_scores
 from posefit.sweep.table import search_run
-from posefit.tracking.measures import Measure
 
 if TYPE_CHECKING:
     from posefit.report.contest import Contest

@@ -1,6 +1,6 @@
 """Tracks in a report: their figures, names, intervals and baselines, and what the page has of them alone.
 
-Label, unit, digits and meaning of figures come from `posefit.tracking.measures`.
+Label, unit, digits and meaning of figures come from `posefit.evaluation.measures`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES, MEASURES, Measure
 from posefit.fitting.metrics import skill
 from posefit.reading import counted
 from posefit.report.columns import NAMED, Column, Score, interquartile_mean, listed, mean
 from posefit.statistics.intervals import iqm_intervals
-from posefit.tracking.measures import BASELINES, MEASURES, Measure
 from posefit.uncertainty.calibration import BINS, LEVELS
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from posefit.evaluation.measures import BASELINES, MEASURES
 from posefit.report.tracks import Tracks
 from posefit.sweep.cell import run_cell
-from posefit.tracking.measures import BASELINES, MEASURES
 from tests.report.contests import FIRST
 
 COLUMNS = Tracks.columns
