@@ -61,7 +61,9 @@ def _five_digits(values: Array) -> Any:
     scale = 10.0 ** np.abs(power)
     numbers = np.where(finite, values, 0.0)
     rounded = np.where(power >= 0.0, np.round(numbers * scale) / scale, np.round(numbers / scale) * scale)
-    return np.where(finite, rounded, None).tolist()
+    plain_values = rounded.astype(object)
+    plain_values[~finite] = None
+    return plain_values.tolist()
 
 
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:

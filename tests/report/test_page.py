@@ -185,7 +185,7 @@ def test_buttons_show_and_hide_methods_and_their_intervals_in_every_chart(chromi
 def test_a_track_plays_and_the_skeleton_turns(chromium: Any, tracks: Path) -> None:
     with shown(chromium, tracks, 390, has_touch=True) as page:
         page.locator("#of-instance").select_option(label="walk, view 0°, 90°, holes 0, instance 2")
-        page.locator("#all-rows").get_by_text("watch").first.click()
+        page.locator("#all-rows button", has_text="watch").first.click()
         assert "view 0°, 90°" in page.inner_text("#viewer-title")
 
         def changes(canvas: str, act: Callable[[], Any]) -> bool:
@@ -229,7 +229,7 @@ def test_hostile_names_are_text_and_commands_repeat_their_rows(chromium: Any, tm
         assert page.locator("img").count() == 0
         assert page.locator("script").count() == 2
         assert page.locator("#certainty, #sections a[href='#certainty']").count() == 0
-        page.get_by_text("watch").first.click()
+        page.locator("#all-rows button", has_text="watch").first.click()
         assert page.locator("#overlay").is_hidden()  # there is no such motion, and no camera
         page.keyboard.press("Escape")
         commands = set()

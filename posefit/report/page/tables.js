@@ -9,7 +9,7 @@ const column = (title, of, show = String, more = {}) => {
   return { title, value, show: (row) => (given(value(row)) ? show(value(row), row) : "–"), ...more };
 };
 const textColumn = (title, of, show, more) => column(title, of, show, { text: true, ...more });
-const more = (one) => ({ ...one, more: true });
+const further = (one) => ({ ...one, more: true });
 const methodColumn = (of) => {
   const name = (row) => METHODS[pick(of)(row)];
   return textColumn("method", name, (text, row) => [swatch(pick(of)(row)), text]);
@@ -106,9 +106,11 @@ function leaderboard() {
   ];
   const columns = [
     ...first.filter(({ value }) => D.leaderboard.some((row) => given(value(row)))),
-    more(textColumn("group", "letters", String, { about: "Methods that share a letter do not differ significantly" })),
-    ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [more(figure(one))])),
-    more(column("runs", "runs", whole, { down: true })),
+    further(
+      textColumn("group", "letters", String, { about: "Methods that share a letter do not differ significantly" }),
+    ),
+    ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [further(figure(one))])),
+    further(column("runs", "runs", whole, { down: true })),
   ];
   const kind = (row) => (row.baseline ? "base" : null);
   table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
@@ -146,11 +148,11 @@ function allRows() {
   const columns = [
     buttonColumn("watch, or run again", runButtons),
     textColumn("method", of("method"), (m, k) => [METHODS[m], D.warned[k] ? warningSign(k) : null]),
-    more(textColumn("settings", (k) => D.methods[R.method[k]].settings || "default")),
+    further(textColumn("settings", (k) => D.methods[R.method[k]].settings || "default")),
     textColumn("instance", of("instance"), (instance) => INSTANCES[instance]),
     column("seed", of("seed"), (seed) => String(D.seeds[seed])),
     ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !FEW.includes(name) })),
-    more(textColumn("key", of("key"))),
+    further(textColumn("key", of("key"))),
   ];
   const some = Object.keys(D.animations.tracks).length;
   if (some < R.key.length)
