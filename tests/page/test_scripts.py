@@ -11,7 +11,7 @@ import pytest
 from posefit.page.document import SHARED, part
 from posefit.report import page as report_page
 from posefit.report.figures import COLOURS
-from posefit.tracking import page as track_page
+from posefit.output import page as track_page
 
 ROOT = Path(__file__).parents[2]
 MIN_CONTRAST = 4.5  # WCAG 2.2, 1.4.3, of text; here of marks and lines too
