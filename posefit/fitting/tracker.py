@@ -277,7 +277,7 @@ class SynthesisTracker:
 
 def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: float) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
-    counts = problem.areas(poses, translations)[:, 0]
+    counts = problem.cost_and_areas(poses, translations)[1][:, 0]
     coordinates = problem.space.coordinates(best.proposal)
     effort = (best.evaluations, seconds, best.history)
     return Frame(

@@ -65,7 +65,7 @@ def test_a_search_gets_the_costs_of_the_areas_without_views_that_know_nothing(
     cameras = [problem.cameras[0]] * 3
     several = replace(problem, cameras=cameras, silhouettes=[blind, whole, half], beta=0.3, threads=threads)
     proposals = drawn(several, 40)
-    counts = several.areas(*several.decode(proposals))
+    counts = several.cost_and_areas(*several.decode(proposals))[1]
     shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
     np.testing.assert_allclose(several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0))
     nothing = replace(several, silhouettes=[blind] * 3, blank=True)
