@@ -32,4 +32,4 @@ def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `exemplars`."""
     from posefit_exemplars.tracker import ExemplarTracker
 
-    register("exemplars", ExemplarTracker)
+    register("exemplars", ExemplarTracker, looks_ahead=True)

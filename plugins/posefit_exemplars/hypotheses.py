@@ -31,7 +31,7 @@ from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
 from posefit_exemplars.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.smoothing import Estimate, clocks
+from posefit_exemplars.smoothing import Estimate
 
 # metres, of the steps of a fit: contours that are farther off count less
 FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)
@@ -156,7 +156,7 @@ class HypothesisFilter:
         """Yield each estimate with the pose of the likeliest sequence, up to `delay` frames later."""
         rows = paths = None
         for window in markov.windows(self._frames(estimates), self.delay):
-            start, states = clocks(), [frame.states for frame in window]
+            states = [frame.states for frame in window]
             estimate, hypotheses, *_ = window[0]
             row, weights, poses = markov.viterbi_state(states), markov.state_weights(states), hypotheses.poses
             squares = ((hypotheses.joints - hypotheses.joints[row]) ** 2).sum(axis=2).mean(axis=1) / SAME_DISTANCE**2
@@ -165,16 +165,15 @@ class HypothesisFilter:
                 rows = markov.sample_states(states, rows, self._sampling, rng)
                 skeleton = self._task.body.skeleton
                 paths = markov.SampledPaths.of(skeleton, poses[rows], hypotheses.places[rows], pose)
-            yield replace(estimate, pose=pose, place=place, effort=estimate.effort + clocks() - start, paths=paths)
+            yield replace(estimate, pose=pose, place=place, paths=paths)
 
     def _frames(self, estimates: Iterable[Estimate]) -> Iterator[_FittedFrame]:
-        """Yield each estimate with the effort of its hypotheses, and these."""
+        """Yield each estimate with the evaluations of its hypotheses, and these."""
         latest: _FittedFrame | None = None
         for estimate in estimates:
-            start = clocks()
             hypotheses, noise, evaluations = self._fitted(estimate, latest)
             joined = self._joined(estimate.frame_costs, hypotheses, latest, noise)
-            estimate = replace(estimate, effort=estimate.effort + clocks(evaluations) - start)
+            estimate = replace(estimate, evaluations=estimate.evaluations + evaluations)
             latest = _FittedFrame(estimate, hypotheses, *joined)
             yield latest
 

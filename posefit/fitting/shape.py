@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +78,11 @@ class Shape:
     spread: Array = field(repr=False)  # (17,) standard deviation of each factor's logarithm
     cost: float  # mean over the frames
     height: float | None = None  # metres, to which it was scaled; None where it was fitted
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the build as summary.json holds it."""
+        factors, spread = (dict(zip(NAMES, values.tolist(), strict=True)) for values in (self.factors, self.spread))
+        return {"stature_m": self.body.stature, "cost": self.cost, "factors": factors, "spread": spread}
 
 
 def fit_shape(

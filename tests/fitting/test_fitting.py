@@ -168,8 +168,7 @@ class Walker:
 def test_the_budget_is_used_in_whole_populations() -> None:
     best = minimise(lambda x: -x[:, 0], Walker(7), 40)
     assert (best.evaluations, best.cost) == (35, -4.0)
-    assert best.history.tolist() == [0.0, -1.0, -2.0, -3.0, -4.0]
-    assert best.spent.tolist() == [7, 14, 21, 28, 35]
+    assert best.trace.tolist() == [[7.0, 0.0], [14.0, -1.0], [21.0, -2.0], [28.0, -3.0], [35.0, -4.0]]
     with pytest.raises(BudgetError, match="evaluations must hold one population of 7, got 6"):
         minimise(lambda x: x[:, 0], Walker(7), 6)
 

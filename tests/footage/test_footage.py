@@ -45,8 +45,8 @@ def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: tuple[Path, list
     assert result.summary["fps"] == 25.0
     assert result.summary["translation"] == "aligned"
     assert result.summary["iou"] > 0.75  # masks of 900 pixels
-    assert result.summary["body"]["stature"] == pytest.approx(1.7)
-    assert set(result.summary["body"]["factors"]) == set(result.summary["body"]["spread"])
+    assert result.summary["build"]["stature_m"] == pytest.approx(1.7)
+    assert set(result.summary["build"]["factors"]) == set(result.summary["build"]["spread"])
     # the camera is on the person's left, so they walk to the left of the image, and face there
     assert result.motion.translations[-1, 0] < result.motion.translations[0, 0] - 0.5
     assert np.abs(wrapped(result.motion.poses[:, 0] + np.pi / 2)).mean() < np.radians(45.0)

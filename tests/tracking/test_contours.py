@@ -25,7 +25,7 @@ from posefit.tracking.smoothing.contours import (
     growth,
 )
 from posefit.tracking.smoothing.path import Visibility
-from posefit.tracking.smoothing.smooth import smoothed
+from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
@@ -271,16 +271,16 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2), recalibration=sure)
     nothing = np.zeros((1, 3), np.int64)
     frames = [
-        Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0), posterior=posterior)
+        Frame(pose, place, 0.0, nothing, 0, posterior=posterior)
         for pose, place in zip(estimate.poses, estimate.translations, strict=True)
     ]
-    alone, both = (smoothed(scene, frames, shape, 0.5) for shape in (None, average_shape(scene)))
-    assert alone.shape is None
-    assert both.shape is not None
-    costs = [np.mean([frame.cost for frame in each.frames]) for each in (both, alone)]
+    (_, alone, none), (_, both, shape) = (smooth(scene, frames, each, 0.5) for each in (None, average_shape(scene)))
+    assert none is None
+    assert shape is not None
+    costs = [np.mean([frame.cost for frame in each]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
-    assert both.shape.cost == pytest.approx(costs[0])
-    moved, pose, known = both.frames[0].posterior, both.frames[0].pose, alone.frames[0].posterior
+    assert shape.cost == pytest.approx(costs[0])
+    moved, pose, known = both[0].posterior, both[0].pose, alone[0].posterior
     assert moved is not None
     assert known is not None
     assert known.recalibration is sure

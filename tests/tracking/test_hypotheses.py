@@ -35,7 +35,7 @@ QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 400
 def frames_of(poses: Array, costs: Sequence[float]) -> list[Frame]:
     nothing = np.zeros((1, 3), dtype=np.int64)
     return [
-        Frame(pose, np.zeros(3), cost, nothing, 10, 0.5, np.array([cost]), spent=np.array([10]), cpu_seconds=0.25)
+        Frame(pose, np.zeros(3), cost, nothing, 10, np.array([[10, cost]]), seconds=0.5, cpu_seconds=0.25)
         for pose, cost in zip(poses, costs, strict=True)
     ]
 

@@ -149,6 +149,6 @@ def test_a_track_is_smoothed_on_demand_and_has_the_cost_of_its_smooth_poses() ->
     assert (rough.summary["smooth"], smooth.summary["smooth"]) == (False, True)
     assert smooth.summary["acceleration"] < rough.summary["acceleration"]
     assert smooth.summary["cost"] != rough.summary["cost"]
-    assert [frame.evaluations for frame in smooth.estimates] == [frame.evaluations for frame in rough.estimates]
+    assert [frame.evaluations for frame in smooth.frames] == [frame.evaluations for frame in rough.frames]
     with pytest.raises(ValueError, match="smooth must be given where the translation is .* aligned, got known"):
         posefit.track("walk", frames=(0, 3), smooth=True)

@@ -10,14 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from posefit.fitting.tracker import Frame
-from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS
-from posefit.geometry.symmetry import mirrored_poses
-from posefit.motion.motion import Motion
-from posefit.motion.steadiness import BALLS
-from posefit.tracking.table import table
-from posefit.tracking.trust import (
+from posefit.evaluation.trust import (
     ONE_CAMERA,
     SIGNS,
     covered_pixels,
@@ -32,6 +25,13 @@ from posefit.tracking.trust import (
     trust_line,
     trust_of,
 )
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses
+from posefit.motion.motion import Motion
+from posefit.motion.steadiness import BALLS
+from posefit.output.text import table
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, truth_of, viewed, walk
 
