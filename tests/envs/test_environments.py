@@ -106,6 +106,24 @@ def test_fit_ends_at_the_target_or_with_the_budget() -> None:
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
 
 
+def test_the_last_proposal_that_reaches_the_target_terminates_and_does_not_truncate() -> None:
+    proposals = np.array([np.ones(9), np.zeros(9)], dtype=np.float32)
+    env = gym.make("posefit/FitImage-v0", instance=3, target_cost=0.0)
+    env.reset(seed=0)
+    far, near = (env.step(proposal)[4]["cost"] for proposal in proposals)
+    assert near < far
+    limits = {"instance": 3, "target_cost": near, "max_evaluations": 2}
+    env, vector = gym.make("posefit/FitImage-v0", **limits), gym.make_vec("posefit/FitImage-v0", 1, **limits)
+    env.reset(seed=0)
+    vector.reset(seed=0)
+    assert [env.step(proposal)[2:4] for proposal in proposals] == [(False, False), (True, False)]
+    ends = [vector.step(proposal[None])[2:4] for proposal in proposals]
+    assert [(bool(terminated[0]), bool(truncated[0])) for terminated, truncated in ends] == [
+        (False, False),
+        (True, False),
+    ]
+
+
 def test_the_reward_is_the_mismatch_of_the_two_channels() -> None:
     env = gym.make("posefit/FitImage-v0", instance=5, size=(160, 120))
     env.reset(seed=0)
