@@ -6,6 +6,7 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 
 import csv
 import json
+import os
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import repeat
@@ -21,7 +22,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
 from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
-from posefit.reading import cut
+from posefit.reading import cut, parsed_json, read_text
 from posefit.silhouette.foreground import Image
 from posefit.tracking.evaluation import unseen
 from posefit.tracking.identity import Digest, difference
@@ -41,6 +42,7 @@ _OPENSIM = ("track.mot", "model.osim")
 _TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json", "camera.json")
 FILES = (*_MOTION_FILES, *_OPENSIM, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
+SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 
 
@@ -79,13 +81,15 @@ class OutputFolder(Output):
         say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
-        if self.path.exists() and not self.path.is_dir():
-            raise InputError(f"{self.path}: expected a folder to write to, got a file")
-        if self.path.exists() and not force:
-            raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
-        if self.path.exists() and (others := other_entries(self.path, _MINE)):
-            came = f"one with {cut(others[0])}"
-            raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
+        if os.path.lexists(self.path):
+            if self.path.is_symlink() or not self.path.is_dir():
+                came = "a link" if self.path.is_symlink() else "a file"
+                raise InputError(f"{self.path}: expected a folder to write to, got {came}")
+            if not force:
+                raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
+            if others := other_entries(self.path, _MINE) or _unmarked(self.path):
+                came = f"one with {cut(others[0])}, which is none of posefit's"
+                raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
         self._recorded, self._force = 0, force
         self._place = self._same() if resume else None
 
@@ -199,6 +203,17 @@ class OutputFolder(Output):
             raise OSError("no room for summary.png")
         page = track_document(track_data(scene, frames, rows, summary, intervals, stills))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
+
+
+def _unmarked(folder: Path) -> list[str]:
+    """Return the files of a folder, unless its summary is one of a track: those are nobody's whom we know."""
+    names = sorted(entry.name for entry in folder.iterdir())
+    try:
+        summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))
+    except (OSError, ValueError):
+        return names
+    marked = isinstance(summary, dict) and {"version", "method", "evaluations", "trust"} <= summary.keys()
+    return [] if marked else names
 
 
 def page_of(scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> str:

@@ -234,6 +234,8 @@ def test_wrong_arguments_are_named(name: str, arguments: dict[str, Any], message
 def test_unknown_arguments_and_modes_are_named() -> None:
     with pytest.raises(TypeError, match="an argument must be one of motion, .*, got 'nois'; did you mean 'noise'"):
         gym.make("posefit/Track-v0", nois={"holes": 0.3})
+    with pytest.raises(TypeError, match="one of motion, .*, optimiser, .*, got 'optimizer'; did you mean 'optimiser'"):
+        gym.make("posefit/Race-v0", optimizer="cma")
     with pytest.raises(error.UnsupportedMode, match="render_mode must be one of rgb_array, got 'ansi'"):
         gym.make("posefit/Track-v0", render_mode="ansi")
 
