@@ -78,16 +78,17 @@ class World:
         return int(generator.integers(*SPLITS[self.split])) if self.instance is None else self.instance
 
 
-def world_of(**arguments: Any) -> World:
-    """Return the world that an environment's arguments describe.
+def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
+    """Return the world that an environment's arguments describe; it has some of its `own` besides.
 
     Raises ArgumentError where a value is wrong, and TypeError where there is no argument of that name.
     """
     known = tuple(World.__dataclass_fields__)
     for name in arguments:
         if name not in known:
+            every = *known, *own
             raise TypeError(
-                f"an argument must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+                f"an argument must be one of {', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
             )
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)

@@ -48,7 +48,7 @@ from typing import Any, Self
 from posefit import settings
 from posefit.errors import InputError
 from posefit.fitting.check import one_of, whole
-from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text
+from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggestion
 from posefit.registry import registry, version_of
 from posefit.suites.functions import DIMENSIONS, FUNCTIONS, HELD_OUT, SUITES, checked_address, suite_function
 from posefit.suites.problem import EVALUATIONS, INFEASIBLE
@@ -290,7 +290,7 @@ def _check_population(method: str, chosen: Mapping[str, Any], evaluations: int) 
 def _check_names(what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, str]) -> None:
     for name in table:
         if name not in known:
-            raise InputError(f"{what} must hold {', '.join(known)}, got {quoted(name)}")
+            raise InputError(f"{what} must hold {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}")
 
 
 def _check_count(what: str, lists: Sequence[Sequence[Any]]) -> None:

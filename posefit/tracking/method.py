@@ -21,7 +21,7 @@ from posefit.fitting.tracker import Frame, Observation, Prediction, SynthesisTra
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser, CheckedPrior, plugin_errors
 from posefit.footage.source import Footage, kind_of
 from posefit.motion import built_in, recorded
-from posefit.reading import quoted, suggestion
+from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.options import TrackOptions
@@ -55,9 +55,7 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
     if family in offers["optimiser"]:
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
-    hint = suggestion(optimiser, known) or "; posefit plugins doctor says whether a plugin failed to load"
-    if family in offers["prior"]:
-        hint = f"; as a prior it is @{optimiser}"
+    hint = f"; as a prior it is @{optimiser}" if family in offers["prior"] else registry().hint(family, known)
     raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}")
 
 
