@@ -41,6 +41,7 @@ class Scene:
     warnings: Sequence[str] = ()  # what a user should know before they trust it
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
+    first: int = 0  # the number of the first frame in the footage, or in the whole motion
 
 
 def synthetic(
@@ -76,6 +77,8 @@ def synthetic(
         motion,
         observations,
         placing,
+        motion.notes,
+        first=motion.first,
     )
 
 

@@ -24,7 +24,7 @@ from posefit.motion.asf import LARGEST, lines_of, mistake, shown, values_of
 from posefit.motion.joint_names import joints_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.motion.rig import STANDING, Retargeted, Rig, retargeted, upward
-from posefit.motion.units import METRES, NAMES, UNITS, Unit, metres_of, unit_of
+from posefit.geometry.units import METRES, NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.reading import check_size, cut, quoted
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side

@@ -58,6 +58,12 @@ class Motion:
         poses, translations = self.poses[start:stop], self.translations[start:stop]
         return replace(self, poses=poses, translations=translations, first=self.first + start)
 
+    def turned(self, rotation: Array) -> "Motion":
+        """Return the motion in a world that is turned by a rotation (3, 3)."""
+        poses = self.poses.copy()
+        poses[:, :3] = unwrapped(root_angles_from_rotation(rotation @ rotation_from_root_angles(poses[:, :3])))
+        return replace(self, poses=poses, translations=self.translations @ rotation.T)
+
     def about_axes_of(self, skeleton: Skeleton) -> "Motion":
         """Return the motion with joint angles about another skeleton's axes: in space, each joint turns as before."""
         if np.array_equal(self.skeleton.axes, skeleton.axes):
