@@ -55,8 +55,13 @@ class FileOptions(NamedTuple):
 
     asf: str | Path | None = None  # of an .amc; None for the only one beside it
     unit: Unit | None = None  # of lengths; None for the one that is recognised
-    up: Up | None = None  # the axis of a .bvh or .amc that is up; None for y, or the one that a .bvh's person stands along
+    up: Up | None = (
+        None  # the axis of a .bvh or .amc that is up; None for y, or the one that a .bvh's person stands along
+    )
     rate: float | None = None  # frames a second of an .amc; None for what it states, or 120
+
+
+RECOGNISED = FileOptions()
 
 
 def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
@@ -196,7 +201,7 @@ class SourceClip:
         return self.poses if self.fps is None else round(self.poses * fps / self.fps)
 
 
-def clip_of(source: Source, stated: FileOptions = FileOptions()) -> SourceClip:
+def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
     """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
     A file is read once, now. Raises InputError where there is
@@ -229,14 +234,18 @@ def _motion_in(source: str | Path, stated: FileOptions) -> Motion:
     return built_in.motion(str(source))  # raises: there is none of that name
 
 
-def load_motion(source: Source, fps: float = FPS, stated: FileOptions = FileOptions()) -> Motion:
+def load_motion(source: Source, fps: float = FPS, stated: FileOptions = RECOGNISED) -> Motion:
     """Return the motion that a source names, at a rate: built-in, recorded, or of an .amc or .bvh file.
 
     Raises InputError where there is no such motion, and where something is stated that only files have use for.
     """
     path = None if isinstance(source, Motion) or source in built_in.names() else Path(source)
     suffix = "" if path is None else path.suffix.lower()
-    for name, value, suffixes in (("unit", stated.unit, MOTIONS), ("up", stated.up, MOTIONS), ("rate", stated.rate, (".amc",))):
+    for name, value, suffixes in (
+        ("unit", stated.unit, MOTIONS),
+        ("up", stated.up, MOTIONS),
+        ("rate", stated.rate, (".amc",)),
+    ):
         if value is not None and suffix not in suffixes:
             raise InputError(f"{name} must be given for {' and '.join(suffixes)} files only, got {quoted(value)}")
     return clip_of(source, stated)(fps)
@@ -268,7 +277,7 @@ def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:
 
 
 def training_clips(
-    sources: Sequence[Source], stated: FileOptions = FileOptions(), *, followed: Source | None = None
+    sources: Sequence[Source], stated: FileOptions = RECOGNISED, *, followed: Source | None = None
 ) -> list[SourceClip]:
     """Return the clips that sources name, each of which gives its motion at any rate.
 

@@ -13,7 +13,7 @@ UNITS: tuple[Unit, ...] = get_args(Unit)
 INCH = 0.0254  # metres
 CMU_UNIT = INCH / 0.45  # of the CMU database: its .asf files say `length 0.45`
 METRES: Mapping[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": INCH, "foot": 12 * INCH, "cmu": CMU_UNIT}
-NAMES: Mapping[Unit, str] = {
+UNIT_NAMES: Mapping[Unit, str] = {
     "m": "metres",
     "cm": "centimetres",
     "mm": "millimetres",

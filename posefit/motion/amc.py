@@ -62,9 +62,12 @@ def read_amc(
     check_size(path, SIZE_LIMIT)
     spans, columns, targets = _layout(skeleton)
     values, radians, stated = _frames(path, spans, skeleton.name)
-    notes = ()
+    notes: tuple[str, ...] = ()
     if (rate := fps or stated) is None:
-        rate, notes = FPS, (f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it",)
+        rate, notes = (
+            FPS,
+            (f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it",),
+        )
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
     poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))

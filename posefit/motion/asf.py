@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
-from posefit.geometry.units import CMU_UNIT, INCH, NAMES, STATURES, Unit, metres_of, unit_of
+from posefit.geometry.units import CMU_UNIT, INCH, UNIT_NAMES, STATURES, Unit, metres_of, unit_of
 from posefit.reading import SHOWN, check_size, cut, quoted
 
 LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
@@ -131,7 +131,7 @@ def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
         came = f"{path}: the length that it states makes a person of {stature:.2f} m"
         if guess is not None:
             wanted = metres_of(guess)
-            came += f"; lengths are taken for {NAMES[guess]}: {stature / metres * wanted:.2f} m; --unit sets it"
+            came += f"; lengths are taken for {UNIT_NAMES[guess]}: {stature / metres * wanted:.2f} m; --unit sets it"
         notes.append(came)
     ratio = wanted / metres
     skeleton = stated if ratio == 1.0 else replace(stated, offsets=stated.offsets * ratio)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -19,12 +18,12 @@ from posefit.geometry.body import Body
 from posefit.geometry.calibration import TURNS, Up
 from posefit.geometry.rotation import angles_about, rotation_about, steady_angles
 from posefit.geometry.skeleton import ENDS, JOINTS, PARENTS
+from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.motion.amc import SIZE_LIMIT, VALUES
 from posefit.motion.asf import LARGEST, lines_of, mistake, shown, values_of
 from posefit.motion.joint_names import joints_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.motion.rig import STANDING, Retargeted, Rig, retargeted, upward
-from posefit.geometry.units import METRES, NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.reading import check_size, cut, quoted
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
@@ -39,7 +38,7 @@ _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
     "wrist": "Hand",
     "hand": "FingerBase",
 }
-JOINT_NAMES = {
+NAMES = {
     "root": "Hips",
     "lowerback": "LowerBack",
     "upperback": "Spine",
@@ -95,15 +94,19 @@ def _notes(path: Path, result: Retargeted, unit: Unit, guessed: bool, stature: f
     """Return what a reader should know: what was guessed, what is missing, and how far joints are off."""
     notes, metres = [], METRES[unit]
     if guessed and unit != "m":
-        notes.append(f"{path}: lengths are taken for {NAMES[unit]}, as the person stands {stature:.4g} of them; --unit sets it")
+        notes.append(
+            f"{path}: lengths are taken for {UNIT_NAMES[unit]}, as the person stands {stature:.4g} of them; --unit sets it"
+        )
     elif not guessed and unit_of(stature * metres) is None:
-        notes.append(f"{path}: the person stands {stature * metres:.2f} m with lengths in {NAMES[unit]}")
+        notes.append(f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}")
     if axis not in ("", "y"):
         notes.append(f"{path}: {axis} is taken to be up, as the person stands along it; --up sets it")
     if result.filled:
         notes.append(f"{path}: without {', '.join(result.filled)}, which are an average person's at rest")
     if result.off * metres > MISSED:
-        notes.append(f"{path}: bones change their lengths or fork; joints are up to {1e3 * result.off * metres:.1f} mm off")
+        notes.append(
+            f"{path}: bones change their lengths or fork; joints are up to {1e3 * result.off * metres:.1f} mm off"
+        )
     return notes
 
 
@@ -239,12 +242,11 @@ def _rig(content: _Content) -> Rig:
     if isinstance(joints, list):
         raise InputError(f"a person's joints, got one without {cut(', '.join(joints), 200)}")
     wanted: set[int] = set()
-    for node in (joints.hips, joints.chest, *joints.limbs.values(), *joints.spine, *joints.neck):
-        while node >= 0 and node not in wanted:
-            wanted.add(node)
-            node = parents[node]
-    turns = np.tile(np.eye(3), (len(nodes), 1, 1, 1))
-    rest, places = np.zeros((len(nodes), 3)), np.zeros((len(nodes), 1, 3))
+    for start in (joints.hips, joints.chest, *joints.limbs.values(), *joints.spine, *joints.neck, joints.head or 0):
+        while start >= 0 and start not in wanted:
+            wanted.add(start)
+            start = parents[start]
+    rest = np.zeros((len(nodes), 3))
     turned: dict[int, Array] = {}
     placed: dict[int, Array] = {}
     for number, node in enumerate(nodes):
@@ -293,7 +295,7 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
         tab = "\t" * depth
         where = np.zeros(3) if PARENTS[joint] <= 0 else motion.skeleton.offsets[PARENTS[joint] - 1]
         order.append(joint)
-        lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {JOINT_NAMES[JOINTS[joint]]}")
+        lines.append(f"{tab}{'JOINT' if joint else 'ROOT'} {NAMES[JOINTS[joint]]}")
         channels = "6 Xposition Yposition Zposition" if joint == 0 else "3"
         lines.extend([f"{tab}{{", f"{tab}\tOFFSET {_plain(where)}", f"{tab}\tCHANNELS {channels} {ROTATIONS}"])
         for child, parent in enumerate(PARENTS):

@@ -1,6 +1,6 @@
 """What the joints of somebody else's skeleton are, by their names and by how they hang together.
 
-Names of many programs are known: those of Acclaim, of the CMU conversions by cgspeed, MotionBuilder and HumanIK, Mixamo,
+Names of many programs are known: those of Acclaim, the CMU conversions by cgspeed, MotionBuilder and HumanIK, Mixamo,
 LAFAN1, Bandai Namco, 3ds Max's Biped, Biovision, Xsens, Poser, SMPL, Unreal, VRM, Blender and freemocap. Namespaces,
 prefixes, numbers and the ways to write a side do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and `thigh.L` are
 one joint. A limb's joints are named; the spine is what lies between the legs and the arms, whatever it is called.
@@ -8,6 +8,7 @@ one joint. A limb's joints are named; the spine is what lies between the legs an
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 # Of each joint of a side, from the trunk outwards: its names, and those that it has where no other joint has the first.
@@ -22,7 +23,7 @@ _LIMBS: Mapping[str, tuple[set[str], set[str]]] = {
     "hand": ({"hand", "wrist"}, set()),
     "palm": ({"fingerbase", "handmiddle", "middle", "fmiddle", "handmid", "mid"}, set()),
 }
-_MIDDLE = {"head": {"head"}, "neck": {"neck", "lowerneck", "upperneck"}}
+_MIDDLE = {"head": {"head", "face", "skull"}, "neck": {"neck", "lowerneck", "upperneck"}}
 _SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
 _JOINED = {"lu": ("left", "u"), "ru": ("right", "u"), "lf": ("left", "f"), "rf": ("right", "f")}  # LUArm, RFArm
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -78,7 +79,8 @@ class Joints(NamedTuple):
     hips: int
     chest: int  # from which arms and head go
     spine: Sequence[int]  # from behind the hips to the joint that bears the neck
-    neck: Sequence[int]  # from the base of the neck to the head; empty where there is neither
+    neck: Sequence[int]  # from the base of the neck to before the head
+    head: int | None
 
 
 def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str]:
@@ -93,7 +95,7 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     missing = [f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs]
     for side in ("left", "right"):
         for chain in (LEGS, ARMS):
-            for above, below in zip(chain, chain[1:], strict=False):
+            for above, below in pairwise(chain):
                 first, second = limbs.get((side, above)), limbs.get((side, below))
                 if first is not None and second is not None and first not in paths[second][:-1]:
                     missing.append(f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})")
@@ -102,8 +104,8 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     legs = [limbs[side, "thigh"] for side in ("left", "right")]
     arms = [limbs[side, "arm"] for side in ("left", "right")]
     hips = _common(paths, legs)
-    heads = [node for node, part in enumerate(parts) if part.part == "head" and not part.side]
-    head = min(heads, key=lambda node: (parts[node].others, len(paths[node])), default=None)
+    heads = [node for node, part in enumerate(parts) if part.part in _MIDDLE["head"] and not part.side]
+    head = min(heads, key=lambda node: (parts[node].part != "head", parts[node].others, len(paths[node])), default=None)
     if hips is None or (chest := _common(paths, arms if head is None else [*arms, head])) is None:
         return ["a root from which legs, arms and head go"]
     if hips not in paths[chest]:
@@ -112,12 +114,12 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     if head is None:
         necks = [node for node, part in enumerate(parts) if part.part == "neck" and not part.side]
         neck = min(necks, key=lambda node: len(paths[node]), default=None)
-        above = [] if neck is None or chest not in paths[neck] else paths[neck][paths[neck].index(chest) + 1 :]
+        bearing = [] if neck is None or chest not in paths[neck] else paths[neck][paths[neck].index(chest) + 1 :]
     else:
-        above = paths[head][paths[head].index(chest) + 1 :]
+        bearing = paths[head][paths[head].index(chest) + 1 : -1]
     if parts[chest].part == "neck" and between:  # Biped's shoulders hang from the neck
-        above, between = [between[-1], *above], between[:-1]
-    return Joints(limbs, hips, chest, between, above)
+        bearing, between = [between[-1], *bearing], between[:-1]
+    return Joints(limbs, hips, chest, between, bearing, head)
 
 
 def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> dict[str, int]:
@@ -141,7 +143,6 @@ def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> 
         if not nodes[wanted] and len(spare) > 1 and spare[0] in paths[spare[1]]:
             nodes[above], nodes[below] = [spare[0]], [spare[1]]
     return {joint: each[0] for joint, each in nodes.items() if each}
-
 
 
 def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:

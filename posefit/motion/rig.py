@@ -6,7 +6,7 @@ apart, arms out, palms down: how a node is turned there is read off the rig's ow
 off the frame that is most like it, each bone turned the shortest way from the one before.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -33,17 +33,27 @@ SQUARE = 25.0  # degrees: a root's axes that are so near to left, up and ahead a
 STANDING = 0.7  # the mean cosine between legs, trunk and the axis that is up
 POSES = 2_000  # frames, the most that are searched for one like the pose of rest
 UNUSED = 1e-5  # radians: a turn about an axis that CMU's joints do not have, which is rounding
+_ENDS_OF = {
+    "hipjoint": "thigh",
+    "femur": "shin",
+    "tibia": "foot",
+    "clavicle": "arm",
+    "humerus": "forearm",
+    "radius": "hand",
+}
 _STEADY = ("femur", "tibia", "humerus", "radius", "wrist")
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """Which nodes are a person's joints, and where all nodes are and how they are turned: at rest, and in the frames."""
+    """Which nodes are a person's joints, and where nodes are and how they are turned: at rest, and in the frames."""
 
     names: Sequence[str]
     parents: Sequence[int]
     joints: Joints
-    tips: Sequence[Sequence[Array]] = field(repr=False)  # of each node: where bones that no node follows end, (3,) in it
+    tips: Sequence[Sequence[Array]] = field(
+        repr=False
+    )  # of each node: where bones that no node follows end, (3,) in it
     rest: tuple[Array, Array] = field(repr=False)  # turns (nodes, 3, 3) and places (nodes, 3)
     moving: tuple[Array, Array] = field(repr=False)  # turns (nodes, T, 3, 3) and places (nodes, T, 3)
 
@@ -141,16 +151,19 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
         rest_at[joint] = rest_at[above] + frame @ before @ vector if rest_end is None else rest_end
         length = float(np.linalg.norm(vector))
         if joint in ENDS:
+            begin, carrying = bones[above - 1].rest, bones[above - 1].node
+            if bone.rest is not None and begin is not None:  # without the end's own turn
+                vector = before.T @ frame.T @ rest_turns[carrying] @ rig.rest[0][carrying].T @ (bone.rest - begin)
             skeleton_offsets[joint - 1] = vector
             world[joint] = world[above]
             at[joint] = at[above] + world[above] @ vector
             continue
         off = np.degrees(geodesic(np.eye(3), shortest_turn(expected, vector))) if length > 0.0 else 0.0
         aligned = off > (ALIKE if name[1:] in _STEADY else AS_IN_FILE)
-        if name.endswith("hipjoint"):
-            aligned = False  # it does not turn
+        aligned = aligned and not name.endswith("hipjoint")  # which does not turn
         turned[joint] = before @ shortest_turn(expected, vector) if aligned else before
-        direction = (expected / np.linalg.norm(expected) if aligned else vector / max(length, 1e-300)) if length else expected
+        direction = expected if aligned or not length else vector
+        direction = direction / np.linalg.norm(direction)
         carrier = turns[bone.node] @ (rest_turns[bone.node].T @ frame @ turned[joint])
         if bone.at is not None and length > 0.0:
             reach = bone.at - at[above]
@@ -201,28 +214,30 @@ def _bones(rig: Rig, scale: float) -> list[_Bone]:
     joints, limbs, places = rig.joints, rig.joints.limbs, _Places(rig)
     average = dict(zip(BONES, scale * average_skeleton().lengths, strict=True))
     bones: dict[str, _Bone] = {}
-    base = joints.neck[0] if joints.neck else None
-    chest = places.of(base) if base is not None else _Bone(joints.chest)
-    if chest.at is None:  # no neck and no head: the middle between the arms
-        arms = [places.of(limbs[side, "clavicle"] if (side, "clavicle") in limbs else limbs[side, "arm"]) for side in ("left", "right")]
-        chest = places.between(joints.chest, *arms, 0.5)
+    if joints.neck:
+        chest = places.of(joints.neck[0])
+    else:  # the middle between the shoulders
+        starts = ("clavicle" if (side, "clavicle") in limbs else "arm" for side in ("left", "right"))
+        shoulders = [places.of(limbs[side, start]) for side, start in zip(("left", "right"), starts, strict=True)]
+        chest = places.between(joints.chest, shoulders[0], shoulders[1], 0.5)
     bones.update(_spine(rig, chest))
-    if not joints.neck:
-        bones |= {name: _Bone(joints.chest) for name in ("lowerneck", "upperneck", "head")}
+    necks = [places.of(node) for node in (*joints.neck[1:], joints.head) if node is not None]
+    last = (joints.chest, *joints.neck)[-1] if joints.head is None else joints.head
+    tip = places.tip(last, 0.3 * (average["upperneck"] + average["head"])) if joints.neck or necks else None
+    crown = _Bone(last) if tip is None else places.carried(last, tip)
+    bones["head"] = crown
+    if len(necks) > 1:
+        bones |= {"lowerneck": necks[0], "upperneck": necks[-1]}
+    elif necks:  # the skull is two of posefit's bones, and turns as the head does
+        half = _Bone(last) if tip is None else places.between(last, necks[0], crown, 0.5)
+        bones |= {"lowerneck": necks[0], "upperneck": half}
     else:
-        head = joints.neck[-1]
-        tip = places.tip(head, 0.3 * (average["upperneck"] + average["head"]))
-        crown = None if tip is None else places.carried(head, tip)
-        inner = [places.of(node) for node in joints.neck[1:]]
-        if len(inner) >= 2:
-            bones |= {"lowerneck": inner[0], "upperneck": inner[-1], "head": crown or _Bone(head)}
-        else:
-            bones |= _head(places, head, chest, inner, crown)
+        ends = [_Bone(last) if tip is None else places.between(last, chest, crown, share) for share in (1 / 3, 2 / 3)]
+        bones |= {"lowerneck": ends[0], "upperneck": ends[1]}
     for side in ("left", "right"):
         letter = side[0]
-        thigh, shin, foot, arm, forearm, hand = (limbs[side, joint] for joint in ("thigh", "shin", "foot", "arm", "forearm", "hand"))
-        bones |= {f"{letter}hipjoint": places.of(thigh), f"{letter}femur": places.of(shin), f"{letter}tibia": places.of(foot)}
-        bones |= {f"{letter}clavicle": places.of(arm), f"{letter}humerus": places.of(forearm), f"{letter}radius": places.of(hand)}
+        foot, hand = limbs[side, "foot"], limbs[side, "hand"]
+        bones |= {f"{letter}{bone}": places.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
         foot_length, toe_length = average["lfoot"], average["ltoes"]
         toe = limbs.get((side, "toe"))
         if toe is not None:
@@ -247,19 +262,8 @@ def _bones(rig: Rig, scale: float) -> list[_Bone]:
     return [bones[name] for name in BONES]
 
 
-def _head(places: _Places, head: int, chest: _Bone, inner: Sequence[_Bone], crown: _Bone | None) -> dict[str, _Bone]:
-    """Return the bones of a neck of one joint or none: the skull is two of posefit's, and turns as the head does."""
-    if inner:
-        half = _Bone(head) if crown is None else places.between(head, inner[0], crown, 0.5)
-        return {"lowerneck": inner[0], "upperneck": half, "head": crown or _Bone(head)}
-    if crown is None:
-        return {name: _Bone(head) for name in ("lowerneck", "upperneck", "head")}
-    thirds = [places.between(head, chest, crown, share) for share in (1 / 3, 2 / 3)]
-    return {"lowerneck": thirds[0], "upperneck": thirds[1], "head": crown}
-
-
 def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
-    """Return the three bones of the spine, whatever joints it has: of more than there are, those of steadiest length."""
+    """Return the three bones of the spine, whatever joints it has; of more of them, those of the steadiest lengths."""
     joints, places, turns = rig.joints, _Places(rig), rig.moving[1]
     root = _Bone(joints.hips, turns[joints.hips], rig.rest[1][joints.hips])
     near = SAME_PLACE * _length(rig, "left")
@@ -272,8 +276,8 @@ def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
         chain.append(places.between(chest.node, chain[0], chest, 0.5))
     elif len(chain) > 2:
 
-        def unsteadiness(pair: tuple[_Bone, _Bone]) -> tuple[float, float]:
-            ends = np.array([root.at, pair[0].at, pair[1].at, chest.at])
+        def unsteadiness(pair: Iterable[_Bone]) -> tuple[float, float]:
+            ends = np.array([root.at, *(bone.at for bone in pair), chest.at])
             lengths = np.linalg.norm(np.diff(ends, axis=0), axis=2)
             mean = lengths.mean(axis=1)
             return round(float(lengths.std(axis=1).sum() / max(mean.sum(), 1e-300)), 6), float(mean.std())
@@ -302,14 +306,19 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> tuple[Array, Array, Array]:
     step = max(1, count // POSES)
     poses += [(rig.moving[0][:, k], rig.moving[1][:, k]) for k in range(0, count, step)]
     average = average_skeleton()
-    legs = [(side, *pair) for side in ("left", "right") for pair in (("thigh", "shin", "femur"), ("shin", "foot", "tibia"))]
-    arms = [(side, *pair) for side in ("left", "right") for pair in (("arm", "forearm", "humerus"), ("forearm", "hand", "radius"))]
+    legs, arms = (
+        [(side, *part) for side in ("left", "right") for part in parts]
+        for parts in (
+            (("thigh", "shin", "femur"), ("shin", "foot", "tibia")),
+            (("arm", "forearm", "humerus"), ("forearm", "hand", "radius")),
+        )
+    )
 
     def frame_of(turns: Array, places: Array) -> Array:
         end = _rest_end(rig, chest, turns, places)
         local = turns[hips].T
-        left, above = local @ (places[thighs[0]] - places[thighs[1]]), local @ ((places[hips] if end is None else end) - places[thighs].mean(axis=0))
-        return _squared(left, above)
+        above = (places[hips] if end is None else end) - places[thighs].mean(axis=0)
+        return _squared(local @ (places[thighs[0]] - places[thighs[1]]), local @ above)
 
     def angles(turns: Array, places: Array, root: Array, parts: Sequence[tuple[str, str, str, str]]) -> Array:
         frame = turns[hips] @ root

@@ -280,4 +280,18 @@ class TrackOptions:
         return replace(self, **values)
 
 
-VIEW = ("asf", "camera", "view_degrees", "size", "fps", "frames", "extraction", "height", "up", "unit", "rate", "label", "holes")
+VIEW = (
+    "asf",
+    "camera",
+    "view_degrees",
+    "size",
+    "fps",
+    "frames",
+    "extraction",
+    "height",
+    "up",
+    "unit",
+    "rate",
+    "label",
+    "holes",
+)

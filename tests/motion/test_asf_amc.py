@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skeleton, angle_index
+from posefit.geometry.units import CMU_UNIT
 from posefit.motion.amc import read_amc, read_clip, write_amc
-from posefit.motion.asf import METRES_PER_UNIT, read_asf
+from posefit.motion.asf import read_asf
 from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about, chained
@@ -117,7 +118,7 @@ def test_joints_are_where_acclaim_puts_them(cmu: Path, clip: str) -> None:
 
 def test_a_skeleton_by_hand(skeleton: Skeleton, tmp_path: Path) -> None:
     # bone 2, lfemur's place in the text below root's three children, has length 4 in the direction -y
-    assert pytest.approx(0.056444, abs=1e-6) == METRES_PER_UNIT
+    assert pytest.approx(0.056444, abs=1e-6) == CMU_UNIT
     np.testing.assert_allclose(skeleton.offsets[BONES.index("lfemur")], [0.0, -4 * 0.0254 / 0.45, 0.0], atol=1e-12)
     np.testing.assert_allclose(skeleton.axes[7], turn(0.0, 0.0, 20.0), atol=1e-12)
     (tmp_path / "rad.asf").write_text(asf_text(angle="rad", turn=repr(np.pi / 9)))
