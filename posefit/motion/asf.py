@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
-from posefit.geometry.units import CMU_UNIT, INCH, UNIT_NAMES, STATURES, Unit, metres_of, unit_of
+from posefit.geometry.units import CMU_UNIT, INCH, STATURES, UNIT_NAMES, Unit, metres_of, unit_of
 from posefit.reading import SHOWN, check_size, cut, quoted
 
 LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow

@@ -94,9 +94,8 @@ def _notes(path: Path, result: Retargeted, unit: Unit, guessed: bool, stature: f
     """Return what a reader should know: what was guessed, what is missing, and how far joints are off."""
     notes, metres = [], METRES[unit]
     if guessed and unit != "m":
-        notes.append(
-            f"{path}: lengths are taken for {UNIT_NAMES[unit]}, as the person stands {stature:.4g} of them; --unit sets it"
-        )
+        stands = f"as the person stands {stature:.4g} of them"
+        notes.append(f"{path}: lengths are taken for {UNIT_NAMES[unit]}, {stands}; --unit sets it")
     elif not guessed and unit_of(stature * metres) is None:
         notes.append(f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}")
     if axis not in ("", "y"):
