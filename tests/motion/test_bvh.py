@@ -182,6 +182,17 @@ def test_joints_of_other_programs_are_where_their_files_put_them(tmp_path: Path,
     assert any("centimetres" in note for note in motion.notes)
 
 
+def test_hinges_bend_as_people_s_do_where_no_frame_is_like_the_pose_of_rest(tmp_path: Path) -> None:
+    run = recorded.clip("09_01").motion()  # knees and elbows are never straight
+    motion = read_bvh(write_rig(tmp_path / "rig.bvh", run, STYLES["lafan1"], 100.0, rest="along x"))
+    angles, expected = (clinical_angles(each.skeleton, each.poses) for each in (motion, run))
+    for side in ("left", "right"):
+        for joint in ("knee", "elbow"):
+            flexion = f"{side}_{joint}_flexion"
+            np.testing.assert_allclose(angles[flexion], expected[flexion], atol=1.0)
+            assert np.abs(angles[f"{side}_{joint}_adduction"]).max() < 3.0
+
+
 def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     walk = recorded.clip("16_15").motion().frames(10, 14)
     motion = read_bvh(write_rig(tmp_path / "rig.bvh", walk, STYLES["vrm"]))
