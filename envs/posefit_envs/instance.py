@@ -158,7 +158,10 @@ def instance_number(number: Any) -> int:
 
 @lru_cache(maxsize=32)
 def _source(motion: str) -> Motion:
-    return load_motion(motion, FPS)
+    source = load_motion(motion, FPS)
+    for note in source.notes:
+        logger.warn(note)
+    return source
 
 
 @lru_cache(maxsize=32)

@@ -46,7 +46,6 @@ _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
     "holes": ("masks", ["masks"]),
     "height": ("footage", ["masks", "video"]),
     "size": ("motions", ["motion"]),
-    "rate": (".amc files", ["motion"]),
 }
 
 
@@ -55,9 +54,7 @@ class FileOptions(NamedTuple):
 
     asf: str | Path | None = None  # of an .amc; None for the only one beside it
     unit: Unit | None = None  # of lengths; None for the one that is recognised
-    up: Up | None = (
-        None  # the axis of a .bvh or .amc that is up; None for y, or the one that a .bvh's person stands along
-    )
+    up: Up | None = None  # the axis that is up; None for y, or the one that a .bvh's person stands along
     rate: float | None = None  # frames a second of an .amc; None for what it states, or 120
 
 
@@ -107,7 +104,7 @@ def scene_of(
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
     options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "rate": rate, "asf": asf})
+    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "asf": asf})
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
@@ -239,15 +236,10 @@ def load_motion(source: Source, fps: float = FPS, stated: FileOptions = RECOGNIS
 
     Raises InputError where there is no such motion, and where something is stated that only files have use for.
     """
-    path = None if isinstance(source, Motion) or source in built_in.names() else Path(source)
-    suffix = "" if path is None else path.suffix.lower()
-    for name, value, suffixes in (
-        ("unit", stated.unit, MOTIONS),
-        ("up", stated.up, MOTIONS),
-        ("rate", stated.rate, (".amc",)),
-    ):
-        if value is not None and suffix not in suffixes:
-            raise InputError(f"{name} must be given for {' and '.join(suffixes)} files only, got {quoted(value)}")
+    suffix = "" if isinstance(source, Motion) or source in built_in.names() else Path(source).suffix.lower()
+    for name, value in (("unit", stated.unit), ("up", stated.up)):
+        if value is not None and suffix not in MOTIONS:
+            raise InputError(f"{name} must be given for {' and '.join(MOTIONS)} files only, got {quoted(value)}")
     return clip_of(source, stated)(fps)
 
 
