@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from gymnasium import error
+from gymnasium import error, logger
 from numpy.typing import NDArray
 
 from posefit import Body, Camera, Motion, Observation, PoseProblem, SearchSpace, Silhouette, Task
