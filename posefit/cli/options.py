@@ -126,7 +126,7 @@ ENGINE = (
 
 
 HEADINGS = {  # the options of a track in its help, by their names in Python
-    "What is seen": "live asf camera up view_degrees size fps frames frame height label holes",
+    "What is seen": "live asf camera up unit rate view_degrees size fps frames frame height label holes",
     "How the person is taken out of video": "extraction background roi ignore width",
     "Method and budget": "method settings train without_subject evaluations seed threads device",
     "How it is followed": "translation first_pose restarts body_frames hypotheses smooth",

@@ -95,6 +95,7 @@ def combined(
         "given" if known else "guessed",
         [warning for view in views for warning in view.warnings] + _unequal(views),
         pictures,
+        views[0].masks.first,
     )
 
 

@@ -83,7 +83,8 @@ def name_of(source: str | Path | Masks) -> str:
 
 def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of images of one size. Raises InputError naming the file where one is none."""
-    chosen = images[slice(*span(frames, len(images)))]
+    start, stop = span(frames, len(images))
+    chosen = images[start:stop]
     if is_colourful(existing(chosen[0])):
         raise _many_colours(name)
     counts, shape = ValueCounts(), (0, 0)
@@ -107,7 +108,8 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
         for k, (length, dtype) in enumerate(stored):
             values = np.frombuffer(zlib.decompress(spool.read(length)), dtype).reshape(shape)
             masks[k] = np.packbits(is_person(values))
-    return PackedMasks([str(file) for file in chosen], size, masks, None, np.ones(len(chosen), dtype=bool))
+    usable = np.ones(len(chosen), dtype=bool)
+    return PackedMasks([str(file) for file in chosen], size, masks, None, usable, first=start)
 
 
 def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
@@ -133,7 +135,7 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
     if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
         raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
-    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks)
+    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks, start)
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture

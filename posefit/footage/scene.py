@@ -43,11 +43,12 @@ class Scene:
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
+    first: int = 0  # the number of the first frame in the footage, or in the whole motion
 
     def motion(self, frames: Sequence[Frame]) -> Motion:
         """Return the person's motion that some frames estimate."""
         poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-        return Motion(self.name, self.body.skeleton, poses, places, self.fps)
+        return Motion(self.name, self.body.skeleton, poses, places, self.fps, self.first)
 
 
 def synthetic(
@@ -83,6 +84,8 @@ def synthetic(
         motion,
         observations,
         placing,
+        motion.notes,
+        first=motion.first,
     )
 
 

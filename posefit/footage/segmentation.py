@@ -204,7 +204,7 @@ class Segmentation:
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
         landmarks = np.array(self._landmarks)
         known = landmarks if landmarks[..., 2].any() else None
-        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, known)
+        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, known, self.start)
 
     def learned(self) -> Segmenter:
         """Return the segmenter, which has learned the background."""

@@ -130,6 +130,7 @@ def _write_npz(path: Path, content: Content) -> None:
         poses=content.motion.poses,
         translations=content.motion.translations,
         fps=np.array(content.motion.fps),
+        frames=content.motion.first + np.arange(len(content.motion)),
         joints=np.array(JOINTS),
         places=np.array(PLACES),
         costs=content.table["cost"],

@@ -64,7 +64,7 @@ def track(
         chosen = chosen.changed(body_frames=0)
     chosen = resolved(sources[0], chosen)
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
-    clips = training_clips(chosen.train, chosen.asf, followed=followed)  # before the work, as a name may be wrong
+    clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:
             raise InputError(f"{name} must be given with out, the folder of the track, got none")
@@ -117,13 +117,16 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
 
 def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
     """Return nothing. Raises InputError for options that do not fit a source whose truth is known, or unknown."""
+    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
+    folders = any(Path(motion).is_dir() for motion in options.train if isinstance(motion, str | Path))
+    if options.rate is not None and not (captured or folders):
+        raise InputError(f"rate must be given for .amc files only, got {quoted(options.rate)}")
     if not known:
         if options.translation == "known":
             raise InputError("translation must be searched or aligned where only masks are given, got known")
         if options.first_pose == "given":
             raise InputError("first_pose must be searched where only masks are given, got given")
         return
-    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
     if options.asf is not None and not captured:
         raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
     if options.restarts == 0:
