@@ -12,9 +12,10 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.footage.cameras import CameraView, calibrated, combined, listed
 from posefit.footage.cleaning import cleaned
+from posefit.footage.images import IMAGES
 from posefit.footage.masks import FPS, Range, existing
 from posefit.footage.quality import Verdict
-from posefit.footage.readers import IMAGES, Masks, name_of, read_masks
+from posefit.footage.readers import Masks, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video

@@ -10,7 +10,8 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
-from posefit.footage.readers import IMAGES, name_of
+from posefit.footage.images import IMAGES
+from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
 from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
 from posefit.motion import built_in
