@@ -68,7 +68,9 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
     if isinstance(source, np.ndarray):
         return _packed(name_of(source), {"masks": source}, frames, label)
     if source.is_dir():
-        return read_images(images_in(source), str(source), frames, label)
+        if not (images := images_in(source)):
+            raise InputError(f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
+        return read_images(images, str(source), frames, label)
     existing(source)
     if source.suffix.lower() == ".npy":
         stack = mapped(source)
@@ -89,12 +91,10 @@ def name_of(source: str | Path | Masks) -> str:
 
 
 def images_in(folder: Path) -> list[Path]:
-    """Return the images of a folder in the natural order of their names. Raises InputError where it has none."""
+    """Return the images of a folder in the natural order of their names."""
     # hidden files are ignored: some systems put one beside each image that they copy
     files = (file for file in folder.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
-    if not (images := sorted(files, key=_natural)):
-        raise InputError(f"{folder}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
-    return images
+    return sorted(files, key=_natural)
 
 
 def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
@@ -104,7 +104,7 @@ def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
 
 
 def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list[str]]:
-    """Return the images of successive frames, None for a number that is missing, and what was assumed of them.
+    """Return the images of successive frames, None for a number that is missing, and what was guesses of them.
 
     Raises InputError where files are of several kinds, or several have one number: some are no masks then.
     """
@@ -129,15 +129,15 @@ def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list
     if missing > MOST_MISSING * len(images):
         return list(images), [f"{name}: the numbers from {numbers[0]} to {numbers[-1]} do not count frames"]
     places = dict(zip(numbers, images, strict=True))
-    assumed = [f"{name}: every {step}th number is a frame"] if step > 1 else []
+    guesses = [f"{name}: every {step}th number is a frame"] if step > 1 else []
     if missing:
-        assumed.append(f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are missing, and are held")
-    return [places.get(number) for number in range(numbers[0], numbers[-1] + 1, step)], assumed
+        guesses.append(f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are missing, and are held")
+    return [places.get(number) for number in range(numbers[0], numbers[-1] + 1, step)], guesses
 
 
 def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of images of one size. Raises InputError naming the file where one is none."""
-    files, assumed = numbered(images, name)
+    files, guesses = numbered(images, name)
     every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
     chosen = every[slice(*span(frames, len(every)))]
     counts, shape, known = ValueCounts(), (0, 0), [file is not None for file, _ in chosen]
@@ -173,7 +173,7 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
         valid[:] = np.where(known, 255, 0)[:, None]
     paged = {file for file, page in chosen if page}
     names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
-    return PackedMasks(names, size, masks, valid, np.array(known), assumed=[*assumed, *kind])
+    return PackedMasks(names, size, masks, valid, np.array(known), guesses=[*guesses, *kind])
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:
@@ -187,14 +187,14 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     start, stop = span(frames, count)
     if not usable[start:stop].any():
         raise InputError(f"{name}: expected a frame that is usable, got none from {start} to {stop}")
-    is_person, assumed = _stack_classifier(name, stack, start, stop, label)
+    is_person, guesses = _stack_classifier(name, stack, start, stop, label)
     masks = _pack(stack, start, stop, is_person)
     valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
     names = [f"{name}[{k}]" for k in range(start, stop)]
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
     if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
         raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
-    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks, assumed)
+    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks, guesses)
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
@@ -236,7 +236,7 @@ def _described(stored: Stored | NDArray[Any]) -> str:
 def _stack_classifier(
     name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None
 ) -> tuple[Classifier, list[str]]:
-    """Return how frames start to stop become masks, and what was assumed; booleans need no count."""
+    """Return how frames start to stop become masks, and what was guesses; booleans need no count."""
     if stored.dtype.kind == "b" and label is None:
         return _above(0.0), []
     counts = ValueCounts()
@@ -292,7 +292,7 @@ class ValueCounts:
             self.solid.update(_solid(values, unique))
 
     def classifier(self, label: int | None, name: object) -> tuple[Classifier, list[str]]:
-        """Return how these values become masks, and what was assumed of them.
+        """Return how these values become masks, and what was guesses of them.
 
         Raises InputError where it is open which label is the person.
         """

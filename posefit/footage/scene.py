@@ -39,6 +39,7 @@ class Scene:
     observations: Sequence[Observation] = field(repr=False)
     placing: Placing = "placed"
     warnings: Sequence[str] = ()  # what a user should know before they trust it
+    guesses: Sequence[str] = ()  # what the sources do not state, and posefit assumes
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
 
@@ -49,6 +50,7 @@ def synthetic(
     size: tuple[int, int],
     cameras: Sequence[Camera],
     frames: Range,
+    guesses: Sequence[str] = (),
 ) -> Scene:
     """Return the scene of a known motion; its masks are drawn frame by frame as they are needed.
 
@@ -76,6 +78,7 @@ def synthetic(
         motion,
         observations,
         placing,
+        guesses=guesses,
     )
 
 

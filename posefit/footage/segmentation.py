@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import Parameter
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -161,6 +162,8 @@ class Segmentation:
         self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
         self._given, self._how = "background" in how.settings, how
         self._segmenter = how.segmenter(self._film) if self._given else None  # a background is checked now
+        self._masks, self._valid = (empty_planes(len(self), self.size) for _ in range(2))
+        self._pass: tuple[Iterator[Image], Segmenter, FrameQuality, CameraMotion] | None = None  # while frames are read
         self._shifts: list[float] = []
         self._facings: list[float] = []  # of each frame, as `Segmenter.facing`; NaN where unknown
         self._landmarks: list[Array] = []  # of each frame, as `Segmenter.landmarks`, in scaled pixels
@@ -177,12 +180,30 @@ class Segmentation:
         `on_frame` gets each frame, scaled, the person in it, and whether it is usable. Raises InputError where no frame
         shows a person.
         """
-        masks, valid = (empty_planes(len(self), self.size) for _ in range(2))
-        segmenter = self.learned()
-        quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
-        motion = CameraMotion(self.size)
-        frames = self.video.frames(self.start, self.stop, self.size)
-        for k, image in enumerate(progress(frames, len(self)) if progress else frames):
+        self.read(len(self) - len(self.rows), progress, on_frame)
+        self._pass = None
+        if not self.shown:
+            damage = f"; {self._damage}" if self._missing else ""
+            none = "expected a person who moves before a still background, got none in any frame"
+            raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
+        return self.packed()
+
+    def read(
+        self,
+        count: int,
+        progress: Progress | None = None,
+        on_frame: Callable[[Image, Person, bool], None] | None = None,
+    ) -> None:
+        """Take the person out of so many more frames."""
+        if self._pass is None:
+            segmenter = self.learned()
+            quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
+            frames = self.video.frames(self.start, self.stop, self.size)
+            self._pass = frames, segmenter, quality, CameraMotion(self.size)
+        frames, segmenter, quality, motion = self._pass
+        chosen = islice(frames, count)
+        for image in progress(chosen, count) if progress else chosen:
+            k = len(self.rows)
             if k % PERIOD == 0:
                 self._shifts.append(motion.shift(image))
             result, row = self.person(segmenter, image, quality, self.start + k)
@@ -193,18 +214,23 @@ class Segmentation:
             )
             row["usable"] = int(row["usable"] and self.video.is_filmed(self.start + k))
             self.rows.append(row)
-            masks[k], valid[k] = np.packbits(result.mask), np.packbits(result.valid)
+            self._masks[k], self._valid[k] = np.packbits(result.mask), np.packbits(result.valid)
             if on_frame is not None:
                 on_frame(image, result, bool(row["usable"]))
-        if not any(row["area"] for row in self.rows):
-            damage = f"; {self._damage}" if self._missing else ""
-            none = "expected a person who moves before a still background, got none in any frame"
-            raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
+
+    @property
+    def shown(self) -> bool:
+        """Whether any frame so far shows a person."""
+        return any(row["area"] for row in self.rows)
+
+    def packed(self) -> PackedMasks:
+        """Return the masks of the frames so far."""
         count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
         landmarks = np.array(self._landmarks)
         known = landmarks if landmarks[..., 2].any() else None
-        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, known)
+        masks, valid, guesses = self._masks[:count], self._valid[:count], self.video.guesses
+        return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, guesses)
 
     def learned(self) -> Segmenter:
         """Return the segmenter, which has learned the background."""

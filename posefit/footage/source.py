@@ -10,17 +10,17 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.footage.cameras import CameraView, calibrated, combined, listed
+from posefit.footage.cameras import CameraView, calibrated, combined, listed, world_of
 from posefit.footage.cleaning import cleaned
-from posefit.footage.images import IMAGES
+from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import FPS, Range, existing
-from posefit.footage.quality import Verdict
-from posefit.footage.readers import Masks, name_of, read_masks
+from posefit.footage.quality import MIN_FRAMES, Verdict
+from posefit.footage.readers import Masks, images_in, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up, upright
+from posefit.geometry.calibration import Calibration, Unit, Up
 from posefit.geometry.camera import Camera
 from posefit.limits import allowed_bytes
 from posefit.motion import built_in, recorded
@@ -33,18 +33,19 @@ from posefit.reading import quoted
 
 MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".npy", ".asf", ".json", ".csv", ".txt")
+FIRST_SECONDS = 2.0  # of several videos, by which they are refused before the rest is read
 SIZE = (320, 240)  # pixels of a rendered picture
-Kind = Literal["motion", "masks", "video"]
-_KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video"}
+Kind = Literal["motion", "masks", "video", "pictures"]
+_KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video", "pictures": "pictures"}
 Source = str | Path | Motion
 Footage = Source | Masks
 POSE_BYTES = 3_000  # that a method takes to learn from a pose: its angles, joints and codes, and copies
 _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
-    "extraction": ("video", ["video"]),
-    "fps": ("motions and masks", ["motion", "masks"]),
+    "extraction": ("video", ["video", "pictures"]),
+    "fps": ("motions, masks and pictures", ["motion", "masks", "pictures"]),
     "label": ("masks", ["masks"]),
     "holes": ("masks", ["masks"]),
-    "height": ("footage", ["masks", "video"]),
+    "height": ("footage", ["masks", "video", "pictures"]),
     "size": ("motions", ["motion"]),
 }
 
@@ -54,8 +55,9 @@ def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
     for name, (where, kinds) in _USED_FOR.items():
         if kind not in kinds and view.get(name) is not None:
             raise useless_for(kind, name, view[name], where)
-    if view.get("up") is not None and not view.get("camera"):
-        raise useless_for(kind, "up", view["up"], "calibrations")
+    for name in ("up", "unit"):
+        if view.get(name) is not None and not view.get("camera"):
+            raise useless_for(kind, name, view[name], "calibrations")
 
 
 def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
@@ -76,6 +78,7 @@ def scene_of(
     extraction: Extraction | None = None,
     height: float | None = None,
     up: Up | None = None,
+    unit: Unit | None = None,
     label: int | None = None,
     holes: float | None = None,
 ) -> Scene:
@@ -88,31 +91,51 @@ def scene_of(
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
     options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up})
+    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit})
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
         known = listed(camera)
-        world = upright([one for one in known if isinstance(one, Calibration)], up)
-        cameras = [one if isinstance(one, Camera) else one.camera(one.size, world) for one in known]
+        world, metres, guesses = world_of(known, up, unit)
+        cameras = [
+            one if isinstance(one, Camera) else one.in_metres(metres).camera(one.size or size or SIZE, world)
+            for one in known
+        ]
         motion = load_motion(cast(Source, sources[0]), fps or FPS, asf)
-        return synthetic(motion, view_degrees, size or SIZE, cameras, frames)
+        return synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()])
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
-    if kind == "video":
-        videos = [Video.of(Path(str(source))) for source in sources]
+    body, facing = body_of(asf, height), view_degrees[0] if view_degrees else None
+
+    def scene(views: Sequence[CameraView]) -> Scene:
+        return combined(views, Path(views[0].name).stem, body, known, facing, up, fps, unit)
+
+    if kind in ("video", "pictures"):
+        videos = [film_of(source, fps) for source in cast(Sequence[str | Path | tuple[Path, ...]], sources)]
         rates = {round(video.fps, 3) for video in videos}
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
         known = calibrated(camera, [video.size for video in videos])
-        views = _filmed(videos, extraction or Extraction(), frames, progress)
+        views = _filmed(videos, extraction or Extraction(), frames, progress, scene)
     else:
         known = calibrated(camera, [None] * len(sources))
         places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
         masks = [cleaned(read_masks(place, frames, label), name_of(place), holes) for place in places]
         views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
-    facing = view_degrees[0] if view_degrees else None
-    return combined(views, Path(views[0].name).stem, body_of(asf, height), known, facing, up, fps)
+    result = scene(views)
+    if height is None and asf is None:
+        result = replace(result, guesses=[*result.guesses, f"a person of {result.body.stature:.2f} m"])
+    if result.guesses:
+        progress.log(f"guessed: {'; '.join(result.guesses)}")
+    return result
+
+
+def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:
+    """Return the film of a video file, or of pictures, a folder of them or their files, taken at a rate."""
+    if isinstance(source, tuple):
+        return Video.of_pictures(source, Path(name_of(source)), fps)
+    path = Path(source)
+    return Video.of_pictures(images_in(path), path, fps) if path.is_dir() else Video.of(path)
 
 
 def body_of(asf: str | Path | None, height: float | None) -> Body:
@@ -121,14 +144,20 @@ def body_of(asf: str | Path | None, height: float | None) -> Body:
     return body if height is None else body.scaled(height / body.stature, height / body.stature)
 
 
-def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress) -> list[CameraView]:
-    """Return what videos show. Raises InputError where their masks cannot be those of a person.
+def _filmed(
+    videos: Sequence[Video],
+    how: Extraction,
+    frames: Range,
+    progress: Progress,
+    scene: Callable[[Sequence[CameraView]], object],
+) -> list[CameraView]:
+    """Return what videos show. Raises InputError where their masks cannot be those of a person, or `scene` does.
 
     Of several ways to take the person out, the first is used whose masks are not doubted, or else are doubted least.
     """
     tried = []
     for way in how.ways(len(videos)):
-        tried.append((way.name, *_taken_out(videos, way, frames, progress)))
+        tried.append((way.name, *_taken_out(videos, way, frames, progress, scene)))
         if tried[-1][2] is None:
             break
     name, views, doubt = min(tried, key=lambda one: 0 if one[2] is None else 1 + one[2].refused)
@@ -142,21 +171,49 @@ def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: P
 
 
 def _taken_out(
-    videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress
+    videos: Sequence[Video],
+    how: Extraction,
+    frames: Range,
+    progress: Progress,
+    scene: Callable[[Sequence[CameraView]], object],
 ) -> tuple[list[CameraView], Verdict | None]:
-    """Return what videos show, and the worst that is wrong with their masks, if anything."""
-    views, doubts = [], []
+    """Return what videos show, and the worst that is wrong with their masks, if anything.
+
+    Of several videos the first seconds come first: where all of them are refused, or contradict each other as a
+    `scene`, the rest need not be read.
+    """
     segmentations = [Segmentation(video, how, frames) for video in videos]  # all are checked before any is read
+
+    def view(part: Segmentation) -> CameraView:
+        pictures = partial(part.video.frames, part.start, part.stop, part.size)
+        return CameraView(part.packed(), part.warnings, str(part.video.path), part.video.size, pictures, part.facings)
+
+    if len(videos) > 1:
+        for part in segmentations:
+            part.read(round(FIRST_SECONDS * part.video.fps))
+        verdicts = [part.verdict for part in segmentations]
+        if all(
+            verdict is not None and verdict.refused and part.shown for verdict, part in zip(verdicts, segmentations)
+        ):
+            return [], verdicts[0]
+        if (
+            sum(all(row["usable"] for row in rows) for rows in zip(*(part.rows for part in segmentations)))
+            >= MIN_FRAMES
+        ):
+            scene([view(part) for part in segmentations])
+    views, worst = [], None
     for part in segmentations:
         progress.log(f"taking the person out of {part.video.path} by {how.name}")
         try:
-            masks = part.masks(progress.steps)
+            part.masks(progress.steps)
         except InputError as error:
             return [], Verdict(str(error), True)
-        pictures = partial(part.video.frames, part.start, part.stop, part.size)
-        views.append(CameraView(masks, part.warnings, str(part.video.path), part.video.size, pictures, part.facings))
-        doubts += [part.verdict] if part.verdict else []
-    return views, max(doubts, key=lambda one: one.refused, default=None)
+        views.append(view(part))
+        if part.verdict is not None and (worst is None or part.verdict.refused):
+            worst = part.verdict
+        if worst is not None and worst.refused:
+            break
+    return views, worst
 
 
 @dataclass(frozen=True)
@@ -219,14 +276,21 @@ def load_motion(source: Source, fps: float = FPS, asf: str | Path | None = None)
 def kind_of(source: Footage) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
 
-    A name with folders in it and no suffix is a folder's, even where there is none.
+    A name with folders in it and no suffix is a folder's, even where there is none. Images are a film where there are
+    several, or pages, and the first is a picture in many colours; else they are masks.
     """
-    if isinstance(source, np.ndarray | tuple):
+    if isinstance(source, np.ndarray):
         return "masks"
+    if isinstance(source, tuple):
+        return "pictures" if is_photo(source[0]) and (len(source) > 1 or page_count(source[0]) > 1) else "masks"
     if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
-    if path.is_dir() or path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
+    if path.suffix.lower() in IMAGES and not path.is_dir():
+        return kind_of((path,))
+    if path.is_dir():
+        return kind_of(tuple(images)) if (images := images_in(path)) else "masks"
+    if path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
 

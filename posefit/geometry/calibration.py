@@ -35,6 +35,8 @@ from posefit.geometry.camera import Camera, check_focal
 from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
+Unit = Literal["m", "cm", "mm", "in", "ft"]
+METRES: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 MESSAGE = 300  # characters of what is wrong
 DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
@@ -83,10 +85,9 @@ class Calibration:
         """Whether the lens bends straight lines; a fisheye does so by itself."""
         return self.fisheye or bool(np.any(self.distortion))
 
-    @property
-    def distance(self) -> float:
-        """How far the camera is from the origin of its world."""
-        return 0.0 if self.translation is None else float(np.linalg.norm(self.translation))
+    def in_metres(self, metres: float) -> "Calibration":
+        """Return the calibration of a file whose unit is so many metres."""
+        return self if self.translation is None else replace(self, translation=metres * self.translation)
 
     def camera(self, size: tuple[int, int], world: Array) -> Camera:
         """Return the camera of pictures scaled to `size` without their distortion; `world` (3, 3) turns its up to +y.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from posefit.footage.masks import Range
     from posefit.footage.segmentation import Extraction
     from posefit.footage.source import Source
-    from posefit.geometry.calibration import Up
+    from posefit.geometry.calibration import Unit, Up
     from posefit.geometry.camera import Camera
 
 ITERATIONS = 60  # C of the SAPSO paper, section 5.2
@@ -182,6 +182,9 @@ class TrackOptions:
         repeated=True,
     )
     up: "Up | None" = option(None, "Axis that points up in the calibration's world.", _one_of("x", "y", "z"), "x|y|z")
+    unit: "Unit | None" = option(
+        None, "Unit of lengths in a calibration; else guessed.", _one_of("m", "cm", "mm", "in", "ft"), "m|cm|mm|in|ft"
+    )
     view_degrees: float | Sequence[float] = option(
         (), "Where a camera stands: 0 in front, 90 to the side; repeatable.", _degrees, "DEGREES", None, float, True
     )
@@ -259,4 +262,17 @@ class TrackOptions:
         return replace(self, **values)
 
 
-VIEW = ("asf", "camera", "view_degrees", "size", "fps", "frames", "extraction", "height", "up", "label", "holes")
+VIEW = (
+    "asf",
+    "camera",
+    "view_degrees",
+    "size",
+    "fps",
+    "frames",
+    "extraction",
+    "height",
+    "up",
+    "unit",
+    "label",
+    "holes",
+)

@@ -6,6 +6,7 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 
 import csv
 import json
+import os
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import repeat
@@ -16,7 +17,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.files import MARK, Unfinished, other_entries
+from posefit.files import MARK, Unfinished, opencv_name, other_entries
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
@@ -79,8 +80,10 @@ class OutputFolder(Output):
         say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
-        if self.path.exists() and not self.path.is_dir():
-            raise InputError(f"{self.path}: expected a folder to write to, got a file")
+        opencv_name(self.path)  # a name that it cannot write is refused before the work
+        if os.path.lexists(self.path) and not self.path.is_dir():
+            came = "a link that leads nowhere" if self.path.is_symlink() else "a file"
+            raise InputError(f"{self.path}: expected a folder to write to, got {came}")
         if self.path.exists() and not force:
             raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
         if self.path.exists() and (others := other_entries(self.path, _MINE)):
@@ -195,7 +198,7 @@ class OutputFolder(Output):
         assert writer is not None
         writer.close()
         notes = ("" if summary["trust"] is None else summary["trust"]["sentence"], undetermined(summary))
-        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, [*filter(None, notes)])):
+        if not cv2.imwrite(opencv_name(folder / "summary.png"), painter.summary(rows, [*filter(None, notes)])):
             raise OSError("no room for summary.png")
         page = track_document(track_data(scene, frames, rows, summary, intervals, stills))
         (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
