@@ -17,7 +17,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span
-from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
+from posefit.footage.quality import MIN_FRAMES, PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
@@ -37,6 +37,7 @@ RIVAL_AREA = 0.4  # of the person's area: something so large may be another pers
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
 CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
+LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
@@ -223,9 +224,20 @@ class Segmentation:
         """Whether any frame so far shows a person."""
         return any(row["area"] for row in self.rows)
 
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which frames so far are usable (T,)."""
+        return np.array([row["usable"] for row in self.rows], dtype=bool)
+
+    @property
+    def refused_so_far(self) -> bool:
+        """Whether the frames so far show something as large as a person whose masks are refused."""
+        whole = [row for row in self.rows if not row["touches_border"] and row["longer_side"] > LARGE * self.size[1]]
+        return len(whole) >= MIN_FRAMES and bool((verdict := self.verdict) and verdict.refused)
+
     def packed(self) -> PackedMasks:
         """Return the masks of the frames so far."""
-        count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
+        count, usable = len(self.rows), self.usable
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
         landmarks = np.array(self._landmarks)
         known = landmarks if landmarks[..., 2].any() else None

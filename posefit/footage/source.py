@@ -191,15 +191,10 @@ def _taken_out(
     if len(videos) > 1:
         for part in segmentations:
             part.read(round(FIRST_SECONDS * part.video.fps))
-        verdicts = [part.verdict for part in segmentations]
-        if all(
-            verdict is not None and verdict.refused and part.shown for verdict, part in zip(verdicts, segmentations)
-        ):
-            return [], verdicts[0]
-        if (
-            sum(all(row["usable"] for row in rows) for rows in zip(*(part.rows for part in segmentations)))
-            >= MIN_FRAMES
-        ):
+        first = segmentations[0].verdict
+        if first is not None and all(part.refused_so_far for part in segmentations):
+            return [], first
+        if np.prod([part.usable for part in segmentations], axis=0).sum() >= MIN_FRAMES:
             scene([view(part) for part in segmentations])
     views, worst = [], None
     for part in segmentations:

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from posefit.footage.cameras import unit_of_heights
+from posefit.footage.segmentation import Extraction
 from posefit.footage.source import scene_of
 from posefit.geometry.calibration import METRES
+from posefit.progress import Progress
 from tests.cases import each
 from tests.commands import error_of
-from tests.footage.conftest import camera, truth, walk
+from tests.footage.conftest import camera, film, truth, walk
 from tests.footage.test_footage import toml
 
 AZIMUTHS = (np.pi / 2, 0.6)
@@ -41,9 +43,7 @@ def test_the_unit_of_calibrations_is_recognised_by_the_persons_height(tmp_path: 
         assert np.linalg.norm(scene.anchor - walk().translations[8]) < 0.3
         np.testing.assert_allclose([one.position for one in scene.cameras], [camera(a).position for a in AZIMUTHS], atol=1e-6)  # fmt: skip
         assert list(scene.guesses) == ([] if stated else [f"lengths of the calibration are in {unit}"])
-    with pytest.raises(
-        ValueError, match="expected a person of 1.74 m, got masks .* or the calibrations are in another o"
-    ):
+    with pytest.raises(ValueError, match="got .*: the masks show .* or the calibrations are in another order or unit"):
         scene_of(views(tmp_path), camera=[path], up="y", unit="ft", height=1.74)
 
 
@@ -87,3 +87,27 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 259.5], [0, 0, 1]]\n")
     with pytest.raises(ValueError, match="camera 'bare' must have its centre in 160x120, got 79.5x259.5"):
         scene_of([source], camera=[bare])
+
+
+def test_videos_that_contradict_each_other_are_refused_by_their_first_seconds(tmp_path: Path) -> None:
+    films = []
+    for name, azimuth in zip("ab", AZIMUTHS, strict=True):
+        masks = truth(azimuth)
+        films.append(film(tmp_path / f"{name}.avi", [*masks[6:], *masks[::-1], *masks, *masks[::-1]]))
+    steps: list[int] = []
+
+    def counted(frames: Any, count: int) -> Any:
+        steps.append(count)
+        return frames
+
+    how = Extraction("mean", background="0:2")
+    np.savez(tmp_path / "first.npz", masks=truth()[:1])
+    swapped = calibration(tmp_path / "two.toml", 1.0, AZIMUTHS[::-1])
+    with pytest.raises(ValueError, match="got .*: the masks show only parts of the person, or another one, or the cal"):
+        scene_of(films, Progress(steps=counted), camera=[swapped], up="y", unit="m", extraction=how)
+    assert steps == []  # those of the first two seconds have no bar
+    right = calibration(tmp_path / "right.toml", 1.0)
+    assert (
+        scene_of(films, Progress(steps=counted), camera=[right], up="y", extraction=how).count == len(truth()) * 4 - 6
+    )
+    assert steps == [len(truth()) * 4 - 6 - 50] * 2
