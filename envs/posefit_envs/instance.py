@@ -169,8 +169,9 @@ def body_of(motion: str) -> Body:
 
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
-    angles = np.concatenate([load_motion(name, FPS).poses[:, 3:] for name in train])
-    fitted: Prior = registry().prior(prior)().fit(angles, _source(motion).skeleton)
+    skeleton = _source(motion).skeleton
+    angles = np.concatenate([load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train])
+    fitted: Prior = registry().prior(prior)().fit(angles, skeleton)
     return fitted
 
 

@@ -126,7 +126,7 @@ ENGINE = (
 
 
 HEADINGS = {  # the options of a track in its help, by their names in Python
-    "What is seen": "live asf camera up unit view_degrees size fps frames frame height label holes",
+    "What is seen": "live asf camera up unit rate view_degrees size fps frames frame height label holes",
     "How the person is taken out of video": "extraction background roi ignore width",
     "Method and budget": "method settings train without_subject evaluations population_size iterations ask_seconds "
     "seed threads device",

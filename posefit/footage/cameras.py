@@ -16,15 +16,16 @@ from posefit.footage.masks import FPS, PackedMasks, Views, undistorted
 from posefit.footage.quality import apparent_sizes, disagreement, extent_of, meeting
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import METRES, Calibration, Unit, Up, guessed_up, read_calibrations, upright
+from posefit.geometry.calibration import Calibration, Up, guessed_up, read_calibrations, upright
 from posefit.geometry.camera import Camera
+from posefit.geometry.units import METRES, UNIT_NAMES, Unit
 from posefit.reading import cut, quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
 AROUND = 0.5  # seconds before and after a frame whose facings are averaged
 AGREEMENT = 0.6  # the mean of unit vectors is at least so long: facings may not contradict each other
-GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "in")
+GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
 FAR, FARTHER = 100.0, 1000.0  # of a camera from its world's origin: no metres, and no centimetres either
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
@@ -88,7 +89,7 @@ def combined(
         miss, tall = apparent
         if calibrated and unit is None:
             word = unit_of_heights(float(np.median(tall)) / metres / body.stature)
-            factor, of_cameras["unit"] = METRES[word] / metres, f"lengths of the calibration are in {word}"
+            factor, of_cameras["unit"] = METRES[word] / metres, f"the calibration is in {UNIT_NAMES[word]}"
             cameras = [replace(camera, translation=factor * camera.translation) for camera in cameras]
             miss, tall = factor * miss, factor * tall
         if wrong := disagreement(miss, tall, body.stature):
@@ -112,6 +113,7 @@ def combined(
         [warning for view in views for warning in view.warnings] + _unequal(views),
         [*guesses, *of_cameras.values()],
         pictures,
+        views[0].masks.first,
     )
 
 
@@ -124,7 +126,7 @@ def world_of(
     distances = [float(np.linalg.norm(one.translation)) for one in calibrations if one.translation is not None]
     if unit is None and distances:
         unit = "m" if max(distances) <= FAR else "cm" if max(distances) <= FARTHER else "mm"
-        guesses["unit"] = f"lengths of the calibration are in {unit}"
+        guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
     for calibration in calibrations:
         if calibration.rotation is None:
             guesses["place"] = "the camera stands level, which its calibration does not state"

@@ -34,7 +34,8 @@ class PackedMasks:
     usable: NDArray[np.bool_] = field(repr=False)  # (T,) whether a frame shows enough of the person to be searched
     fps: float | None = None  # None where the source does not state it
     landmarks: Array | None = field(default=None, repr=False)  # (T, 27, 3), see `Segmenter`; None where there are none
-    guesses: Sequence[str] = ()  # of the source, which it does not state
+    first: int = 0  # the number of the first frame in the footage
+    guesses: Sequence[str] = ()  # what the source does not state
 
     def __len__(self) -> int:
         return len(self.masks)

@@ -42,6 +42,7 @@ class Scene:
     guesses: Sequence[str] = ()  # what the sources do not state, and posefit assumes
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
+    first: int = 0  # the number of the first frame in the footage, or in the whole motion
 
 
 def synthetic(
@@ -78,7 +79,9 @@ def synthetic(
         motion,
         observations,
         placing,
-        guesses=guesses,
+        motion.notes,
+        guesses,
+        first=motion.first,
     )
 
 

@@ -242,7 +242,7 @@ class Segmentation:
         landmarks = np.array(self._landmarks)
         known = landmarks if landmarks[..., 2].any() else None
         masks, valid, guesses = self._masks[:count], self._valid[:count], self.video.guesses
-        return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, guesses)
+        return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, self.start, guesses)
 
     def learned(self) -> Segmenter:
         """Return the segmenter, which has learned the background."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -20,12 +20,13 @@ from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Unit, Up
+from posefit.geometry.calibration import Calibration, Up
 from posefit.geometry.camera import Camera
+from posefit.geometry.units import Unit
 from posefit.limits import allowed_bytes
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
-from posefit.motion.asf import read_asf
+from posefit.motion.asf import Acclaim, parse_asf
 from posefit.motion.bvh import read_bvh
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
@@ -47,7 +48,22 @@ _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
     "holes": ("masks", ["masks"]),
     "height": ("footage", ["masks", "video", "pictures"]),
     "size": ("motions", ["motion"]),
+    "rate": (".amc files", ["motion"]),
 }
+
+
+class FileOptions(NamedTuple):
+    """What the files of motions do not state, or state wrongly."""
+
+    asf: str | Path | None = None  # of an .amc; None for the only one beside it
+    unit: Unit | None = None  # of lengths; None for the one that is recognised
+    up: Up | None = (
+        None  # the axis of a .bvh or .amc that is up; None for y, or the one that a .bvh's person stands along
+    )
+    rate: float | None = None  # frames a second of an .amc; None for what it states, or 120
+
+
+RECOGNISED = FileOptions()
 
 
 def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
@@ -55,9 +71,10 @@ def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
     for name, (where, kinds) in _USED_FOR.items():
         if kind not in kinds and view.get(name) is not None:
             raise useless_for(kind, name, view[name], where)
-    for name in ("up", "unit"):
-        if view.get(name) is not None and not view.get("camera"):
-            raise useless_for(kind, name, view[name], "calibrations")
+    if view.get("up") is not None and not view.get("camera") and kind != "motion":
+        raise useless_for(kind, "up", view["up"], "calibrations and files of motions")
+    if view.get("unit") is not None and kind != "motion" and view.get("asf") is None and not view.get("camera"):
+        raise useless_for(kind, "unit", view["unit"], "calibrations and files of motions")
 
 
 def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
@@ -79,6 +96,7 @@ def scene_of(
     height: float | None = None,
     up: Up | None = None,
     unit: Unit | None = None,
+    rate: float | None = None,
     label: int | None = None,
     holes: float | None = None,
 ) -> Scene:
@@ -91,7 +109,7 @@ def scene_of(
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
     options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit})
+    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "rate": rate, "asf": asf})
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
@@ -101,11 +119,13 @@ def scene_of(
             one if isinstance(one, Camera) else one.in_metres(metres).camera(one.size or size or SIZE, world)
             for one in known
         ]
-        motion = load_motion(cast(Source, sources[0]), fps or FPS, asf)
+        stated = FileOptions(asf, None if known else unit, None if known else up, rate)
+        motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
         return synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()])
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
-    body, facing = body_of(asf, height), view_degrees[0] if view_degrees else None
+    body, notes = body_of(asf, height, None if camera else unit)
+    facing = view_degrees[0] if view_degrees else None
 
     def scene(views: Sequence[CameraView]) -> Scene:
         return combined(views, Path(views[0].name).stem, body, known, facing, up, fps, unit)
@@ -123,8 +143,8 @@ def scene_of(
         masks = [cleaned(read_masks(place, frames, label), name_of(place), holes) for place in places]
         views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
     result = scene(views)
-    if height is None and asf is None:
-        result = replace(result, guesses=[*result.guesses, f"a person of {result.body.stature:.2f} m"])
+    of_height = [f"a person of {body.stature:.2f} m"] if height is None and asf is None else []
+    result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
     if result.guesses:
         progress.log(f"guessed: {'; '.join(result.guesses)}")
     return result
@@ -138,10 +158,13 @@ def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:
     return Video.of_pictures(images_in(path), path, fps) if path.is_dir() else Video.of(path)
 
 
-def body_of(asf: str | Path | None, height: float | None) -> Body:
-    """Return the body of a skeleton file, or the average one, scaled to a height in metres."""
-    body = Body.of(built_in.average_skeleton() if asf is None else read_asf(asf))
-    return body if height is None else body.scaled(height / body.stature, height / body.stature)
+def body_of(asf: str | Path | None, height: float | None, unit: Unit | None = None) -> tuple[Body, Sequence[str]]:
+    """Return the body of a skeleton file, or the average one, scaled to a height in metres; and what was guessed."""
+    acclaim = Acclaim(built_in.average_skeleton(), 1.0) if asf is None else parse_asf(asf, unit)
+    body = Body.of(acclaim.skeleton)
+    if height is None:
+        return body, acclaim.notes
+    return body.scaled(height / body.stature, height / body.stature), ()
 
 
 def _filmed(
@@ -228,10 +251,10 @@ class SourceClip:
         return self.poses if self.fps is None else round(self.poses * fps / self.fps)
 
 
-def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
+def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
     """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
-    A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises InputError where there is
+    A file is read once, now. Raises InputError where there is
     no such motion.
     """
     if source in built_in.names():
@@ -239,7 +262,7 @@ def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
         return SourceClip(lambda fps: built_in.motion(name, fps=fps), len(built_in.motion(name)), None)
     if recorded.is_recorded(source):
         return recorded_clip(recorded.clip(str(source)))
-    motion = source if isinstance(source, Motion) else _motion_in(source, asf)
+    motion = source if isinstance(source, Motion) else _motion_in(source, stated)
     return SourceClip(motion.resampled, len(motion), motion.fps)
 
 
@@ -248,24 +271,34 @@ def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
     return SourceClip(lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS)
 
 
-def _motion_in(source: str | Path, asf: str | Path | None) -> Motion:
+def _motion_in(source: str | Path, stated: FileOptions) -> Motion:
     path = Path(source)
     if path.suffix.lower() == ".amc":
-        return read_clip(_skeleton_file(path, asf), existing(path))
+        skeleton = _skeleton_file(path, stated.asf)
+        return read_clip(skeleton, existing(path), fps=stated.rate, unit=stated.unit, up=stated.up)
     if path.suffix.lower() == ".bvh":
-        return read_bvh(existing(path))
+        return read_bvh(existing(path), unit=stated.unit, up=stated.up)
     if path.exists() or path.suffix or os.sep in str(source):
         expected = "an .amc file, a .bvh file or a built-in motion"
         raise InputError(f"{existing(path)}: expected {expected}, got {path.suffix or 'a folder'}")
     return built_in.motion(str(source))  # raises: there is none of that name
 
 
-def load_motion(source: Source, fps: float = FPS, asf: str | Path | None = None) -> Motion:
+def load_motion(source: Source, fps: float = FPS, stated: FileOptions = RECOGNISED) -> Motion:
     """Return the motion that a source names, at a rate: built-in, recorded, or of an .amc or .bvh file.
 
-    The .asf of an .amc is `asf`, or the only one beside it. Raises InputError where there is no such motion.
+    Raises InputError where there is no such motion, and where something is stated that only files have use for.
     """
-    return clip_of(source, asf)(fps)
+    path = None if isinstance(source, Motion) or source in built_in.names() else Path(source)
+    suffix = "" if path is None else path.suffix.lower()
+    for name, value, suffixes in (
+        ("unit", stated.unit, MOTIONS),
+        ("up", stated.up, MOTIONS),
+        ("rate", stated.rate, (".amc",)),
+    ):
+        if value is not None and suffix not in suffixes:
+            raise InputError(f"{name} must be given for {' and '.join(suffixes)} files only, got {quoted(value)}")
+    return clip_of(source, stated)(fps)
 
 
 def kind_of(source: Footage) -> Kind:
@@ -301,7 +334,7 @@ def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:
 
 
 def training_clips(
-    sources: Sequence[Source], asf: str | Path | None = None, *, followed: Source | None = None
+    sources: Sequence[Source], stated: FileOptions = RECOGNISED, *, followed: Source | None = None
 ) -> list[SourceClip]:
     """Return the clips that sources name, each of which gives its motion at any rate.
 
@@ -312,7 +345,7 @@ def training_clips(
     """
     clips, poses = [], 0
     for source in sources:
-        for clip in _clips(source, asf, followed):
+        for clip in _clips(source, stated, followed):
             clips.append(clip)
             poses += clip.count(FPS)
             _check_memory(poses, FPS)
@@ -333,7 +366,7 @@ def _check_memory(poses: int, fps: float) -> None:
         raise InputError(f"train must take at most the {most / 1e9:.1f} GB of memory that there may be, got {took}")
 
 
-def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> Iterator[SourceClip]:
+def _clips(source: Source, stated: FileOptions, followed: Source | None) -> Iterator[SourceClip]:
     if isinstance(source, str) and recorded.is_library(source):
         clips = [clip for clip in recorded.named(source) if clip.name != _stem(followed)]
         if not clips:
@@ -346,11 +379,11 @@ def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> I
         others = [path for path in paths if not _same(path, followed)]
         if not others:
             raise InputError(f"{source}: expected a folder with another clip than the source, got that one alone")
-        yield from (clip_of(path, asf) for path in others)
+        yield from (clip_of(path, stated) for path in others)
     elif _same(source, followed):
         raise InputError(f"train must not contain the source itself, got {source}")
     else:
-        yield clip_of(source, asf)
+        yield clip_of(source, stated)
 
 
 def _stem(source: Source | None) -> str | None:

@@ -35,8 +35,6 @@ from posefit.geometry.camera import Camera, check_focal
 from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
-Unit = Literal["m", "cm", "mm", "in", "ft"]
-METRES: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 MESSAGE = 300  # characters of what is wrong
 DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by

@@ -74,7 +74,9 @@ def evaluated(
         evaluations=effort["evaluations"],
         evaluations_per_second=effort["evaluations"] / max(effort["seconds"], 1e-9),  # a plugin may report 0
     )
-    rows = [{"frame": k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))]
+    rows = [
+        {"frame": scene.first + k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))
+    ]
     return rows, measures
 
 

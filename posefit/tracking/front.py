@@ -64,7 +64,7 @@ def track(
         chosen = chosen.changed(body_frames=0)
     chosen = resolved(sources[0], chosen)
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
-    clips = training_clips(chosen.train, chosen.asf, followed=followed)  # before the work, as a name may be wrong
+    clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:
             raise InputError(f"{name} must be given with out, the folder of the track, got none")

@@ -71,7 +71,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         if declared.name in WHOLE and getattr(chosen, declared.name) != declared.default:
             raise InputError(f"{declared.name} must be left out with live, got {getattr(chosen, declared.name)}")
     chosen = chosen.changed(method=chosen.method or METHOD, train=chosen.train or built_in.other_styles("walk"))
-    clips = training_clips(chosen.train, chosen.asf)
+    clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
     fps = chosen.fps or stream.fps
     masks = live_masks(stream, chosen.extraction, progress.log)
@@ -117,7 +117,8 @@ def _scene_of(
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
-    body, view = body_of(options.asf, options.height), CameraView(packed(first), (), name)
+    body, notes = body_of(options.asf, options.height, options.unit)
+    view = CameraView(packed(first), notes, name)
     scene = combined([view], name, body, known, facing, options.up, fps)
     bent = next(((each, each.maps(size)) for each in known if isinstance(each, Calibration) and each.distorted), None)
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from posefit.errors import InputError
 from posefit.fitting.check import finite_number, one_of, pair, whole
+from posefit.geometry.units import UNITS
 from posefit.limits import HEIGHTS, RATES, SECONDS
 from posefit.reading import quoted
 from posefit.settings import POPULATION_SIZE
@@ -23,9 +24,10 @@ if TYPE_CHECKING:
     from posefit.fitting.tracker import TrackerFactory
     from posefit.footage.masks import Range
     from posefit.footage.segmentation import Extraction
-    from posefit.footage.source import Source
-    from posefit.geometry.calibration import Unit, Up
+    from posefit.footage.source import FileOptions, Source
+    from posefit.geometry.calibration import Up
     from posefit.geometry.camera import Camera
+    from posefit.geometry.units import Unit
 
 ITERATIONS = 60  # C of the SAPSO paper, section 5.2
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
@@ -181,10 +183,19 @@ class TrackOptions:
         "FILE",
         repeated=True,
     )
-    up: "Up | None" = option(None, "Axis that points up in the calibration's world.", _one_of("x", "y", "z"), "x|y|z")
-    unit: "Unit | None" = option(
-        None, "Unit of lengths in a calibration; else guessed.", _one_of("m", "cm", "mm", "in", "ft"), "m|cm|mm|in|ft"
+    up: "Up | None" = option(
+        None,
+        "Axis that points up: in the calibration's world, or in that of a .bvh or .amc file; recognised where absent.",
+        _one_of("x", "y", "z"),
+        "x|y|z",
     )
+    unit: "Unit | None" = option(
+        None,
+        "Unit of lengths in a calibration, or in a .bvh or .asf file; recognised where absent.",
+        _one_of(*UNITS),
+        "|".join(UNITS),
+    )
+    rate: float | None = _float("Rate of .amc files that do not state it; by default 120.", RATES, "HZ")
     view_degrees: float | Sequence[float] = option(
         (), "Where a camera stands: 0 in front, 90 to the side; repeatable.", _degrees, "DEGREES", None, float, True
     )
@@ -257,6 +268,13 @@ class TrackOptions:
         """The options that say how a source is looked at, as `posefit.footage.source.scene_of` takes them."""
         return {name: getattr(self, name) for name in VIEW}
 
+    @property
+    def of_files(self) -> "FileOptions":
+        """What is stated of the files that are learned from."""
+        from posefit.footage.source import FileOptions
+
+        return FileOptions(self.asf, rate=self.rate)
+
     def changed(self, **values: Any) -> Self:
         """Return these options with some of them replaced, checked again."""
         return replace(self, **values)
@@ -273,6 +291,7 @@ VIEW = (
     "height",
     "up",
     "unit",
+    "rate",
     "label",
     "holes",
 )

@@ -282,6 +282,7 @@ def _write_formats(
         poses=estimate.poses,
         translations=estimate.translations,
         fps=np.array(estimate.fps),
+        frames=estimate.first + np.arange(len(estimate)),
         joints=np.array(JOINTS),
         places=np.array(PLACES),
         costs=np.array([frame.cost for frame in frames]),

@@ -81,7 +81,7 @@ class Painter:
         image = np.hstack([left, side])
         if self._count in self._wanted:
             self._stills.append(self._still(image, row))
-        label = [f"frame {self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
+        label = [f"frame {self._scene.first + self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
         label += [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
         label += [] if observation.usable else ["pose held"]
         image[:LABEL_HEIGHT] //= 4  # so that the label stands out from a bright sky
@@ -104,7 +104,7 @@ class Painter:
         """Return a small picture whose words are large enough to be read in a page."""
         still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
-        label = f"frame {self._count}, {worth}"
+        label = f"frame {self._scene.first + self._count}, {worth}"
         if row["lost"] >= LOST:
             _draw_border(still, BORDER // 2)
         head = blank(LABEL_HEIGHT, still.shape[1])

@@ -11,6 +11,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,8 @@ from posefit.tracking.smoothing.smooth import Pass, smooth
 from posefit.tracking.summary import evaluate
 from posefit.tracking.trajectory import Hypothesis, cheapest
 
+MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
+
 
 def track_scene(
     scene: Scene,
@@ -59,7 +62,10 @@ def track_scene(
     options = options or TrackOptions()
     output = output or Output()
     options = options.changed(smooth=scene.truth is None if options.smooth is None else options.smooth)
-    scene = on_device(scene, options.device)
+    notes = dict.fromkeys(note for motion in training for note in motion.notes if note not in scene.warnings)
+    if len(notes) > MAX_NOTES:
+        notes = dict.fromkeys([*islice(notes, MAX_NOTES), f"and {len(notes) - MAX_NOTES} more of files to learn from"])
+    scene = replace(on_device(scene, options.device), warnings=[*scene.warnings, *notes])
     task = task_of(scene, options, training)
     if options.smooth and task.translation == "known":
         raise InputError("smooth must be given where the translation is searched or aligned, got known")

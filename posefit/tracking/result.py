@@ -74,7 +74,7 @@ class Track:
     @property
     def unknown_sides(self) -> NDArray[np.bool_]:
         """In which frames (T,) left and right are unknown; between two of these they may be exchanged as well."""
-        return np.isin(np.arange(len(self)), self.summary["unknown_sides"] or [])
+        return np.isin(self.scene.first + np.arange(len(self)), self.summary["unknown_sides"] or [])
 
     def angles(self, name: str) -> Array:
         """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.
@@ -95,7 +95,7 @@ class Track:
         return {name: np.where(blank, np.nan, values) for name, values in angles.items()}
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a table of one row a frame: seconds since the first, measures, angles in degrees, joints in metres.
+        """Return a table of one row a frame: seconds of the footage, measures, angles in degrees, joints in metres.
 
         Columns are those of frames.csv and angles.csv. Raises ImportError where pandas is not installed.
         """
@@ -104,7 +104,7 @@ class Track:
         rows = {name: [row[name] for row in self.frames] for name in self.frames[0] if name != "cpu_seconds"}
         axes = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
         points = dict(zip(axes, self.joints.reshape(len(self), -1).T, strict=True))
-        seconds = np.arange(len(self)) / self.motion.fps
+        seconds = (self.motion.first + np.arange(len(self))) / self.motion.fps
         table: pd.DataFrame = import_pandas().DataFrame(
             {**rows, "seconds": seconds, "activity": self.activity, **self._angles(), **points}
         )

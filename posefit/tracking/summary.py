@@ -87,8 +87,8 @@ def evaluate(
         "none_of_modes": round(float(np.mean(none)), 6) if none else None,
         "unknown_sides": _numbers(rows, "unknown_sides", 1.0),
         "lost_frames": _numbers(rows, "lost", LOST),
-        "relocalised": [k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
-        "retracked_outside": tracked.stay,
+        "relocalised": [scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
+        "retracked_outside": tracked.stay and tuple(scene.first + k for k in tracked.stay),
         "backwards_share": round(float(walks_back.mean()), 6),
         "trust": None
         if scene.truth is not None

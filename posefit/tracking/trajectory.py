@@ -52,7 +52,7 @@ class TrajectoryCost:
 def motion_of(scene: Scene, frames: Sequence[Frame]) -> Motion:
     """Return the estimated motion of a scene's person."""
     poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-    return Motion(scene.name, scene.body.skeleton, poses, places, scene.fps)
+    return Motion(scene.name, scene.body.skeleton, poses, places, scene.fps, scene.first)
 
 
 def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
