@@ -102,13 +102,9 @@ def test_videos_that_contradict_each_other_are_refused_by_their_first_seconds(tm
         steps.append(count)
         return frames
 
-    how = Extraction("mean", background="0:6")
-    swapped = calibration(tmp_path / "two.toml", 1.0, AZIMUTHS[::-1])
+    how, right = Extraction("mean", background="0:6"), calibration(tmp_path / "two.toml", 1.0)
     with pytest.raises(ValueError, match="got .*: the masks show only parts of the person, or another one, or the cal"):
-        scene_of(films, Progress(steps=counted), camera=[swapped], up="y", unit="m", extraction=how)
+        scene_of(films, Progress(steps=counted), camera=[right], up="y", unit="foot", extraction=how)
     assert steps == []  # those of the first two seconds have no bar
-    right = calibration(tmp_path / "right.toml", 1.0)
-    assert (
-        scene_of(films, Progress(steps=counted), camera=[right], up="y", extraction=how).count == 144
-    )
+    assert scene_of(films, Progress(steps=counted), camera=[right], up="y", extraction=how).count == 144
     assert steps == [144 - 50] * 2
