@@ -11,7 +11,19 @@ import pytest
 from posefit.geometry.calibration import Calibration, guessed_up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from tests.cases import each
-from tests.geometry.calibrations import QUALISYS, TOML, opencv
+from tests.geometry.calibrations import (
+    KINDS,
+    LENS,
+    QUALISYS,
+    ROTATION,
+    TOML,
+    TRANSLATION,
+    YAML_24,
+    K,
+    kind_written,
+    matrix_text,
+    opencv,
+)
 
 
 def written(tmp_path: Path, name: str) -> Path:
@@ -182,67 +194,6 @@ def test_a_picture_that_a_codec_filled_up_has_the_camera_that_it_had(
         assert (after.width, after.height) == came
 
 
-ROTATION = cv2.Rodrigues(np.array([1.4, 0.3, -0.2]))[0]  # a camera that looks along a z-up world's ground
-TRANSLATION = np.array([0.3, 1.1, 4.2])
-K = [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]]
-LENS = [0.12, -0.05, 0.001, 0.002, 0.01]
-ROWS = [f"   - {value}" for value in LENS]
-
-
-def _matrix(name: str, values: object) -> str:
-    array = np.atleast_2d(np.asarray(values, dtype=float))
-    shape = f"   rows: {array.shape[0]}\n   cols: {array.shape[1]}\n   dt: d\n"
-    return f"{name}: !!opencv-matrix\n{shape}   data: {array.ravel().tolist()}\n"
-
-
-PLACED = {"rotation": cv2.Rodrigues(ROTATION)[0].tolist(), "translation": TRANSLATION[:, None].tolist()}  # columns
-ENTRY = f"size = [640, 480]\nmatrix = {K}\ndistortions = {LENS}\nrotation = {PLACED['rotation']}\ntranslation = {PLACED['translation']}\nfisheye = false\n"
-YAML_24 = (
-    "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n"
-    + _matrix("Camera_Matrix", K)
-    + _matrix("Distortion_Coefficients", LENS)
-)
-INTRI = (
-    '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n'
-    + _matrix("K_left", K)
-    + _matrix("dist_left", LENS)
-    + _matrix("K_right", K)
-    + _matrix("dist_right", np.zeros(5))
-)
-EXTRI = '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n' + "".join(
-    _matrix(f"{kind}_{name}", value)
-    for name in ("left", "right")
-    for kind, value in (("R", PLACED["rotation"]), ("Rot", ROTATION), ("T", PLACED["translation"]))
-)
-ROS = (
-    "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
-    f"  data: {np.ravel(K).tolist()}\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
-    f"  data: {LENS}\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
-    f"projection_matrix:\n  rows: 3\n  cols: 4\n  data: {np.ravel(np.eye(3, 4)).tolist()}\n"
-)
-ROS_MESSAGE = (
-    "header:\n  seq: 1\n  frame_id: narrow\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n"
-    f"D: {LENS}\nK: {np.ravel(K).tolist()}\nR: [0, 1, 0, 1, 0, 0, 0, 0, -1]\nP: {np.ravel(np.eye(3, 4)).tolist()}\n"
-)
-KINDS = {
-    "caliscope.toml": f"[charuco]\ncolumns = 4\n[cameras.0]\ncam_id = 0\n{ENTRY}[cameras.1]\nignore = true\n",
-    "pose2sim.toml": f"[cam_01]\nname = 'cam_01'\n{ENTRY}[metadata]\nadjusted = false\n",
-    "opencv24.yml": YAML_24 + _matrix("R", ROTATION) + _matrix("T", PLACED["translation"]),
-    "tutorial.json": json.dumps({"mtx": K, "dist": [LENS], "R": ROTATION.tolist(), "tvec": PLACED["translation"]}),
-    "several.json": json.dumps({"cameras": [{"name": "a", "K": K, "dist_coeff": LENS, "image_size": [640, 480], "R": ROTATION.tolist(), "t": TRANSLATION.tolist()}]}),
-    "numbered.yaml": "w: 640\nh: 480\nfx: 500\nfy: 510\ncx: 319.5\ncy: 239.5\nk1: 0.12\nk2: -0.05\np1: 0.001\np2: 0.002\nk3: 0.01\n" + _matrix("R", ROTATION) + _matrix("T", TRANSLATION),
-    "intri.yml": INTRI,
-    "ros.yaml": ROS,
-    "ros_message.yaml": ROS_MESSAGE,
-}  # fmt: skip
-
-
-def kind_written(folder: Path, name: str) -> Path:
-    (folder / "extri.yml").write_text(EXTRI)
-    (folder / name).write_text(KINDS[name])
-    return folder / name
-
-
 @each("name", list(KINDS))
 def test_cameras_of_every_program_project_as_opencv_does(tmp_path: Path, name: str) -> None:
     read = read_calibrations(kind_written(tmp_path, name))
@@ -264,7 +215,9 @@ def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
     for lens in ([0.1, -0.02, 0.003, 0.0], [0.0] * 4):  # without numbers, too
         text = "%YAML:1.0\n---\nimage_width: 1280\nimage_height: 800\n" + f"{name}: {value}\n"
         k = np.array([[600.0, 0.0, 639.5], [0.0, 600.0, 399.5], [0.0, 0.0, 1.0]])
-        (tmp_path / "a.yml").write_text(text + _matrix("camera_matrix", k) + _matrix("distortion_coefficients", lens))
+        (tmp_path / "a.yml").write_text(
+            text + matrix_text("camera_matrix", k) + matrix_text("distortion_coefficients", lens)
+        )
         (one,) = read_calibrations(tmp_path / "a.yml")
         assert one.distorted
         rays = np.array([[1.0, 0.55, 1.0], [-0.4, 0.2, 1.0]])
@@ -287,7 +240,7 @@ def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
     ],
 )
 def test_a_lens_that_is_not_known_is_named(tmp_path: Path, line: str, message: str) -> None:
-    fine = "image_size: [640, 480]\nlens: Canon 50 mm\nmodel: HERO9\ndistance: 3.0\n" + _matrix("K", K)
+    fine = "image_size: [640, 480]\nlens: Canon 50 mm\nmodel: HERO9\ndistance: 3.0\n" + matrix_text("K", K)
     (tmp_path / "a.yml").write_text(fine)
     assert not read_calibrations(tmp_path / "a.yml")[0].distorted
     (tmp_path / "a.yml").write_text(f"{fine}{line}\n")
