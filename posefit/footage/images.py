@@ -25,6 +25,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # as Pillow cal
 COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no grey one
 CHROMA_RANGE = 15  # the same, as a JPEG has it
 MANY_COLOURS = 64  # a picture of a place has more; so many labels are rare
+_GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")  # as Pillow calls what has no colours
 logging.getLogger("PIL").addHandler(logging.NullHandler())  # what is wrong with a file is reported by posefit
 
 
@@ -68,7 +69,7 @@ def page_count(path: Path) -> int:
 def is_photo(path: Path) -> bool:
     """Return whether a file is a picture in many colours, without alpha channel: of a place, not of a person's mask."""
     try:
-        return any(marks.photo for marks in read_marks(path))
+        return any(_decoded(path, [0], lambda image: image.mode not in _GREY and _marks(image, False).photo))
     except InputError:  # raised again where it is read
         return False
 

@@ -214,11 +214,15 @@ def _taken_out(
     if len(videos) > 1:
         for part in segmentations:
             part.read(round(FIRST_SECONDS * part.video.fps))
-        first = segmentations[0].verdict
-        if first is not None and all(part.refused_so_far for part in segmentations):
-            return [], first
-        if np.prod([part.usable for part in segmentations], axis=0).sum() >= MIN_FRAMES:
-            scene([view(part) for part in segmentations])
+        refused = [verdict for part in segmentations if (verdict := part.verdict) and verdict.refused]
+        if all(part.refused_so_far for part in segmentations):
+            return [], refused[0]
+        usable = zip(*(part.usable for part in segmentations), strict=False)
+        if sum(map(all, usable)) >= MIN_FRAMES:
+            try:
+                scene([view(part) for part in segmentations])
+            except InputError as error:
+                return [], refused[0] if refused else Verdict(str(error), True)
     views, worst = [], None
     for part in segmentations:
         progress.log(f"taking the person out of {part.video.path} by {how.name}")

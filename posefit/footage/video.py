@@ -153,7 +153,7 @@ def _check_no_text(path: Path) -> None:
     with path.open("rb") as file:
         head = file.read(HEAD)
     if head and not head.startswith(b"YUV4MPEG2") and (head.startswith((b"ffconcat", b"#EXTM3U")) or _is_text(head)):
-        raise InputError(f"{path}: expected a video, got a text")
+        raise InputError(f"{path}: expected a video that OpenCV can read, got a text")
 
 
 def _is_text(head: bytes) -> bool:

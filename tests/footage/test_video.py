@@ -105,7 +105,7 @@ def test_pixels_that_are_not_square_are_reported(tmp_path: Path) -> None:
 def test_a_text_that_would_open_other_files_is_refused(tmp_path: Path, text: str) -> None:
     film(tmp_path / "secret.avi", truth()[:4])
     (tmp_path / "a.mp4").write_text(text.replace("secret.mp4", "secret.avi"))
-    with pytest.raises(ValueError, match="a.mp4: expected a video, got a text"):
+    with pytest.raises(ValueError, match="a.mp4: expected a video that OpenCV can read, got a text"):
         Video.of(tmp_path / "a.mp4")
 
 
