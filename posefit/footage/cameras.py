@@ -12,13 +12,14 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.masks import FPS, PackedMasks, Views, undistorted
+from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.quality import apparent_sizes, disagreement, extent_of, meeting
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration, Up, guessed_up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from posefit.geometry.units import METRES, UNIT_NAMES, Unit
+from posefit.motion.clips import FPS
 from posefit.reading import cut, quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette

@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
 from posefit.footage.images import FORMATS, IMAGES, PIXELS, page_count, read_marks
-from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
+from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
-from posefit.reading import quoted
+from posefit.reading import existing, quoted
 from posefit.silhouette.mask import Mask
 
 NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by

@@ -17,8 +17,8 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS, page_count, read_image
-from posefit.footage.masks import FPS
 from posefit.footage.readers import numbered
+from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
 HEAD = 2_000  # bytes at the beginning of a file by which a text is recognised

@@ -15,9 +15,11 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.geometry.rotation import (
+    along_y,
     geodesic,
     joint_angles_from_rotation,
     root_angles_from_rotation,
+    rotation_about,
     shortest_turn,
     unwrapped,
 )
@@ -41,6 +43,12 @@ _ENDS_OF = {
     "humerus": "forearm",
     "radius": "hand",
 }
+# the bone below a hinge, where its ends are, and which way it bends from rest
+_HINGES = {
+    "femur": ("shin", "foot", (0.0, 0.0, -1.0)),
+    "humerus": ("forearm", "hand", (0.0, 0.5, 0.75**0.5)),
+}  # an elbow bends 30 degrees up from forwards
+BENT = 0.35  # the sine of 20 degrees, from which on a knee or an elbow shows about which axis it bends
 _STEADY = ("femur", "tibia", "humerus", "radius", "wrist")
 
 
@@ -131,7 +139,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
         raise InputError("legs with a length, got some without")
     bones = _bones(rig, scale)
     hips = rig.joints.hips
-    rest_turns, rest_places, root = _like_rest(rig, bones)
+    own, rest_turns, rest_places, root = _like_rest(rig, bones)
     frame = rest_turns[hips] @ root  # the root's, where its angles are 0
     count = places.shape[1]
     skeleton_offsets = np.zeros((len(BONES), 3))
@@ -162,6 +170,8 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
         aligned = off > (ALIKE if name[1:] in _STEADY else AS_IN_FILE)
         aligned = aligned and not name.endswith("hipjoint")  # which does not turn
         turned[joint] = before @ shortest_turn(expected, vector) if aligned else before
+        if not own and name[1:] in _HINGES:
+            turned[joint] = turned[joint] @ _twist(rig, name, bone, turned[joint].T @ frame.T @ rest_turns[bone.node])
         direction = expected if aligned or not length else vector
         direction = direction / np.linalg.norm(direction)
         carrier = turns[bone.node] @ (rest_turns[bone.node].T @ frame @ turned[joint])
@@ -185,6 +195,29 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     missed = max((float(np.linalg.norm(bone.at - at[joint], axis=1).max()) for bone, joint in ends), default=0.0)  # type: ignore[operator]
     filled = [BONES[k] for k, bone in enumerate(bones) if bone.at is None]
     return Retargeted(skeleton, unwrapped(np.where(skeleton.free, poses, 0.0)), places[hips], filled, missed)
+
+
+def _twist(rig: Rig, name: str, bone: _Bone, frame: Array) -> Array:
+    """Return by which turn (3, 3) about a thigh or an upper arm its knee or elbow bends the way that people's do.
+
+    `frame` (3, 3) takes what is counted in the bone's node to posefit's rest.
+    """
+    side = "left" if name[0] == "l" else "right"
+    start, end, way = _HINGES[name[1:]]
+    turns, places = rig.moving
+    below = places[rig.joints.limbs[side, end]] - places[rig.joints.limbs[side, start]]
+    along = average_skeleton().offsets[BONES.index(name)]
+    along = along / np.linalg.norm(along)
+    local = np.einsum("tji,tj->ti", turns[bone.node], below) @ frame.T
+    across = local - (local @ along)[:, None] * along
+    bent = np.linalg.norm(across, axis=1) > BENT * np.linalg.norm(below, axis=1)
+    mean = across[bent].sum(axis=0)
+    if not np.linalg.norm(mean) > 0.0:
+        return np.eye(3)
+    wanted = np.array(way) - (along @ way) * along
+    angle = np.arctan2(np.cross(mean, wanted) @ along, mean @ wanted)  # about the bone, from where it bends
+    axes = along_y(along)
+    return np.asarray(axes @ rotation_about(1, -angle) @ axes.T)
 
 
 def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
@@ -294,10 +327,10 @@ def _rest_end(rig: Rig, bone: _Bone, turns: Array, places: Array) -> Array | Non
     return np.asarray(places[bone.node] + turns[bone.node] @ carried)
 
 
-def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> tuple[Array, Array, Array]:
+def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> tuple[bool, Array, Array, Array]:
     """Return the pose that stands for CMU's rest, turns and places of all nodes, and the axes (3, 3) of the root in it.
 
-    The columns of these are left, up and ahead in the root's node.
+    The columns of these are left, up and ahead in the root's node. First comes whether it is the rig's own rest.
     """
     chest, hips = bones[BONES.index("thorax")], rig.joints.hips
     thighs = [rig.joints.limbs[side, "thigh"] for side in ("left", "right")]
@@ -333,13 +366,13 @@ def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> tuple[Array, Array, Array]:
     root = frame_of(*rig.rest)
     legs_off = angles(*rig.rest, root, legs)
     if legs_off.max() <= UPRIGHT:
-        return *rig.rest, root
+        return True, *rig.rest, root
     for k, pose in enumerate(poses):
         frame = frame_of(*pose)
         off = float((angles(*pose, frame, legs) ** 2).sum() + (0.5 * angles(*pose, frame, arms) ** 2).sum())
         if off < best_off:
             best, best_off = k, off
-    return *poses[best], frame_of(*poses[best])
+    return best == 0, *poses[best], frame_of(*poses[best])
 
 
 def _squared(left: Array, above: Array) -> Array:

@@ -13,8 +13,9 @@ from posefit.fitting.check import whole
 from posefit.footage.images import IMAGES
 from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
+from posefit.footage.source import Footage, check_used, kind_of, scene_of
 from posefit.motion import built_in
+from posefit.motion.clips import Source, training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
@@ -111,13 +112,16 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
 
 def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
     """Return nothing. Raises InputError for options that do not fit a source whose truth is known, or unknown."""
+    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
+    folders = any(Path(motion).is_dir() for motion in options.train if isinstance(motion, str | Path))
+    if options.rate is not None and not (captured or folders):
+        raise InputError(f"rate must be given for .amc files only, got {quoted(options.rate)}")
     if not known:
         if options.translation == "known":
             raise InputError("translation must be searched or aligned where only masks are given, got known")
         if options.first_pose == "given":
             raise InputError("first_pose must be searched where only masks are given, got given")
         return
-    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
     if options.asf is not None and not captured:
         raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
     if options.restarts == 0:

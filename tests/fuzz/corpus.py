@@ -24,6 +24,8 @@ from posefit_priors.sklearn import Transformed
 from tests.footage.matroska import write_matroska
 from tests.fuzz.written import written
 from tests.geometry.calibrations import EXTRI, KINDS, QUALISYS, TOML, opencv
+from tests.geometry.turns import about
+from tests.motion.rigs import STYLES, write_rig
 
 PLAN = """[defaults]
 frames = 3
@@ -57,6 +59,10 @@ def corpus(folder: Path) -> list[Seed]:
     write_amc(folder / "a.amc", motion)
     write_bvh(folder / "a.bvh", motion)
     seeds = [Seed(kind, f".{kind}", (folder / f"a.{kind}").read_bytes()) for kind in ("asf", "amc", "bvh")]
+    rigs = (("mixamo", "t", 100.0), ("lafan1", "along x", 39.37), ("biped", "cmu", 1.0), ("vrm", "t", 17.7))
+    for name, rest, scale in rigs:  # in centimetres, inches, metres and the CMU database's unit
+        path = write_rig(folder / "rig.bvh", motion, STYLES[name], scale, about(0, np.pi / 2), rest)
+        seeds.append(Seed("bvh", ".bvh", path.read_bytes()))
     body, camera = Body.of(motion.skeleton), Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
     masks = np.stack([project(body, camera, *where) for where in zip(motion.poses, motion.translations, strict=True)])
     usable = np.array([True, False, True])

@@ -11,12 +11,16 @@ import pytest
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
 from posefit.geometry.body import Body
-from posefit.geometry.rotation import rotation_from_joint_angles
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS, Skeleton
+from posefit.geometry.rotation import rotation_from_joint_angles, wrapped
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit
 from posefit.measuring.angles import clinical_angles
+from posefit.measuring.c3d import write_c3d
 from posefit.motion import built_in, bvh, recorded
+from posefit.motion.amc import write_amc
+from posefit.motion.asf import write_asf
 from posefit.motion.bvh import NAMES, read_bvh, write_bvh
+from posefit.motion.clips import load_motion, training_clips
 from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about
@@ -182,6 +186,17 @@ def test_joints_of_other_programs_are_where_their_files_put_them(tmp_path: Path,
     assert any("centimetres" in note for note in motion.notes)
 
 
+def test_hinges_bend_as_people_s_do_where_no_frame_is_like_the_pose_of_rest(tmp_path: Path) -> None:
+    run = recorded.clip("09_01").motion()  # knees and elbows are never straight
+    motion = read_bvh(write_rig(tmp_path / "rig.bvh", run, STYLES["lafan1"], 100.0, rest="along x"))
+    angles, expected = (clinical_angles(each.skeleton, each.poses) for each in (motion, run))
+    for side in ("left", "right"):
+        for joint in ("knee", "elbow"):
+            flexion = f"{side}_{joint}_flexion"
+            np.testing.assert_allclose(angles[flexion], expected[flexion], atol=1.0)
+            assert np.abs(angles[f"{side}_{joint}_adduction"]).max() < 3.0
+
+
 def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     walk = recorded.clip("16_15").motion().frames(10, 14)
     motion = read_bvh(write_rig(tmp_path / "rig.bvh", walk, STYLES["vrm"]))
@@ -236,6 +251,29 @@ def test_bones_that_change_their_lengths_are_followed_and_said(tmp_path: Path) -
     motion = read_bvh(path)
     assert 0.0039 < farthest(path, STYLES["lafan1"], motion, 1.0, np.eye(3)) < 0.0045
     assert any("change their lengths" in note and "4.0 mm" in note for note in motion.notes)
+
+
+def test_one_motion_in_every_kind_of_file_is_one_source_and_one_training(tmp_path: Path) -> None:
+    ezc3d, walk = pytest.importorskip("ezc3d"), recorded.clip("16_15").motion().frames(0, 30)
+    fingers = [JOINTS.index(f"{side}{bone}") for side in "lr" for bone in ("wrist", "hand")]  # the rigs have none
+    write_asf(tmp_path / "a.asf", walk.skeleton)
+    write_amc(tmp_path / "a.amc", walk)
+    write_bvh(tmp_path / "a.bvh", walk)
+    sources = [tmp_path / "a.amc", tmp_path / "a.bvh"]
+    for unit in ("m", "cm", "inch"):
+        for axis in ("y", "z"):
+            path = tmp_path / f"{unit}-{axis}.bvh"
+            sources.append(write_rig(path, walk, STYLES["motionbuilder"], 1.0 / METRES[unit], ABOUT[axis]))
+    for source in sources:
+        motion, (learned,) = load_motion(source), training_clips([source])
+        off = np.delete(motion.joints - walk.joints, [] if source.stem == "a" else fingers, axis=1)
+        assert np.abs(off).max() < 1e-3, source
+        wrists = [angle for bone in ("lwrist", "rwrist") for angle in channel_angles(bone, ("rx", "ry", "rz"))]
+        angles = np.delete(learned(30.0).poses - walk.poses, [] if source.stem == "a" else wrists, axis=1)
+        assert np.abs(wrapped(angles)).max() < 1e-5, source
+    write_c3d(tmp_path / "a.c3d", walk)
+    points = ezc3d.c3d(str(tmp_path / "a.c3d"))["data"]["points"][:3].transpose(2, 1, 0) / 1e3
+    np.testing.assert_allclose(points, walk.joints, atol=1e-6)
 
 
 def test_a_bvh_has_the_poses_of_the_same_motion_as_amc(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ import posefit
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.footage.scene import Scene
-from posefit.footage.source import training_clips
 from posefit.geometry.body import varied
+from posefit.motion.clips import training_clips
 from posefit.tracking import evaluation
 from posefit.tracking.evaluation import evaluated, nearest
 from posefit.tracking.measures import Measures
