@@ -158,6 +158,9 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     usable = sum(row["usable"] for row in whole)
     instead = advice(method, learned=learned)
     none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
+    cut = sum(bool(row["touches_border"]) for row in rows)
+    if cut > 0.5 * len(rows):
+        none = f"expected a person who is whole in the picture, got one at its edge in {cut} of {len(rows)} frames"
     if len(whole) < MIN_FRAMES:
         return None if usable else Verdict(none, True)
     outside = float(np.median([row["beside"] for row in whole]))

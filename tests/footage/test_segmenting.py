@@ -235,6 +235,13 @@ def rows(
     [
         (rows(), "mixture", True, None, ""),
         (rows(0.2, (100, 110)), "mixture", True, None, ""),
+        (
+            [{**row, "touches_border": 1, "usable": 0} for row in rows()],
+            "mixture",
+            True,
+            True,
+            "got one at its edge in 20 of 20 frames",
+        ),
         (rows(pieces=2), "median", True, None, ""),
         (rows(0.6, (100, 150)), "mixture", True, True, "in the background: 60% of what moves lies outside the masks"),
         (rows(0.0, (100, 150)), "mean", False, False, "parts of the person seem to be missing; --extraction mediapipe"),
