@@ -50,7 +50,10 @@ LEVEL = 0.5  # of the images' up direction: where less of it is along the axis t
 
 # Names of what describes a camera, in small letters and without signs between: Camera_Matrix is cameramatrix
 MATRIX = ("cameramatrix", "matrix", "k", "m", "mtx", "intrinsic", "intrinsics", "intrinsicmatrix")
-LENS = ("distortioncoefficients", "distcoeffs", "distcoeff", "distcoefs", "distortions", "distortion", "dist", "d")
+LENS = (
+    *("distortioncoefficients", "distortioncoeffs", "distortions", "distortion", "distcoefficients", "distcoeffs"),
+    *("distcoefs", "distcoeff", "dist", "d", "kc"),
+)
 MODEL = ("distortionmodel", "fisheyemodel", "fisheye", "isfisheye", "lensmodel", "cameramodel", "model")
 SIZE = ("imagesize", "size", "resolution", "imgsize", "imsize")
 SIDES = (("imagewidth", "width", "w"), ("imageheight", "height", "h"))
@@ -62,7 +65,7 @@ _POLYNOMIALS = (
     *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
 )
 _OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
-_OF_LENS = re.compile(r"dist(?!ance).*|lens.*|fish.*|radial.*|tangential.*|omni.*|k[1-9]|xi")  # plain keys of a lens
+_OF_LENS = re.compile(r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|k[1-9]|xi")
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,6 +253,8 @@ def _described(name: str, values: Mapping[str, Any], read: set[int], depth: int)
 def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> Calibration:
     """Return the camera that values describe, whose keys in small letters and digits are those of `known`."""
     matrix = _matrix_of(_first(known, MATRIX))
+    if matrix.shape == (4,):  # as Kalibr has it
+        matrix = _pinhole(matrix[:2], matrix[2:])
     fisheye = _is_fisheye(known)
     numbered = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")  # in OpenCV's order
     lens = _first(known, LENS)
@@ -267,7 +272,7 @@ def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> C
     return _stated(
         name,
         None if None in size else [_number_of(side) for side in size],
-        matrix.reshape(3, 3) if matrix.shape == (9,) else matrix,
+        matrix,
         _matrix_of(lens),
         None if rotation is None else _matrix_of(rotation),
         None if translation is None else _matrix_of(translation).reshape(-1),
@@ -349,7 +354,7 @@ def _stated(
     name: str, size: Any, matrix: Any, distortion: Any, rotation: Any, translation: Any, fisheye: bool = False
 ) -> Calibration:
     """Return what a file states, checked; a rotation of three numbers is its axis, as long as its angle."""
-    matrix = _numbers(matrix, (3, 3))
+    matrix = _numbers(np.reshape(matrix, (3, 3)) if np.shape(matrix) == (9,) else matrix, (3, 3))
     if size is not None:
         width, height = size
         if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):

@@ -96,6 +96,7 @@ KINDS = {
     "tutorial.json": json.dumps({"mtx": K, "dist": [LENS], "R": ROTATION.tolist(), "tvec": PLACED["translation"]}),
     "several.json": json.dumps({"cameras": [{"name": "a", "K": K, "dist_coeff": LENS, "image_size": [640, 480], "R": ROTATION.tolist(), "t": TRANSLATION.tolist()}]}),
     "numbered.yaml": "w: 640\nh: 480\nfx: 500\nfy: 510\ncx: 319.5\ncy: 239.5\nk1: 0.12\nk2: -0.05\np1: 0.001\np2: 0.002\nk3: 0.01\n" + matrix_text("R", ROTATION) + matrix_text("T", TRANSLATION),
+    "kalibr.yaml": f"cam0:\n  camera_model: pinhole\n  intrinsics: [500, 510, 319.5, 239.5]\n  distortion_model: radtan\n  distortion_coeffs: {LENS}\n  resolution: [640, 480]\n  rvec: {PLACED['rotation']}\n  tvec: {PLACED['translation']}\n",
     "intri.yml": INTRI,
     "ros.yaml": ROS,
     "ros_message.yaml": ROS_MESSAGE,

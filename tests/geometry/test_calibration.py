@@ -232,6 +232,7 @@ def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
     ("line", "message"),
     [
         ("dist_foo: [0.1, 0.2, 0, 0]", "the lens key 'dist_foo' of 'a', which is not known"),
+        ("lens_coefs: [0.1, 0, 0, 0]", "the lens key 'lens_coefs' of 'a', which is not known"),
         ("xi: 1.2", "the lens key 'xi' of 'a', which is not known"),
         ("k4: 0.2\nk1: 0.1", "the lens key 'k4' of 'a', which is not known"),
         ("distortion_model: double_sphere", "the lens model 'double_sphere', which is not known"),
@@ -240,7 +241,9 @@ def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
     ],
 )
 def test_a_lens_that_is_not_known_is_named(tmp_path: Path, line: str, message: str) -> None:
-    fine = "image_size: [640, 480]\nlens: Canon 50 mm\nmodel: HERO9\ndistance: 3.0\n" + matrix_text("K", K)
+    fine = "image_size: [640, 480]\nlens: Canon 50 mm\nlens_focal_mm: 4.2\nmodel: HERO9\ndistance: 3.0\n" + matrix_text(
+        "K", K
+    )
     (tmp_path / "a.yml").write_text(fine)
     assert not read_calibrations(tmp_path / "a.yml")[0].distorted
     (tmp_path / "a.yml").write_text(f"{fine}{line}\n")
