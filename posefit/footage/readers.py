@@ -104,7 +104,7 @@ def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
 
 
 def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list[str]]:
-    """Return the images of successive frames, None for a number that is missing, and what was guesses of them.
+    """Return the images of successive frames, None for a number that is missing, and what was guessed of them.
 
     Raises InputError where files are of several kinds, or several have one number: some are no masks then.
     """
@@ -236,7 +236,7 @@ def _described(stored: Stored | NDArray[Any]) -> str:
 def _stack_classifier(
     name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None
 ) -> tuple[Classifier, list[str]]:
-    """Return how frames start to stop become masks, and what was guesses; booleans need no count."""
+    """Return how frames start to stop become masks, and what was guessed; booleans need no count."""
     if stored.dtype.kind == "b" and label is None:
         return _above(0.0), []
     counts = ValueCounts()
@@ -262,7 +262,8 @@ class ValueCounts:
     """Counts the values in the masks of a source, one mask after the other, and decides which are the person's."""
 
     soft: bool = False  # whether a value is a degree: in lossy images, in fractions, in an alpha channel
-    lowest: float = 0.0
+    fractions: bool = False
+    lowest: float = np.inf
     highest: float = 0.0
     # with each value, while these are few
     pixels: Counter[int | float] = field(default_factory=Counter)
@@ -273,26 +274,23 @@ class ValueCounts:
         """Count the next mask."""
         low, high = values.min(), values.max()
         self.lowest, self.highest = min(self.lowest, float(low)), max(self.highest, float(high))
+        self.fractions |= values.dtype.kind == "f" and bool((values != np.floor(values)).any())
         self.soft |= soft
         if self.soft:
             return
         top = int(np.count_nonzero(values == high))
         if low == high or top + np.count_nonzero(values == low) == values.size:  # takes less time than sorting
-            unique, counts = np.array([low, high])[-2 if low != high else -1 :], np.array([values.size - top, top])
-            counts = counts[counts > 0]
-        elif values.dtype.kind == "f":
-            self.soft = True
-            return
+            different = slice(int(low == high), 2)
+            unique, counts = np.array([low, high])[different], np.array([values.size - top, top])[different]
         else:
             unique, counts = np.unique(values, return_counts=True)
-        few = COUNTED_VALUES if values.dtype.kind != "f" else 2
         self.pixels.update(dict(zip(unique.tolist(), counts.tolist(), strict=True)))
-        self.soft = len(self.pixels) > few
+        self.soft = len(self.pixels) > (2 if self.fractions else COUNTED_VALUES)
         if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
 
     def classifier(self, label: int | None, name: object) -> tuple[Classifier, list[str]]:
-        """Return how these values become masks, and what was guesses of them.
+        """Return how these values become masks, and what was guessed of them.
 
         Raises InputError where it is open which label is the person.
         """
@@ -331,10 +329,10 @@ class ValueCounts:
         """
         if self.lowest < -SIGNED * self.highest:
             return 0.0, "logits"
-        scale = next((scale for scale in SCALES if self.highest <= NEAR_SCALE * scale), self.highest)
-        if scale != 1.0 and self.highest < 0.25 * scale and self.lowest:
-            scale = self.highest
-        return (0.5 if scale == 1.0 else float(scale // 2)), "degrees"
+        if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:  # of no usual scale
+            return self.highest / 2.0, "degrees"
+        full = next((scale for scale in SCALES if self.highest <= NEAR_SCALE * scale), self.highest)
+        return (0.5 if full == 1.0 else float(full // 2)), "degrees"
 
     def _listed(self, labels: Sequence[float]) -> str:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""

@@ -150,14 +150,28 @@ def test_two_fractions_are_a_mask_whichever_they_are(
     assert guesses == ([] if usual else [f"{tmp_path / 'a.npy'}: masks of values from {min(values):g} to {max(values):g}: the person is the higher of two"])  # fmt: skip
 
 
+def degrees_of(soft: Any, scale: float) -> Any:
+    """Return degrees a little below 0, as bicubic scaling makes them."""
+    return soft * scale - 0.02 * scale
+
+
+def test_labels_may_be_whole_numbers_held_as_fractions(walk: list[Any], tmp_path: Path) -> None:
+    labels = np.stack(walk).astype(np.float32)
+    labels[:, :30, :30] = 2.0
+    np.save(tmp_path / "a.npy", labels)
+    with pytest.raises(ValueError, match="got the labels 1, 2; --label N chooses one"):
+        read_masks(tmp_path / "a.npy", ALL)
+    np.testing.assert_array_equal(read_masks(tmp_path / "a.npy", ALL, 1).silhouette(0).mask, walk[0])
+
+
 def test_logits_are_cut_at_zero_and_degrees_half_way(walk: list[Any], tmp_path: Path) -> None:
     soft = np.stack([cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) for mask in walk])
     logits = 30.0 * soft - 20.0  # as SAM gives them
     np.save(tmp_path / "a.npy", logits)
     (guess,) = check(tmp_path / "a.npy", list(logits > 0.0))
     assert guess.endswith("masks of values from -20 to 10 are logits: the person is above 0")
-    for scale, threshold in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0)):
-        degrees = soft * scale - 0.02 * scale  # a little below 0, as bicubic scaling makes them
+    for scale, threshold in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, 0.5 * float(degrees_of(soft, 10.0).max()))):
+        degrees = degrees_of(soft, scale)
         np.save(tmp_path / "a.npy", degrees)
         (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
         assert guess.endswith(f"are degrees: the person is above {threshold:g}")
