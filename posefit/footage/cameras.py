@@ -66,7 +66,7 @@ def combined(
     if not known:
         guesses.append("a level camera, 40 degrees across: distances and sizes are as good as that")
     world, metres, of_cameras = world_of(known, up, unit)
-    calibrated = any(isinstance(camera, Calibration) for camera in known)
+    unit_is_open = unit is None and any(isinstance(camera, Calibration) for camera in known)
     masks: list[PackedMasks] = []
     cameras: list[Camera] = []
     pictures = views[0].pictures
@@ -88,9 +88,11 @@ def combined(
     observations = Views(masks, yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate))
     if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
         miss, tall = apparent
-        if calibrated and unit is None:
+        if unit_is_open and np.median(tall) > 0.0:
             word = unit_of_heights(float(np.median(tall)) / metres / body.stature)
-            factor, of_cameras["unit"] = METRES[word] / metres, f"the calibration is in {UNIT_NAMES[word]}"
+            if METRES[word] != metres:
+                of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[word]}"
+            factor = METRES[word] / metres
             cameras = [replace(camera, translation=factor * camera.translation) for camera in cameras]
             miss, tall = factor * miss, factor * tall
         if wrong := disagreement(miss, tall, body.stature):
@@ -127,7 +129,8 @@ def world_of(
     distances = [float(np.linalg.norm(one.translation)) for one in calibrations if one.translation is not None]
     if unit is None and distances:
         unit = "m" if max(distances) <= FAR else "cm" if max(distances) <= FARTHER else "mm"
-        guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
+        if unit != "m" or not all(calibration.upright for calibration in calibrations):  # ours are in metres
+            guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
     for calibration in calibrations:
         if calibration.rotation is None:
             guesses["place"] = "the camera stands level, which its calibration does not state"
