@@ -18,10 +18,10 @@ from posefit.arrays import Array
 from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
-from posefit.footage.instance import motion_of_instance, variation
-from posefit.footage.source import load_motion
 from posefit.geometry.body import varied
 from posefit.motion import built_in
+from posefit.motion.clips import load_motion
+from posefit.motion.instance import motion_of_instance, variation
 from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted

@@ -153,7 +153,7 @@ def extraction_of(options: dict[str, Any], source: str, settings: Sequence[str] 
 
     given = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
     given = {name: value for name, value in given.items() if value is not None}
-    if (kind := kind_of(source)) != "video":
+    if (kind := kind_of(source)) not in ("video", "pictures"):
         for name, value in given.items():
             raise useless_for(kind, name, value, "video")
         return None

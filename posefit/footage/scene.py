@@ -40,6 +40,7 @@ class Scene:
     observations: Sequence[Observation] = field(repr=False)
     placing: Placing = "placed"
     warnings: Sequence[str] = ()  # what a user should know before they trust it
+    guesses: Sequence[str] = ()  # what the sources do not state, and posefit assumes
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
@@ -57,6 +58,7 @@ def synthetic(
     size: tuple[int, int],
     cameras: Sequence[Camera],
     frames: Range,
+    guesses: Sequence[str] = (),
 ) -> Scene:
     """Return the scene of a known motion; its masks are drawn frame by frame as they are needed.
 
@@ -85,6 +87,7 @@ def synthetic(
         observations,
         placing,
         motion.notes,
+        guesses,
         first=motion.first,
     )
 

@@ -11,10 +11,12 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.fitting.check import whole
 from posefit.fitting.driving import clocks
-from posefit.footage.readers import IMAGES, name_of
+from posefit.footage.images import IMAGES
+from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
+from posefit.footage.source import Footage, check_used, kind_of, scene_of
 from posefit.motion import built_in
+from posefit.motion.clips import Source, training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of

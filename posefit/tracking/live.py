@@ -20,9 +20,10 @@ from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
 from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of, training_clips, training_motions
+from posefit.footage.source import body_of
 from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
+from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare

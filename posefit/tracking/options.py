@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from posefit.fitting.tracker import TrackerFactory
     from posefit.footage.masks import Range
     from posefit.footage.segmentation import Extraction
-    from posefit.footage.source import FileOptions, Source
     from posefit.geometry.calibration import Up
     from posefit.geometry.camera import Camera
     from posefit.geometry.units import Unit
+    from posefit.motion.clips import FileOptions, Source
 
 EVALUATIONS = 2440  # of a frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
@@ -190,7 +190,7 @@ class TrackOptions:
     )
     unit: "Unit | None" = option(
         None,
-        "Unit of lengths in a .bvh or .asf file; recognised where absent.",
+        "Unit of lengths in a calibration, or in a .bvh or .asf file; recognised where absent.",
         _one_of(*UNITS),
         "|".join(UNITS),
     )
@@ -259,7 +259,7 @@ class TrackOptions:
     @property
     def of_files(self) -> "FileOptions":
         """What is stated of the files that are learned from."""
-        from posefit.footage.source import FileOptions
+        from posefit.motion.clips import FileOptions
 
         return FileOptions(self.asf, rate=self.rate)
 
