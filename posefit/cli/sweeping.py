@@ -46,11 +46,11 @@ def sweep(
     Exit status 1 where cells were quarantined after three attempts, 130 where it was stopped.
     """
     from posefit.sweep import command
-    from posefit.sweep.engine import TRIAL_SECONDS, Limits
+    from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
 
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
-    start = command.engine(Limits(min(seconds, TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
+    start = command.engine(Limits(min(seconds, command.TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
     if dry_run:
         lines, some = command.preview(plan, out, shard, start, as_json), ""
         while True:

@@ -16,13 +16,14 @@ from posefit.errors import InputError
 from posefit.reading import counted, cut
 from posefit.sweep.cell import Cell, json_of, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
-from posefit.sweep.engine import Engine, Limits, Run, estimate
+from posefit.sweep.engine import POLL_SECONDS, Engine, Limits, Run
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS, Plan
 from posefit.sweep.pool import Pool, cores
 
 VALUES = 12  # of a field, that a preview lists
 WARNINGS = 5  # of a preview
+TRIAL_SECONDS = 120.0  # that a trial of a preview may take at most, whatever a cell may
 
 Say = Callable[[str], None]
 
@@ -127,11 +128,16 @@ def preview(plan: str, out: str | None, shard: str | None, start: Callable[[], E
     if first:
         with closing(start()) as engine:
             workers = engine.window()
-            for (method, cell), taken in zip(first.items(), estimate(list(first.values()), engine), strict=True):
-                if isinstance(taken, str):
-                    untried[str(cell)] = taken
+            for method, cell in first.items():
+                for _ in range(2):  # the first compiles what is not compiled yet
+                    engine.submit(cell)
+                    while not (outcomes := engine.wait(POLL_SECONDS)):
+                        pass
+                    if outcomes[0].result is None:
+                        untried[str(cell)] = outcomes[0].reason or "what ran it was lost"
+                        break
                 else:
-                    seconds += taken * totals[method] / cell.total_evaluations / workers
+                    seconds += outcomes[0].result.row["seconds"] * totals[method] / cell.total_evaluations / workers
     if as_json:
         rest = {"seconds": seconds, "workers": workers, "untried": untried}
         yield f"], {json.dumps(rest)[1:]}"

@@ -30,6 +30,7 @@ from tests.sweep.fake import SLOW, STARTS, bad, cells, result, starts
 
 ROOT = Path(__file__).parents[2]
 EVENTS = ("kill a worker", "kill the driver", "kill the group", "stop and go on", "start a second driver")
+DASK = ("kill a Dask worker",)  # whose processes run the cells
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.3, 1.5  # seconds between two events, at least and at most
 PATIENCE = 60.0  # seconds for a driver to begin cells, or to end
@@ -110,10 +111,14 @@ class Chaos:
 
     def _event(self) -> None:
         assert self._driver is not None
-        event, driver = self._random.choice(EVENTS), self._driver.pid
+        events = EVENTS + DASK * (self.engine == "dask")
+        event, driver = self._random.choice(events), self._driver.pid
         with suppress(ProcessLookupError, FileNotFoundError):
             if event == "kill a worker":
                 done = self._signalled(self._running(), signal.SIGKILL, signal.SIGTERM)
+            elif event in DASK:
+                parents = [ancestors[0] for process in self._running() if (ancestors := _ancestors(process))]
+                done = self._signalled(parents, signal.SIGKILL, signal.SIGTERM)
             elif event == "kill the driver":
                 done = self._signalled([driver], signal.SIGKILL)
             elif event == "kill the group":
