@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from posefit.sweep.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
+SLOW_SECONDS = "POSEFIT_SLOW_SECONDS"
 SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
 LEAVE, KILLED, EXIT, COMPILE = 1008, 1009, 1010, 1011
 LIMITS = Limits(seconds=300.0, gigabytes=1.0)
@@ -65,7 +66,7 @@ def behave(cell: TrackCell) -> CellResult:
         case n if n == SECOND:
             time.sleep(1.0)
         case n if n == SLOW:
-            time.sleep(0.5)
+            time.sleep(float(os.environ.get(SLOW_SECONDS, "0.5")))
         case _:
             time.sleep(0.05)
     return result(cell)
