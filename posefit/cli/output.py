@@ -35,10 +35,10 @@ class Command(click.Command):
 
 
 def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
-    """Yield steps, of which there are `count`, with a bar on stderr."""
+    """Yield steps, of which there are `count`, with a bar on stderr where that is a terminal."""
     from tqdm import tqdm
 
-    return iter(tqdm(steps, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True))
+    return iter(tqdm(steps, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True, disable=None))
 
 
 @contextmanager

@@ -24,9 +24,9 @@ from posefit.report.columns import (
     Column,
 )
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
+from posefit.settings import setting_text, settings_text
 from posefit.statistics.profiles import hits
 from posefit.suites.running import SuiteRun
-from posefit.sweep.cell import setting_text, settings_text
 from posefit.sweep.table import is_search, search_run
 from posefit.uncertainty.calibration import BINS
 

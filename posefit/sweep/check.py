@@ -19,7 +19,7 @@ from posefit.registry import Offer, registry, version_of
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.suites.functions import DIMENSIONS, SUITES, checked_address, suite_function
 from posefit.suites.problem import INFEASIBLE
-from posefit.sweep.cell import ALL_AROUND, DROPPED, SearchCell, TrackCell, digest_of, json_of, settings_text
+from posefit.sweep.cell import ALL_AROUND, DROPPED, SearchCell, TrackCell, digest_of, json_of
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions, declared
 
@@ -38,7 +38,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
         if name not in spec:
             raise InputError(f"a cell must say its {name}, got none")
     values = _checked(spec, CHECKS)
-    texts = tuple(settings_text(values.get("settings", {})))
+    texts = tuple(settings.settings_text(values.get("settings", {})))
     offers, chosen = _of_method(values["method"], texts)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
@@ -148,7 +148,7 @@ def _name(field: str, value: Any) -> str:
     return value
 
 
-def label(field: str, value: Any) -> str:
+def _label(field: str, value: Any) -> str:
     if not isinstance(value, str) or len(value) > SHOWN or not value.isprintable():
         raise InputError(f"{field} must be a text of at most {SHOWN} characters, got {quoted(value)}")
     return value
@@ -249,7 +249,7 @@ CHECKS: Checks = {
     "view_degrees": _views,
     "corruption": _corruption,
     "instance": _whole(0),
-    "name": label,
+    "name": _label,
     "frames": _frames,
     "yaw_off_degrees": _within(ALL_AROUND),
     "body_off_percent": _within(MAX_BODY_OFF),
@@ -264,5 +264,5 @@ SEARCH_CHECKS: Checks = {
     "settings": flattened,
     "infeasible": _choice(*INFEASIBLE),
     "seed": _whole(0),
-    "name": label,
+    "name": _label,
 }

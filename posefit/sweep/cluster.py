@@ -105,7 +105,7 @@ class Cluster:
             return lost
         if self._running:
             with suppress(*self._gone):
-                self._distributed.wait(tuple(self._running), seconds, "FIRST_COMPLETED")
+                self._distributed.wait(tuple(self._running), seconds, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
         return [self._outcome(future) for future in tuple(self._running) if future.done()]
 
     def close(self) -> None:

@@ -45,6 +45,7 @@ GRID = 'settings and their values such as "sapso.inertia" = [0.7, 0.9]'
 
 Entry = Mapping[str, Any]
 
+
 class Plan:
     """The cells of a sweep, made as they are asked for; no two are equal."""
 
@@ -208,7 +209,9 @@ def _gridded(methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequen
         for chosen in product(*(lists[name] for name in mine)):
             entries.append({**entry, "settings": own | dict(zip(mine, chosen, strict=True))} if mine else entry)
     if unused := [name for name in lists if name not in used]:
-        raise InputError(f"grid must hold settings of {', '.join(sorted(known))}, the plan's methods, got {quoted(unused[0])}")
+        raise InputError(
+            f"grid must hold settings of {', '.join(sorted(known))}, the plan's methods, got {quoted(unused[0])}"
+        )
     return entries
 
 

@@ -11,20 +11,22 @@ from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import Skeleton
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.measures import Measures, Spread
 from posefit.tracking.trajectory import effort_of, motion_of
-from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL
+from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, reliability
 from posefit.uncertainty.intervals import joint_intervals
-from posefit.uncertainty.modes import unknown_sides
+from posefit.uncertainty.modes import likeliest_is_right, unknown_sides
 
 MAX_FULL_SIZE_POSES = 8_000  # training poses, more than which are not all drawn at full size in every frame
 SMALL_STRIDE = 4  # of so many poses each is drawn in a small picture
 FULL_SIZE_CANDIDATES = 200  # of these are drawn at full size, with their neighbours in the clip
 MIN_SMALL_SIDE, MAX_SMALL_FACTOR = 60, 4  # pixels of a small picture's side, and by how much it is smaller
 LOST = 0.5  # the probability of a frame to be lost from which on it is called so
+MAX_TRACE_POINTS = 64
 
 
 def unseen(rows: Sequence[Mapping[str, float]]) -> set[int]:
@@ -207,3 +209,43 @@ def _costs(scene: Scene, training: Array, k: int, observation: Observation, beta
             camera, silhouette = coarser_camera(camera, factor), coarser_silhouette(silhouette, factor)
         costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
     return costs
+
+
+def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
+    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
+
+    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
+    """
+    searched = [frame for frame in frames if len(frame.history)]
+    if not searched:
+        return {"evaluations": [], "cost": []}
+    spent = [_spent(frame) for frame in searched]
+    points = np.unique(np.concatenate(spent))
+    points = points[points >= max(used[0] for used in spent)]  # from where every frame has a cost
+    if len(points) > MAX_TRACE_POINTS:
+        wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
+        points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
+    costs = [
+        frame.history[np.searchsorted(used, points, side="right") - 1]
+        for frame, used in zip(searched, spent, strict=True)
+    ]
+    mean = np.mean(costs, axis=0)
+    return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
+
+
+def _spent(frame: Frame) -> Array:
+    """Return the evaluations (populations,) after each population; of equal ones where the tracker does not say."""
+    if frame.spent is not None:
+        return np.asarray(frame.spent)
+    count = len(frame.history)
+    return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
+
+
+def mode_reliability(frames: Sequence[Frame], truth: Array, skeleton: Skeleton) -> list[list[float]]:
+    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
+    weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
+    if not weighed:
+        return []
+    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
+    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
+    return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]

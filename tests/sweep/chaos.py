@@ -104,7 +104,12 @@ class Chaos:
 
     def _begun(self) -> subprocess.Popen[bytes]:
         words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), self.engine, str(self.count), str(LIMIT)]
-        environment = {**os.environ, STARTS: str(self._starts), SLOW_SECONDS: str(self.seconds), "PYTHONPATH": str(ROOT)}
+        environment = {
+            **os.environ,
+            STARTS: str(self._starts),
+            SLOW_SECONDS: str(self.seconds),
+            "PYTHONPATH": str(ROOT),
+        }
         with (self.folder / "output.txt").open("ab") as output:
             return subprocess.Popen(
                 words, cwd=ROOT, env=environment, start_new_session=True, stdout=output, stderr=subprocess.STDOUT

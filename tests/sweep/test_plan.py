@@ -20,10 +20,11 @@ from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Plugin, Registry
 from posefit.suites.functions import SUITE
 from posefit.sweep import check
-from posefit.sweep.cell import TrackCell, anytime_trace, cell_from, cell_scene, digest_of, run_cell
+from posefit.sweep.cell import TrackCell, cell_from, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking import method
+from posefit.tracking.evaluation import anytime_trace
 from posefit.version import posefit_build, source_digest
 from tests.cases import each
 from tests.effort import effort
