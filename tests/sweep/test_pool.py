@@ -162,24 +162,6 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(tmp_
     assert rows_in(tmp_path / "shards") == rows_in(tmp_path / "dask") == first
 
 
-@pytest.mark.slow
-def test_workers_of_this_machine_run_nothing_for_who_has_no_certificate() -> None:
-    distributed = pytest.importorskip("distributed")
-    with closing(cluster(workers=1)) as engine:
-        engine.window()
-        address = engine._address
-        assert address.startswith("tls://127.0.0.1:")
-        worker = next(iter(engine._client.nthreads()))
-        for target in (address, worker):
-            place = target.partition("://")[2]
-            for strange, security in (
-                (f"tcp://{place}", None),
-                (f"tls://{place}", distributed.Security.temporary()),  # a certificate of another authority
-            ):
-                with pytest.raises((OSError, TimeoutError)):
-                    distributed.Client(strange, security=security, timeout=2.0, set_as_default=False)
-
-
 def port() -> int:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
