@@ -65,7 +65,10 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
     checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
     evaluations = values.pop("budget") * dimension
     chosen = {name.rpartition(".")[2]: value for name, value in values.get("settings", {}).items()}
-    version = _of_search(values["method"], json_of(chosen), evaluations)
+    try:
+        version = _of_search(values["method"], json_of(chosen), evaluations)
+    except TypeError:
+        raise InputError(f"settings must be numbers, texts and lists of them, got {quoted(chosen)}") from None
     return SearchCell(**{**values, "settings": chosen, "evaluations": evaluations, "version": version})
 
 
