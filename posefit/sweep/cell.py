@@ -5,7 +5,7 @@ import io
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -121,10 +121,10 @@ class TrackCell(Cell):
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
+        from posefit.evaluation.errors import anytime_trace, mode_reliability
+        from posefit.evaluation.measures import MEASURES
         from posefit.footage.source import training_clips, training_motions
         from posefit.geometry.skeleton import joint_distances
-        from posefit.tracking.evaluation import anytime_trace, mode_reliability
-        from posefit.tracking.measures import MEASURES
         from posefit.tracking.options import VIEW, TrackOptions
         from posefit.tracking.pipeline import track_scene
 
@@ -140,15 +140,15 @@ class TrackCell(Cell):
         assert result.truth is not None
         truth, estimate = result.truth.joints, result.motion.joints
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
-        measured = result.measures.as_dict()
+        measured = asdict(result.measures)
         row = {
             **{name: measured[name] for name in MEASURES if name not in UNLIKE},
-            "warnings": result.summary["warnings"],
+            "warnings": result.course.warnings,
             "evaluations_used": result.measures.evaluations,
-            "dimensions": result.summary["dimensions"],
+            "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],
-            "mode_reliability": mode_reliability(result.estimates, truth, result.motion.skeleton),
-            "trace": anytime_trace(result.estimates),
+            "mode_reliability": mode_reliability(result.frames, truth, result.motion.skeleton),
+            "trace": anytime_trace(result.frames),
         }
         return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 

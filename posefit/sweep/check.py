@@ -64,12 +64,16 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
         return None
     checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
     evaluations = values.pop("budget") * dimension
-    chosen = {name.rpartition(".")[2]: value for name, value in values.get("settings", {}).items()}
-    try:
-        version = _of_search(values["method"], json_of(chosen), evaluations)
-    except TypeError:
-        raise InputError(f"settings must be numbers, texts and lists of them, got {quoted(chosen)}") from None
-    return SearchCell(**{**values, "settings": chosen, "evaluations": evaluations, "version": version})
+    version = _of_search(values["method"], json_of(values.get("settings", {})), evaluations)
+    return SearchCell(**{**values, "evaluations": evaluations, "version": version})
+
+
+def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entry of a list of optimisers with its settings, checked, by their names alone."""
+    method = _name("method", entry.get("method"))
+    given = flattened("settings", entry.get("settings", {})).items()
+    chosen = {name.rpartition(".")[2]: value for name, value in given}
+    return {**entry, "settings": settings.check(method, registry().optimiser(method), chosen)}
 
 
 def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
@@ -104,9 +108,8 @@ def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], 
 
 @lru_cache(maxsize=1024)
 def _of_search(method: str, chosen: str, evaluations: int) -> str:
-    """Return the version of an optimiser, whose settings are a JSON text, and fit it and its budget."""
+    """Return the version of an optimiser. Raises ValueError where its settings, a JSON text, need a larger budget."""
     offer = registry().offer("optimiser", method)
-    settings.check(method, offer.factory, json.loads(chosen))
     if (size := settings.population(offer.factory, json.loads(chosen), evaluations)) > evaluations:
         raise InputError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
     return version_of([offer.origin])

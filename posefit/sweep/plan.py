@@ -18,7 +18,7 @@ from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text
 from posefit.suites.functions import FUNCTIONS, HELD_OUT
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
-from posefit.sweep.check import FIELDS, cell_of, families, flattened, search_of
+from posefit.sweep.check import FIELDS, cell_of, families, flattened, search_method, search_of
 
 LISTS = {
     "methods": "method",
@@ -155,7 +155,8 @@ def _searches(tables: Mapping[str, Any]) -> Callable[[], Iterator[Cell]]:
         field: _listed(name, field, tables.get(name, default), HELD_OUT.start if name == "instances" else 0)
         for name, (field, default) in SEARCH_LISTS.items()
     }
-    lists["method"] = _gridded(lists["method"], tables.get("grid", {}), lambda method: (method.partition(":")[0],))
+    methods = _gridded(lists["method"], tables.get("grid", {}), lambda method: (method.partition(":")[0],))
+    lists["method"] = list(map(search_method, methods))
     _check_count(lists)
     return lambda: filter(None, (search_of({**shared, **spec}) for spec in _product(lists)))
 
