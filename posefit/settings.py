@@ -135,6 +135,20 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     return parse(plugin, factory, given)
 
 
+def settings_text(settings: Mapping[str, Any]) -> list[str]:
+    """Return settings as `--set` takes them."""
+    return [f"{name}={setting_text(value)}" for name, value in settings.items()]
+
+
+def setting_text(value: Any) -> str:
+    """Return a setting's value as `--set` takes it."""
+    if isinstance(value, bool) or value is None:
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return ",".join(setting_text(one) for one in value)
+    return str(value)
+
+
 def accepts(annotation: Any, value: Any) -> bool:
     """Return whether a value fits an annotation; one that is not understood accepts everything."""
     origin = get_origin(annotation)

@@ -87,6 +87,7 @@ FRAMES = click.option(
     help="Only these frames: of footage as filmed, of a motion after resampling.",
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+QUIET = click.option("--quiet", is_flag=True, help="No messages and no bars, only the result.")
 EXTRACTION = (
     click.option(
         "--extraction",
@@ -111,7 +112,7 @@ TRACK: tuple[Any, ...] = (
     click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
     click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
     click.option("--verbose", is_flag=True, help="Print all figures, not three lines."),
-    click.option("--quiet", is_flag=True, help="No messages and no bars, only the result."),
+    QUIET,
     JSON,
 )
 ENGINE = (

@@ -43,8 +43,8 @@ class Scene:
     guesses: Sequence[str] = ()  # what the sources do not state, and posefit assumes
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
-    reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
     first: int = 0  # the number of the first frame in the footage, or in the whole motion
+    reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
 
     def motion(self, frames: Sequence[Frame]) -> Motion:
         """Return the person's motion that some frames estimate."""
