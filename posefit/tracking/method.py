@@ -70,10 +70,10 @@ def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     known = isinstance(source, str) and source in built_in.names()
     prior, method = DEFAULT_FOOTAGE_PRIOR if kind_of(source) != "motion" else DEFAULT_PRIOR, options.method
     offers, set_names = registry().offers, {name.partition(".")[0] for name in options.settings}
-    searched = known or options.optimiser is not None or options.prior is not None or set_names - {DEFAULT_TRACKER}
+    searched = known or set_names - {DEFAULT_TRACKER}
     if method is None and not searched and DEFAULT_TRACKER in offers["tracker"]:
         method = DEFAULT_TRACKER
-    elif not callable(method):
+    elif method is None or isinstance(method, str):
         method = str(method_names(method or next(iter(set_names & {*offers["optimiser"]}), None), prior))
     train = options.train
     if not train and method == DEFAULT_TRACKER:
@@ -115,13 +115,14 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     BrokenRuleError where a plugin does not do what its kind has to.
     """
     chosen = options.method
-    if callable(chosen) or (names := method_names(chosen)).tracker is not None:
-        for name in ("optimiser", "prior"):
-            if (plugin := getattr(options, name)) is not None:
-                raise InputError(f"{name} must not be given beside a tracker, got {plugin} and {chosen}")
-        return _tracker_method(_offered("tracker", chosen), options.settings)
-    optimiser = _offered("optimiser", options.optimiser or names.optimiser)
-    prior = None if options.prior is not None else registry().offer("prior", names.prior)
+    if isinstance(chosen, tuple):
+        optimiser, given_prior = _offered("optimiser", chosen[0]), chosen[1]
+    else:
+        names = None if callable(chosen) else method_names(chosen)
+        if names is None or names.tracker is not None:
+            return _tracker_method(_offered("tracker", chosen), options.settings)
+        optimiser, given_prior = _offered("optimiser", names.optimiser), names.prior
+    prior = registry().offer("prior", given_prior) if isinstance(given_prior, str) else None
     mine = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     mine.setdefault("prior", {})
     given = mine["optimiser"]
@@ -133,8 +134,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
             _check_prior(learned, task.angles, prior)
         learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
-        assert options.prior is not None
-        learned, name = options.prior, type(options.prior).__name__
+        learned, name = given_prior, type(given_prior).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
     prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **mine["tracker"]})
     tilt = prediction.tilted(learned, task.training)
