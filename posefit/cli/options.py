@@ -145,9 +145,10 @@ class TrackCommand(click.Command):
         heading = ""
         for field in fields(TrackOptions):
             heading = declared(field).heading or heading
-            sections.setdefault(heading, []).append(field.name)
-        for heading, names in HEADINGS.items():
-            sections.setdefault(heading, []).extend(names.split())
+            if declared(field).flag != "":
+                sections.setdefault(heading, []).append(field.name)
+        for heading, listed in HEADINGS.items():
+            sections.setdefault(heading, []).extend(listed.split())
         for heading, names in sections.items():
             if rows := [records.pop(name) for name in names if name in records]:
                 with formatter.section(heading):

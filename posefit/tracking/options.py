@@ -158,31 +158,6 @@ def text_label(text: str) -> int:
 class TrackOptions:
     """The options of a track, checked; what is None or empty is decided by the source."""
 
-    method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(
-        None,
-        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
-        "for a built-in motion. In Python also a tracker's factory, or a pair: an optimiser's name or factory, and a "
-        "prior's name or one that has learned.",
-        _method,
-        "METHOD",
-        heading="Method and budget",
-    )
-    settings: Mapping[str, Any] | Sequence[str] = option(
-        (),
-        "Of a plugin, such as sapso.cooling=0.9 or, where one alone has it, cooling=0.9; repeatable.",
-        None,
-        "[NAME.]SETTING=VALUE",
-        "set",
-        repeated=True,
-    )
-    train: "Sequence[Source]" = option(
-        (),
-        "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
-        "exemplars, else other styles of a built-in motion, or walks.",
-        _sources,
-        "SOURCE",
-        repeated=True,
-    )
     asf: str | Path | None = option(
         None, "Skeleton of SOURCE; by default the only .asf beside an .amc.", None, "FILE", heading="What is seen"
     )
@@ -234,12 +209,36 @@ class TrackOptions:
         ", a share of the person's area",
         live=False,
     )
+    method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(
+        None,
+        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
+        "for a built-in motion. In Python also a tracker's factory, or a pair: an optimiser's name or factory, and a "
+        "prior's name or one that has learned.",
+        _method,
+        "METHOD",
+        heading="Method and budget",
+    )
+    settings: Mapping[str, Any] | Sequence[str] = option(
+        (),
+        "Of a plugin, such as sapso.cooling=0.9 or, where one alone has it, cooling=0.9; repeatable.",
+        None,
+        "[NAME.]SETTING=VALUE",
+        "set",
+        repeated=True,
+    )
+    train: "Sequence[Source]" = option(
+        (),
+        "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
+        "exemplars, else other styles of a built-in motion, or walks.",
+        _sources,
+        "SOURCE",
+        repeated=True,
+    )
     evaluations: int | None = _int(
         None,
         "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.",
         1,
         "POSES",
-        heading="Method and budget",
     )
     translation: "Translation | None" = option(
         None,
@@ -297,4 +296,4 @@ class TrackOptions:
 
 
 _NAMES = [each.name for each in fields(TrackOptions)]
-VIEW = _NAMES[_NAMES.index("asf") : _NAMES.index("evaluations")]  # how a source is looked at: see `TrackOptions.view`
+VIEW = _NAMES[: _NAMES.index("method")]  # how a source is looked at: see `TrackOptions.view`
