@@ -28,7 +28,7 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
-from posefit.footage.masks import Range, existing, span
+from posefit.footage.masks import Range, span
 from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
@@ -36,15 +36,15 @@ from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.calibration import Calibration
 from posefit.motion.motion import Motion
-from posefit.reading import read_text
+from posefit.output.drawing import draw_body, write
+from posefit.reading import existing, read_text
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.drawing import draw_body, write
-from posefit.tracking.options import ITERATIONS, TrackOptions
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands import CLIPS
 from posefit_reproduce.experiment import Table
-from posefit_reproduce.sapso.experiment import estimate_images, options_of
+from posefit_reproduce.sapso.experiment import ITERATIONS, estimate_images, options_of
 from posefit_reproduce.sapso.methods import LABELS as METHOD_LABELS
 from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
 from posefit_reproduce.sapso.motions import paper_motions
@@ -147,7 +147,7 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     for name in TRACKED:
         how = TrackOptions(**options_of(name, training, iterations), seed=seed, smooth=False, body_frames=0)
         track = track_scene(replace(scene, yaw=None), training, how)
-        estimates[name] = dict(enumerate(track.estimates))
+        estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
     images = {k: replace(scene.observations[k], yaw=None) for k in chosen}

@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from posefit.cli import main
-from posefit.fitting import metrics
+from posefit.evaluation.measures import BASELINES
 from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
 from posefit.tracking.front import track
-from posefit.tracking.measures import BASELINES
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Results, Run
 from posefit_reproduce.sapso.experiment import COMPARED, Scale, baseline, estimate_images, follow, perform
@@ -149,7 +149,7 @@ def test_errors_are_those_of_poses() -> None:
     assert few_joints(analysis, "walk")[0, 0] == pytest.approx(1.0)
     test = motions["walk"].test
     joints = replace(test, poses=test.poses + np.eye(1, 66)[0] * np.pi).joints
-    expected = metrics.swapped(test.joints, joints).mean()
+    expected = nearer_mirrored(test.joints, joints).mean()
     analysis = Analysis(shifted(motions, 180.0, slice(0, 1)), motions)
     assert analysis.share("swapped", "walk")[0, 0] == expected
 
@@ -206,7 +206,7 @@ def test_the_library_has_the_same_motions(cmu: Path) -> None:
 
 
 def test_baselines_are_what_a_track_reports(walk: PaperMotion) -> None:
-    quick = {"method": "sapso", "population_size": 5, "iterations": 1}
+    quick = {"method": "sapso", "settings": {"sapso.population_size": 5}, "evaluations": 10}
     degrees = track(paper_scene(walk, 45.0), train=walk.training, **quick).summary["baselines_degrees"]
     for name in BASELINES:
         away = np.degrees(np.abs(wrapped(baseline(walk, paper_scene(walk, 45.0), name) - walk.test.poses)))
@@ -224,7 +224,7 @@ def test_a_run_is_a_track_of_the_same_seed(walk: PaperMotion) -> None:
         scene,
         train=walk.training,
         method="pso@pca",
-        iterations=4,
+        evaluations=40 * 5,
         settings={"tracker.tilt": "box"},  # Interpretation S16
         seed=3,
     )
@@ -244,18 +244,28 @@ def test_a_single_image_is_estimated_by_itself_whichever_way_the_person_faces(wa
     assert not np.array_equal(poses_of(frames), poses_of(turned_frames))
 
 
+def test_the_yaw_of_a_single_image_is_unknown(walk: PaperMotion) -> None:  # section 5.3, Interpretation S17
+    scene = paper_scene(walk, 45.0)
+    images = {1: scene.observations[1]}
+    poses = [
+        estimate_images(replace(scene, yaw=yaw), images, walk.training, OURS, 4, 3)[0].pose
+        for yaw in (scene.yaw, None, (scene.yaw or 0.0) + 2.0)
+    ]
+    np.testing.assert_array_equal(poses[1], poses[0])
+    np.testing.assert_array_equal(poses[2], poses[0])
+
+
 def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
     swarm = watched_swarm(walk, 30, 6)
     assert [poses.shape for poses in swarm.poses] == [(30, 66)] * 7
     again = track(
         paper_scene(walk, 45.0, (0, 1)),
         train=walk.training,
-        population_size=30,
-        iterations=6,
+        evaluations=30 * 7,
         method="sapso",
-        settings={"tracker.tilt": "box"},  # Interpretation S16
+        settings={"tracker.tilt": "box", "sapso.population_size": 30},  # Interpretation S16
     )
-    np.testing.assert_array_equal(swarm.history, again.estimates[0].history)
+    np.testing.assert_array_equal(swarm.history, again.frames[0].trace[:, 1])
     # the best pose of all iterations is the search's result
     best = [poses[k] for poses, k in zip(swarm.poses, swarm.best, strict=True)]
     assert any(np.array_equal(pose, again.motion.poses[0]) for pose in best)

@@ -20,14 +20,14 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.evaluation.errors import nearest
+from posefit.evaluation.measures import BASELINES
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import place_of
 from posefit.footage.scene import Scene, with_corruption
 from posefit.motion.motion import Motion
-from posefit.tracking.evaluation import nearest
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
-from posefit.tracking.measures import BASELINES
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
@@ -91,7 +91,7 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
     motion = loaded(clips, scale.frames)[run.subject]
     if run.kind == "first":
         frames = [first_frame(motion, scale.iterations, count, run) for count in SWARMS]
-        return {"history": np.array([frame.history for frame in frames])}
+        return {"history": np.array([frame.trace[:, 1] for frame in frames])}
     scene = paper_scene(motion, run.view)
     if run.method in BASELINES:
         return {"poses": baseline(motion, scene, run.method)}
@@ -110,12 +110,13 @@ def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
     }
 
 
-def options_of(name: str, training: Sequence[Motion], iterations: int, particles: int = PARTICLES) -> dict[str, Any]:
+def options_of(name: str, training: Sequence[Motion], iterations: int) -> dict[str, Any]:
     """Return the options of a method's tracks, all with N (C + 1) evaluations a frame."""
-    budget = {"population_size": particles, "evaluations": particles * (iterations + 1)}
-    options = {"train": training, **budget, **METHODS[name].options}
-    if "prior" in options:
-        options["prior"] = options["prior"]().fit(np.concatenate([motion.poses[:, 3:] for motion in training]))
+    options = {"train": training, "evaluations": PARTICLES * (iterations + 1), **METHODS[name].options}
+    method = options["method"]
+    if isinstance(method, tuple) and isinstance(method[1], type):
+        learned = method[1]().fit(np.concatenate([motion.poses[:, 3:] for motion in training]))
+        options["method"] = method[0], learned
     return options
 
 
@@ -123,8 +124,8 @@ def follow(scene: Scene, motion: PaperMotion, scale: Scale, run: Run) -> list[Fr
     """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
     options = options_of(run.method, motion.training, scale.iterations)
     if run.kind == "unknown":
-        return track(replace(scene, yaw=None), restarts=RESTARTS, seed=run.seed, **options).estimates
-    return track(scene, seed=run.seed, **options).estimates
+        return track(replace(scene, yaw=None), restarts=RESTARTS, seed=run.seed, **options).frames
+    return track(scene, seed=run.seed, **options).frames
 
 
 def estimate_images(
@@ -140,7 +141,7 @@ def estimate_images(
     for k, image in images.items():
         known = image.translation
         anchor = place_of(image.silhouettes, scene.cameras, scene.body.stature) if known is None else np.asarray(known)
-        frames += method.tracker(replace(task, anchor=anchor)).track([image], np.random.default_rng([seed, k]))
+        frames += method.follow(replace(task, anchor=anchor), [image], np.random.default_rng([seed, k]))
     return frames
 
 
@@ -154,10 +155,13 @@ def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
     return np.column_stack([truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))])
 
 
-def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run, **more: Any) -> Frame:
-    """Return what a method makes of the first frame with a swarm of some size."""
-    options = options_of(run.method, motion.training, iterations, particles)
-    return track(paper_scene(motion, run.view, (0, 1)), seed=run.seed, **{**options, **more}).estimates[0]
+def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run, method: Any = None) -> Frame:
+    """Return what a method, or another in its place, makes of the first frame with a swarm of some size."""
+    options = options_of(run.method, motion.training, iterations)
+    name = run.method.partition("@")[0] if method is None else method[0].__name__
+    options["settings"] = {**options["settings"], f"{name}.population_size": particles}
+    options |= {"method": method or options["method"], "evaluations": particles * (iterations + 1), "seed": run.seed}
+    return track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]
 
 
 def paper_experiment(clips: str | Path | None, scale: Scale) -> Experiment:

@@ -105,8 +105,8 @@ def watched_swarm(motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterati
 
     poses, translations, best = list[Array](), list[Array](), list[int]()
     run = Run("first", "walk", OURS, SHOWN_VIEW)
-    frame = first_frame(motion, iterations, particles, run, optimiser=Watched, method="@pca")
-    return WatchedSwarm(paper_scene(motion, SHOWN_VIEW, (0, 1)), poses, translations, best, frame.history)
+    frame = first_frame(motion, iterations, particles, run, method=(Watched, "pca"))
+    return WatchedSwarm(paper_scene(motion, SHOWN_VIEW, (0, 1)), poses, translations, best, frame.trace[:, 1])
 
 
 def swarm_figure(swarm: WatchedSwarm) -> Figure:

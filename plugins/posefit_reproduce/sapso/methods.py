@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.tracking.measures import BASELINES
+from posefit.evaluation.measures import BASELINES
 from posefit_priors.pca import PCA
 from posefit_swarm.sapso import SAPSO, Rows
 
@@ -49,13 +49,15 @@ class ConstantInertia(SAPSO):
 
 
 class PaperMethod(NamedTuple):
-    """A method by its name in tables, and the options of its tracks; a prior there is a class."""
+    """A method by its name in tables, and the options of its tracks; a prior in a pair is a class."""
 
     label: str
     options: Mapping[str, Any]
 
 
-def _search(label: str, method: str, settings: Mapping[str, Any] = DRIVEN, **more: Any) -> PaperMethod:
+def _search(
+    label: str, method: str | tuple[Any, Any], settings: Mapping[str, Any] = DRIVEN, **more: Any
+) -> PaperMethod:
     return PaperMethod(label, {"method": method, "settings": settings, **more})
 
 
@@ -76,11 +78,11 @@ PARTS = {
     "no-velocity-limits": _search(
         "no velocity limits (half of constraint 1)", OURS, DRIVEN | {"sapso.alpha": NO_LIMIT}
     ),
-    "no-range": _search("no constraint 1", "sapso", DRIVEN | {"sapso.alpha": NO_LIMIT}, prior=WidePCA),
-    "no-clusters": _search("no constraint 2", "sapso", prior=UnclusteredPCA),
+    "no-range": _search("no constraint 1", ("sapso", WidePCA), DRIVEN | {"sapso.alpha": NO_LIMIT}),
+    "no-clusters": _search("no constraint 2", ("sapso", UnclusteredPCA)),
     "every-move": _search("no annealing: every move counts", OURS, DRIVEN | _ALWAYS),
     "better-moves": _search("no annealing: only better moves count", OURS, DRIVEN | _NEVER),
-    "constant-inertia": _search("inertia constant at 0.3", "@pca", optimiser=ConstantInertia),
+    "constant-inertia": _search("inertia constant at 0.3", (ConstantInertia, "pca")),
 }
 # what may follow a turn better, with the walk's budget
 TURNING = {

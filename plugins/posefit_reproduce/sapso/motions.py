@@ -13,7 +13,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
-from posefit.footage.source import load_motion
+from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 
 SIZE = (320, 240)  # pixels

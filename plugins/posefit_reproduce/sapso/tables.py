@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import turns_of
-from posefit.tracking.measures import BASELINES
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Claim, Results, Table, bounded, claims_table, interval
 from posefit_reproduce.sapso.experiment import COMPARED
@@ -71,7 +72,7 @@ class Analysis:
         )
         truth = np.tile(test.joints, (len(joints) // len(test), 1, 1))
         flags = (
-            metrics.swapped(truth, joints) if which == "swapped" else metrics.mpjpe_mm(truth, joints) > metrics.LOST_MM
+            nearer_mirrored(truth, joints) if which == "swapped" else metrics.mpjpe_mm(truth, joints) > metrics.LOST_MM
         )
         return np.asarray(flags.reshape(poses.shape[:3]).mean(axis=2))
 

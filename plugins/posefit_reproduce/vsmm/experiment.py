@@ -14,7 +14,7 @@ from posefit.errors import InputError
 from posefit.fitting.tracker import Frame, Task
 from posefit.motion import built_in
 from posefit.tracking.method import prepare
-from posefit.tracking.options import TrackOptions
+from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit_reproduce.experiment import Arrays, Experiment, Results, Run
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
 from posefit_vsmm.groups import read_topology
@@ -68,11 +68,10 @@ def film_task(film: Film, evaluations: int) -> Task:
 def perform(run: Run) -> Arrays:
     """Follow the film of a seed with a method; the first pose is not known."""
     film, options = film_of(run.seed), ALL[run.method]
-    task = film_task(film, options.budget)
+    task = film_task(film, options.evaluations or EVALUATIONS)
     with threadpool_limits(1):
         for observations in (film.observations[:WARMING], film.observations):
-            tracker = prepare(options, task).tracker(task)
-            frames = list(tracker.track(observations, np.random.default_rng(run.seed)))
+            frames = list(prepare(options, task).follow(task, observations, np.random.default_rng(run.seed)))
     return arrays_of(frames)
 
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import PARENTS
+from posefit.output.drawing import draw_body, side_view
 from posefit.silhouette.foreground import Image
-from posefit.tracking.drawing import draw_body, side_view
 from posefit_reproduce.experiment import Arrays, Results
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film, film_of
 from posefit_reproduce.vsmm.experiment import GROUPS, MODELS, TUNED
