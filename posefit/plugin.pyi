@@ -7,7 +7,7 @@ from posefit.fitting.box import Start as Start
 from posefit.fitting.box import converted as converted
 from posefit.fitting.box import displacement as displacement
 from posefit.fitting.box import draw_population as draw_population
-from posefit.fitting.box import extent as extent
+from posefit.fitting.box import first_that_works as first_that_works
 from posefit.fitting.box import fold as fold
 from posefit.fitting.box import repair as repair
 from posefit.fitting.box import sample_normal as sample_normal
@@ -28,6 +28,8 @@ from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Observation as Observation
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
+from posefit.fitting.weights import effective_sample_size as effective_sample_size
+from posefit.fitting.weights import weigh as weigh
 from posefit.hooks import RegisterCommand as RegisterCommand
 from posefit.hooks import RegisterOptimiser as RegisterOptimiser
 from posefit.hooks import RegisterPrior as RegisterPrior

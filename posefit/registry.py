@@ -54,6 +54,7 @@ class Offer:
     distribution: str
     version: str
     next_frame: "NextFrame" = "start"  # of an optimiser
+    looks_ahead: bool = False  # of a tracker
     needs: hooks.Needs | None = None
 
     @property

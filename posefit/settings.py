@@ -75,18 +75,13 @@ def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) ->
     return values
 
 
-def planned(
-    factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int, population_size: int | None = None
-) -> dict[str, Any]:
+def planned(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> dict[str, Any]:
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
-    These are `evaluations` itself, `population_size` where one was chosen, and `iterations`, the populations after the
-    first. What is given stays as it is.
+    These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
     filled = dict(given)
-    if population_size is not None and "population_size" in known:
-        filled.setdefault("population_size", population_size)
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:

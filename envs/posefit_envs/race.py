@@ -12,7 +12,7 @@ from posefit.arrays import Array
 from posefit.fitting.check import pair, whole
 from posefit.reading import quoted
 from posefit.registry import registry
-from posefit.settings import planned
+from posefit.settings import planned, settings_of
 from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, log_cost, log_improvement
 from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
@@ -44,7 +44,9 @@ class RaceVectorEnv(SearchVectorEnv):
         self.population_size = int(checked(whole, "population_size", population_size, 2))
         self._least, self._most = _bounds(generations)
         self._optimiser, self._factory = optimiser, checked(registry().optimiser, optimiser)
-        self._settings = planned(self._factory, {}, self.population_size * (self._most + 1), self.population_size)
+        size = {"population_size": self.population_size}
+        sized = any(setting.name in size for setting in settings_of(self._factory))
+        self._settings = planned(self._factory, size if sized else {}, self.population_size * (self._most + 1))
 
         def race_spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
             features = SEARCH_FEATURES * k + COMMON_FEATURES

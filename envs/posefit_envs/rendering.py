@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from posefit import PoseProblem
 from posefit.arrays import Array
+from posefit.output.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
 from posefit.silhouette.cost import project
-from posefit.tracking.drawing import BACKGROUND, BOTH, MISSED, SPILLED, TEXT, side_view
 
 MODES = ("rgb_array",)  # Gymnasium shows the pictures of "human" in its own window
 HEIGHT = 240  # pixels

@@ -7,11 +7,20 @@ J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, Int
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
-from posefit.fitting.box import Space, converted, displacement, draw_population, sample_normal
-from posefit.fitting.check import at_least, between, positive
-from posefit.fitting.optimiser import check_tell
-from posefit_filters.weighting import sharpness, systematic_rows, weigh
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    converted,
+    displacement,
+    draw_population,
+    positive,
+    sample_normal,
+    weigh,
+)
+from posefit_filters.weighting import sharpness, systematic_rows
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10

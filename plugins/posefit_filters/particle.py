@@ -6,11 +6,19 @@ N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesi
 
 import numpy as np
 
-from posefit.arrays import Array
-from posefit.fitting.box import Space, converted, draw_population, repair, sample_normal
-from posefit.fitting.check import at_least, positive
-from posefit.fitting.optimiser import check_tell
-from posefit_filters.weighting import systematic_rows, weigh
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    check_tell,
+    converted,
+    draw_population,
+    positive,
+    repair,
+    sample_normal,
+    weigh,
+)
+from posefit_filters.weighting import systematic_rows
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost

@@ -10,7 +10,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.plugin import Array, Space, at_least, between, check_tell, displacement, draw_population, positive, wrap
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    displacement,
+    draw_population,
+    first_that_works,
+    positive,
+    wrap,
+)
 
 REDRAWS = 10  # ours: of rand() for a particle that is no pose to the prior; then it stays. Interpretation S7
 
@@ -134,8 +145,7 @@ def redrawn(
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c
     if len(broken):
         again = step(np.repeat(broken, redraws))
-        works = allowed(*again).reshape(len(broken), redraws)
-        first, any_works = redraws * np.arange(len(broken)) + works.argmax(axis=1), works.any(axis=1, keepdims=True)
-        v[broken] = np.where(any_works, again[0][first], 0.0)
-        moved[broken] = np.where(any_works, again[1][first], x[broken])
+        works, shape = allowed(*again).reshape(len(broken), redraws), (len(broken), redraws, -1)
+        v[broken] = first_that_works(again[0].reshape(shape), works, 0.0)
+        moved[broken] = first_that_works(again[1].reshape(shape), works, x[broken])
     return v, moved

@@ -128,9 +128,8 @@ ENGINE = (
 HEADINGS = {  # the options of a track in its help, by their names in Python
     "What is seen": "live asf camera up view_degrees size fps frames frame height label holes",
     "How the person is taken out of video": "extraction background roi ignore width",
-    "Method and budget": "method settings train without_subject evaluations population_size iterations ask_seconds "
-    "seed threads device",
-    "How it is followed": "translation first_pose restarts body_frames hypotheses smooth passes",
+    "Method and budget": "method settings train without_subject evaluations seed threads device",
+    "How it is followed": "translation first_pose restarts body_frames hypotheses smooth",
     "Results": "out force resume verbose quiet as_json",
 }
 

@@ -87,7 +87,7 @@ def _print(
     summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
 ) -> None:
     """Print a track's summary: as JSON with something more, in three lines, or whole."""
-    from posefit.tracking.table import brief, table
+    from posefit.output.text import brief, table
 
     if as_json:
         click.echo(json.dumps({**summary, **more}))

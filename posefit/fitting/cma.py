@@ -15,6 +15,7 @@ from posefit.errors import InputError
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.optimiser import check_tell, finite_costs
+from posefit.fitting.weights import effective_sample_size
 from posefit.reading import cut
 
 ALPHA_COV = 2.0
@@ -48,7 +49,7 @@ def constants(dimensions: int, population: int) -> tuple[Array, Rates]:
     """Return the weights (lambda,) of a population of 4 or more, best first, and the rates that follow from them."""
     n, mu = dimensions, population // 2
     raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))  # HANSEN2016 (49)
-    mu_eff, mu_eff_minus = (float(half.sum() ** 2 / (half**2).sum()) for half in (raw[:mu], raw[mu:]))  # HANSEN2016 (8)
+    mu_eff, mu_eff_minus = effective_sample_size(raw[:mu]), effective_sample_size(raw[mu:])  # HANSEN2016 (8)
     c_sigma = (mu_eff + 2.0) / (n + mu_eff + 5.0)  # HANSEN2016 (55)
     d_sigma = 1.0 + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_sigma
     c_c = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n)  # HANSEN2016 (56)

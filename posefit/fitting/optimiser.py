@@ -14,7 +14,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, repair
 
-WORST = 1e15  # few libraries bear nan, infinity or the square of 1e300
+WORST = 1e15  # few libraries work with nan, infinity or the square of 1e300
 
 
 class Optimiser(Protocol):
@@ -120,7 +120,7 @@ def populations(
     """Yield each population (n, d) that an optimiser proposes, with its costs (n,): the loop that every search is.
 
     The optimiser learns the costs before its next population is asked for. The search ends when it proposes none, or
-    one that would go over the budget, which is not evaluated. Raises BudgetError where the first one does, and
+    one beyond the budget, which is not evaluated. Raises BudgetError where the first one does, and
     TypeError where `evaluate` returns anything else than an array of costs (n,).
     """
     used = 0
@@ -141,7 +141,7 @@ def minimise(
 ) -> Minimum:
     """Return the best proposal of a search within a budget of whole populations.
 
-    `evaluate` gives the costs (n,) of proposals (n, d). A population that would go over `evaluations` is not
+    `evaluate` returns the costs (n,) of proposals (n, d). A population beyond `evaluations` is not
     evaluated. A cost that is nan never counts as best. A warning is given where an optimiser ends its search before
     half of the budget is used, unless it was built with the budget, `budget_known`: the schedules of some follow it.
     Raises BudgetError where the budget does not hold one population, and ValueError where every cost is nan.
@@ -157,11 +157,11 @@ def minimise(
 
 
 def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
-    """Return the best of the proposals (n, d) of populations, one or more, that come in turn with their costs (n,).
+    """Return the best of the proposals (n, d) of one population or more, each with its costs (n,).
 
     A cost that is nan never counts as best. Raises ValueError where every cost is nan.
     """
-    best, cost, used, history, spent = None, np.inf, 0, [], []
+    best, cost, used, history, counts = None, np.inf, 0, [], []
     for proposals, costs in searched:
         used += len(proposals)
         lowest = costs.argmin()
@@ -171,7 +171,7 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
         if best is None or math.isnan(cost) or least < cost:
             best, cost = proposals[lowest].copy(), least  # SAPSO (5)
         history.append(cost)
-        spent.append(used)
+        counts.append(used)
     if best is None or math.isnan(cost):
         raise InputError(f"costs must be numbers, got nan for all {used} proposals")
-    return Minimum(best, cost, used, np.array(history), np.array(spent))  # SAPSO A1.3
+    return Minimum(best, cost, used, np.array(history), np.array(counts))  # SAPSO A1.3

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,23 +61,28 @@ _LENGTHS, _GIRTHS = _members(LENGTHS), _members(GIRTHS)
 def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
     """Return a body with its lengths and radii multiplied by factors (17,), in the order of `NAMES`.
 
-    With a `height` in metres the result is scaled to stand so tall.
+    With a `height` in metres the result is scaled to it.
     """
     lengths = factors[0] * np.exp(_LENGTHS @ np.log(factors[1 : 1 + len(LENGTHS)]))
     girths = factors[0] * np.exp(_GIRTHS @ np.log(factors[1 + len(LENGTHS) :]))
-    made = body.scaled(lengths, girths)
-    return made if height is None else made.scaled(height / made.stature, height / made.stature)
+    scaled = body.scaled(lengths, girths)
+    return scaled if height is None else scaled.scaled(height / scaled.stature, height / scaled.stature)
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A fitted body, and how sure its factors are."""
+    """A fitted body, and how uncertain its factors are."""
 
     body: Body
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
     spread: Array = field(repr=False)  # (17,) standard deviation of each factor's logarithm
     cost: float  # mean over the frames
-    height: float | None = None  # metres that it was made to stand; None where it was fitted
+    height: float | None = None  # metres, to which it was scaled; None where it was fitted
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the build as summary.json holds it."""
+        factors, spread = (dict(zip(NAMES, values.tolist(), strict=True)) for values in (self.factors, self.spread))
+        return {"stature_m": self.body.stature, "cost": self.cost, "factors": factors, "spread": spread}
 
 
 def fit_shape(
@@ -91,9 +97,9 @@ def fit_shape(
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with their poses.
 
-    `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
-    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. How sure the
-    factors are is not known yet: their `spread` is people's.
+    `follow` tracks the observations with a body. With a `height` in metres the person is so tall; one camera alone
+    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. How
+    uncertain the factors are is not known yet: their `spread` is that of all people.
     """
 
     def cost(factors: Array) -> float:

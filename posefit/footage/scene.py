@@ -8,7 +8,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.tracker import Observation
+from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.masks import Range, span
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -41,6 +41,11 @@ class Scene:
     warnings: Sequence[str] = ()  # what a user should know before they trust it
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
+
+    def motion(self, frames: Sequence[Frame]) -> Motion:
+        """Return the person's motion that some frames estimate."""
+        poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+        return Motion(self.name, self.body.skeleton, poses, places, self.fps)
 
 
 def synthetic(

@@ -1,6 +1,6 @@
 """The figures of a run that a report shows, and where a row of a ledger has them.
 
-Label, unit, digits and meaning of a track's figures come from `posefit.tracking.measures`.
+Label, unit, digits and meaning of a track's figures come from `posefit.evaluation.measures`.
 """
 
 import math
@@ -12,8 +12,8 @@ import numpy as np
 from scipy.stats import trim_mean
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES, MEASURES, Measure
 from posefit.statistics.intervals import TRIMMED
-from posefit.tracking.measures import BASELINES, MEASURES, Measure
 from posefit.uncertainty.calibration import LEVELS
 
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)  # of intervals, as rows have them

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.measuring.centres import PLACES
 from posefit.reading import counted
@@ -32,7 +33,6 @@ from posefit.suites.functions import suite_function
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SHOWN
 from posefit.sweep.ledger import Ledger
-from posefit.tracking.measures import BASELINES
 
 REASONS = 5  # of failures, the most frequent ones, that the first screen names
 MAX_SEEDS = 50  # that the facts list

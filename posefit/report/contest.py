@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES
 from posefit.fitting.metrics import skill
 from posefit.report.columns import interquartile_mean, mean
 from posefit.report.runs import Runs
@@ -19,7 +20,6 @@ from posefit.statistics.means import mean_interval
 from posefit.statistics.pairing import Shared, most_shared
 from posefit.statistics.ranks import LEVEL, Comparison, compact_letters, wilcoxon
 from posefit.suites.functions import suite_function
-from posefit.tracking.measures import BASELINES
 
 BOOTSTRAP_SEED = 2013
 WORK = 1e8  # numbers that the resamples of one study may come to

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from posefit.evaluation.measures import BASELINES
 from posefit.reading import counted
 from posefit.report.contest import Contest, is_random
 from posefit.statistics.ranks import LEVEL
-from posefit.tracking.measures import BASELINES
 
 NAMED = 4  # names that a sentence lists; of more it gives the number
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
+from posefit.evaluation.measures import BASELINES
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import counted, cut
@@ -14,7 +15,6 @@ from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
-from posefit.tracking.measures import BASELINES
 
 MAX_MISSING = 20  # instances that are named if they are not compared
 SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with

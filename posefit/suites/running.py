@@ -67,9 +67,9 @@ def run_on(
     rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
     factory = registry().optimiser(method)
     chosen = settings.check(method, factory, chosen or {})
-    with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
+    with plugin_errors(f"optimiser {method}", "construction", (BudgetError, ImportError)):
         optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
-    guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
+    guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", evaluations)
     minimise(problem.evaluate, guarded, evaluations, budget_known=True)
     return run_of(problem, method, chosen, seed=seed, budget=evaluations)
 

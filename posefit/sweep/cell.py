@@ -5,7 +5,7 @@ import io
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -123,9 +123,9 @@ class TrackCell(Cell):
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
+        from posefit.evaluation.measures import MEASURES
         from posefit.footage.source import training_clips, training_motions
         from posefit.geometry.skeleton import joint_distances
-        from posefit.tracking.measures import MEASURES
         from posefit.tracking.options import VIEW, TrackOptions
         from posefit.tracking.pipeline import track_scene
 
@@ -141,15 +141,15 @@ class TrackCell(Cell):
         assert result.truth is not None
         truth, estimate = result.truth.joints, result.motion.joints
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
-        measured = result.measures.as_dict()
+        measured = asdict(result.measures)
         row = {
             **{name: measured[name] for name in MEASURES if name not in UNLIKE},
-            "warnings": result.summary["warnings"],
+            "warnings": result.course.warnings,
             "evaluations_used": result.measures.evaluations,
-            "dimensions": result.summary["dimensions"],
+            "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],
-            "mode_reliability": _mode_reliability(result.estimates, truth, result.motion.skeleton),
-            "trace": anytime_trace(result.estimates),
+            "mode_reliability": _mode_reliability(result.frames, truth, result.motion.skeleton),
+            "trace": anytime_trace(result.frames),
         }
         return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 
@@ -298,31 +298,16 @@ def anytime_trace(frames: "list[Frame]") -> dict[str, list[float]]:
     """
     import numpy as np
 
-    searched = [frame for frame in frames if len(frame.history)]
+    searched = [frame.trace for frame in frames if len(frame.trace)]
     if not searched:
         return {"evaluations": [], "cost": []}
-    spent = [_spent(frame) for frame in searched]
-    points = np.unique(np.concatenate(spent))
-    points = points[points >= max(one[0] for one in spent)]  # from where every frame has a cost
+    points = np.unique(np.concatenate([trace[:, 0] for trace in searched]))
+    points = points[points >= max(trace[0, 0] for trace in searched)]  # from where every frame has a cost
     if len(points) > MAX_TRACE_POINTS:
         wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
         points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
-    costs = [
-        frame.history[np.searchsorted(one, points, side="right") - 1]
-        for frame, one in zip(searched, spent, strict=True)
-    ]
-    mean = np.mean(costs, axis=0)
+    mean = np.mean([trace[np.searchsorted(trace[:, 0], points, side="right") - 1, 1] for trace in searched], axis=0)
     return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
-
-
-def _spent(frame: "Frame") -> "Array":
-    """Return the evaluations (populations,) after each population; of equal ones where the tracker does not say."""
-    import numpy as np
-
-    if frame.spent is not None:
-        return np.asarray(frame.spent)
-    count = len(frame.history)
-    return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
 
 
 def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:

@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,12 @@ from posefit.footage.scene import Scene
 from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.output.folder import OutputFolder, Recorder
+from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
-from posefit.tracking.identity import Digest, digest_of
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
-from posefit.tracking.outputs import Output, OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
@@ -68,19 +68,21 @@ def track(
         if value and out is None:
             raise InputError(f"{name} must be given with out, the folder of the track, got none")
     progress = progress or interactive()
-    folder = Output()
+    recorder = Recorder()
     if out is not None:
-        folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
-    with folder as output:
+        recorder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
+    with recorder:
         with progress.phase("masks"):
             scene = scene or scene_of(sources, progress, **chosen.view)
-        names = {
-            "source": [each.name if isinstance(each, Motion) else name_of(each) for each in sources],
-            "frames_chosen": list(chosen.frames),
-            "view_degrees": options.get("view_degrees"),
-        }
         training = training_motions(clips, scene.fps)
-        return track_scene(scene, training, chosen, output=output, progress=progress, source=names)
+        track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
+        names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]
+        view_degrees = options.get("view_degrees")
+        setup = replace(track.setup, source=names, frames_chosen=list(chosen.frames), view_degrees=view_degrees)
+        track = replace(track, setup=setup)
+        with progress.phase("write"):
+            recorder.finish(scene, track.frames, track.table, track.gait, track.summary)
+        return track
 
 
 def fit(source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any) -> Fit:

@@ -27,10 +27,10 @@ from posefit.progress import QUIET, Progress
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart
+from posefit.tracking.restarts import GAP, RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart, relocalised
 
 METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
-WHOLE = ("frames", "size", "label", "holes", "hypotheses", "passes", "smooth", "body_frames")  # need all frames
+WHOLE = ("frames", "size", "label", "holes", "hypotheses", "smooth", "body_frames")  # need all frames
 LINES, ARRAYS = "frames.jsonl", "poses.npz"
 
 
@@ -93,7 +93,8 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
             progress.log(f"looking for the first pose, {restarts} times")
             task, _ = best_restart(task, scene.observations, method.follow, restarts, chosen.seed)
-        for frame in method.relocalising(task, footage=True).track(coming(), np.random.default_rng(chosen.seed)):
+        gap = GAP if method.relocalise_gap is None else method.relocalise_gap
+        for frame in relocalised(task, method.follow, coming(), np.random.default_rng(chosen.seed), gap):
             live = waiting.popleft()
             came, began = live.source.arrived, first[0].source.arrived
             yield LiveFrame(live.source.number, came - began, time.perf_counter() - came, live.usable, frame)

@@ -14,24 +14,17 @@ from posefit import settings
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
+from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation, Prediction, SynthesisTracker, Task, Tracker
-from posefit.fitting.validation import (
-    Audit,
-    AuditedTracker,
-    BrokenRuleError,
-    CheckedOptimiser,
-    CheckedPrior,
-    plugin_errors,
-)
+from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser, CheckedPrior, plugin_errors
 from posefit.footage.source import Footage, kind_of
 from posefit.motion import built_in, recorded
 from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import GAP, RelocalisingTracker
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
@@ -87,41 +80,26 @@ def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
         train = [recorded.LIBRARY]
     train = train or built_in.other_styles(str(source) if known else "walk")
     evaluations = options.evaluations
-    if method == DEFAULT_TRACKER and evaluations is options.iterations is options.population_size is None:
+    if method == DEFAULT_TRACKER and evaluations is None:
         evaluations = DEFAULT_TRACKER_EVALUATIONS
     return options.changed(method=method, train=train, evaluations=evaluations)
 
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A method ready to track: a prior has been learned, and trackers are made of it."""
+    """A method ready to track: its prior has learned, and `build` makes a tracker of a task."""
 
     name: str
     prior: Prior | None  # of a tracker of its own, None
-    beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
-    audit: Audit  # of what the trackers made of it report
+    looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
     relocalise_gap: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
-    _make: Callable[[Task, float], Tracker] = field(repr=False)
-
-    def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
-        """Return a tracker for a task, whose plugin may take so many seconds longer to propose a population."""
-        return self._make(task, patience)
-
-    def looks_ahead(self, task: Task) -> bool:
-        """Return whether the tracker of a task takes several observations before it gives a frame."""
-        return getattr(self.tracker(task), "lag", None) is not None
-
-    def relocalising(self, task: Task, footage: bool) -> Tracker:
-        """Return a tracker that in footage relocalises after gaps, unless it looks ahead."""
-        tracker, gap = self.tracker(task), self.relocalise_gap
-        if gap is None:
-            gap = GAP if footage and getattr(tracker, "lag", None) is None else 0
-        return RelocalisingTracker(task, self.follow, gap) if gap else tracker
+    audit: Audit  # of what its trackers report
+    build: Callable[[Task], Tracker] = field(repr=False)
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""
-        return self.tracker(task).track(observations, rng)
+        return drive(self.build(task), task, observations, rng, self.audit)
 
     def dimensions(self, task: Task) -> int | None:
         """Return how many coordinates a proposal has; None of a tracker of its own, which need not have any."""
@@ -147,7 +125,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     mine = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     mine.setdefault("prior", {})
     given = mine["optimiser"]
-    mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations, options.population_size)
+    mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations)
     mine["optimiser"] = settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
     if prior is not None:
         with _rules(prior):
@@ -161,18 +139,17 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **mine["tracker"]})
     tilt = prediction.tilted(learned, task.training)
 
-    def make(task: Task, patience: float) -> Tracker:
-        limit = None if options.ask_seconds is None else options.ask_seconds + patience
-
-        def build(space: Space, rng: np.random.Generator) -> Optimiser:
+    def build(task: Task) -> Tracker:
+        def optimiser_of(space: Space, rng: np.random.Generator) -> Optimiser:
             with _rules(optimiser):
                 made = optimiser.factory(space, rng, **mine["optimiser"])
-            return CheckedOptimiser(made, space, optimiser.label, limit, task.evaluations)
+            return CheckedOptimiser(made, space, optimiser.label, task.evaluations)
 
-        return SynthesisTracker(task, learned, build, optimiser.next_frame, prediction, tilt)
+        return SynthesisTracker(task, learned, optimiser_of, optimiser.next_frame, prediction, tilt)
 
     label = f"{optimiser.name}@{name}"
-    return Method(label, learned, prediction.beta, mine, Audit(), prediction.relocalise_gap, make)
+    audit = Audit(label, prediction.beta)
+    return Method(label, learned, mine, False, prediction.relocalise_gap, audit, build)
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
@@ -216,14 +193,14 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
     defaults = {setting.name: setting.default for setting in offer.settings}
     beta = {"beta": BETA, **defaults, **mine}["beta"]  # of the costs that it gives
     beta = float(beta) if isinstance(beta, float | int) else BETA
-    audit = Audit()
 
-    def make(task: Task, _patience: float) -> Tracker:
+    def build(task: Task) -> Tracker:
         with _rules(offer):
-            tracker = offer.factory(task, **mine)
-        return AuditedTracker(tracker, task, offer.label, beta, audit)
+            tracker: Tracker = offer.factory(task, **mine)
+        return tracker
 
-    return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
+    gap = 0 if offer.looks_ahead else None
+    return Method(offer.name, None, {"tracker": mine}, offer.looks_ahead, gap, Audit(offer.label, beta), build)
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
@@ -266,4 +243,6 @@ def _offered(kind: Kind, chosen: "str | Callable[..., Any] | None") -> Offer:
     if isinstance(chosen, str):
         return registry().offer(kind, chosen)
     frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"
-    return Offer(kind, getattr(chosen, "__name__", type(chosen).__name__), chosen, "the caller", "", frames)
+    looks_ahead = bool(getattr(chosen, "looks_ahead", False))
+    name = getattr(chosen, "__name__", type(chosen).__name__)
+    return Offer(kind, name, chosen, "the caller", "", frames, looks_ahead)

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from posefit.errors import InputError
 from posefit.fitting.check import finite_number, one_of, pair, whole
-from posefit.limits import HEIGHTS, RATES, SECONDS
+from posefit.limits import HEIGHTS, RATES
 from posefit.reading import quoted
-from posefit.settings import POPULATION_SIZE
 
 if TYPE_CHECKING:
     from posefit.fitting.optimiser import OptimiserFactory
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from posefit.geometry.calibration import Up
     from posefit.geometry.camera import Camera
 
-ITERATIONS = 60  # C of the SAPSO paper, section 5.2
+EVALUATIONS = 2440  # of a frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
 
 Check = Callable[[str, Any], Any]  # of a name and a value that is not None: the value as it is used; raises InputError
@@ -207,11 +206,8 @@ class TrackOptions:
         ", a share of the person's area",
     )
     evaluations: int | None = _int(
-        None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 2440.", 1, "POSES"
+        None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.", 1, "POSES"
     )
-    population_size: int | None = _int(None, "N, by default 40.", 1)
-    iterations: int | None = _int(None, "C, by default 60.", 1, "C")
-    ask_seconds: float | None = _float("How long a plugin may take to propose a population.", SECONDS, "SECONDS")
     translation: "Translation | None" = option(
         None,
         "Of the root: known (the truth), searched, or aligned.",
@@ -227,7 +223,6 @@ class TrackOptions:
     smooth: bool | None = option(
         None, "The root moves smoothly, and feet do not slide; the default for footage.", parse=bool, identifies=False
     )
-    passes: int = _int(1, "How often a smooth track is followed.", 1, identifies=False)
     seed: int = _int(0, "Of all random numbers.", 0)
     threads: int = _int(1, "The result is the same with any number.", 1, identifies=False)
     device: str = option(
@@ -241,13 +236,6 @@ class TrackOptions:
                 object.__setattr__(self, each.name, each.default)
             elif value is not each.default and check is not None:
                 object.__setattr__(self, each.name, check(each.name, value))
-        if self.evaluations is not None and self.iterations is not None:
-            raise InputError("evaluations and iterations must not both be given: a budget has so many iterations")
-
-    @property
-    def budget(self) -> int:
-        """The evaluations of a frame: N (C + 1) where they are not given."""
-        return self.evaluations or (self.population_size or POPULATION_SIZE) * ((self.iterations or ITERATIONS) + 1)
 
     @property
     def view(self) -> dict[str, Any]:

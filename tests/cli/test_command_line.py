@@ -29,7 +29,7 @@ from tests.commands import error_of, printed, run
 from tests.files import arrays
 from tests.plugins.test_registry import point, registering
 
-FEW = ["--population-size", "10", "--iterations", "4"]
+FEW = ["--evaluations", "50", "--set", "annealed.population_size=10"]
 QUICK = [*FEW, "--size", "120x90"]
 FILES = {
     "poses.npz", "track.amc", "track.bvh", "track.trc", "track.c3d", "track.glb", "track.mot", "model.osim",
@@ -101,18 +101,17 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
 
 
 def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
-    tracks = [
-        posefit.track("walk", frames=(0, 4), population_size=40, iterations=5, seed=3, threads=threads)
-        for threads in (1, 2)
-    ]
+    tracks = [posefit.track("walk", frames=(0, 4), evaluations=240, seed=3, threads=threads) for threads in (1, 2)]
     np.testing.assert_array_equal(tracks[0].motion.poses, tracks[1].motion.poses)
-    other = posefit.track("walk", frames=(0, 4), population_size=40, iterations=5, seed=4)
+    other = posefit.track("walk", frames=(0, 4), evaluations=240, seed=4)
     assert np.abs(other.motion.poses - tracks[0].motion.poses).max() > 0.0
 
 
 def test_the_command_is_the_typed_call() -> None:
     summary = printed("track", "walk", "--frames", "0:3", "--seed", "7", *QUICK)
-    called = posefit.track("walk", frames=(0, 3), seed=7, population_size=10, iterations=4, size=(120, 90)).summary
+    called = posefit.track(
+        "walk", frames=(0, 3), seed=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90)
+    ).summary
     for key in KEYS - TIMES:
         assert summary[key] == called[key]
 
@@ -121,9 +120,9 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     summary = printed("fit", "walk", "--frame", "7", "--out", tmp_path / "fit", *QUICK)
     assert len(summary["pose_degrees"]) == 66
     assert summary["frames"] == 1
-    fit = posefit.fit("walk", frame=7, population_size=10, iterations=4, size=(120, 90))
+    fit = posefit.fit("walk", frame=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90))
     np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
-    assert fit.history.ndim == 1
+    assert fit.trace.shape[1] == 2
 
 
 def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -459,7 +458,7 @@ def test_a_setting_that_makes_no_sense_is_one_line() -> None:
     [
         ("--help", "numba scipy cv2 sklearn numpy pandas tqdm"),
         (
-            "track walk --frames 0:2 --size 120x90 --population-size 20 --iterations 3 --out OUT",
+            "track walk --frames 0:2 --size 120x90 --evaluations 80 --out OUT",
             "sklearn scipy.stats scipy.optimize pandas matplotlib cmaes skimage",
         ),
     ],

@@ -51,7 +51,7 @@ def test_a_cost_has_the_same_bits_whatever_stands_beside_it(
     parts = [problem.evaluate(proposals[k : k + 7]) for k in range(0, 1000, 7)]
     np.testing.assert_array_equal(np.concatenate(parts), costs)
     np.testing.assert_array_equal([problem.evaluate(proposal[None])[0] for proposal in proposals[:20]], costs[:20])
-    np.testing.assert_array_equal(problem.cost(*problem.decode(proposals)), costs)
+    np.testing.assert_array_equal(problem.cost_and_areas(*problem.decode(proposals))[0], costs)
     assert problem.evaluate(proposals[:0]).shape == (0,)
 
 
@@ -93,7 +93,8 @@ def test_a_proposal_means_the_same_pose_at_every_size(problem: PoseProblem, tran
 
 def test_small_pictures_rank_poses_as_the_whole_one_does_and_the_true_one_first(problem: PoseProblem) -> None:
     sizes = [problem.coarser(factor) for factor in (1, 2, 4)]
-    assert [size.cost(WALK.poses[:1], WALK.translations[:1]).tolist() for size in sizes] == [[0.0]] * 3
+    true = WALK.poses[:1], WALK.translations[:1]
+    assert [size.cost_and_areas(*true)[0].tolist() for size in sizes] == [[0.0]] * 3
     costs = np.array([size.evaluate(drawn(problem, 300)) for size in sizes])
     ranks = costs.argsort(axis=1).argsort(axis=1)
     whole, half, quarter = ranks - ranks.mean()

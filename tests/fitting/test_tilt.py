@@ -132,7 +132,7 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     learned = PCA().fit(task.angles)
 
     def tilt(choice: TrackOptions) -> Tilt | None:
-        tracker = prepare(choice, task).tracker(task)
+        tracker = prepare(choice, task).build(task)
         assert isinstance(tracker, SynthesisTracker)
         return Follower(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from posefit.evaluation.measures import BASELINES, MEASURES
 from posefit.report.columns import COLUMNS, TABLE_FIGURES
 from posefit.sweep.cell import run_cell
-from posefit.tracking.measures import BASELINES, MEASURES
 from tests.report.contests import FIRST
 
 CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=80)

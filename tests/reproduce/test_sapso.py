@@ -12,10 +12,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from posefit.cli import main
+from posefit.evaluation.measures import BASELINES
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
 from posefit.tracking.front import track
-from posefit.tracking.measures import BASELINES
 from posefit_reproduce.sapso.experiment import (
     Run,
     baseline_poses,
@@ -232,7 +232,7 @@ def test_the_swarm_of_figure_5_is_that_of_a_search(walk: PaperMotion) -> None:
         settings={"tracker.tilt": "box"},  # Interpretation S16
         seed=1,
     )
-    np.testing.assert_array_equal(seen.history, again.estimates[0].history)
+    np.testing.assert_array_equal(seen.history, again.frames[0].trace[:, 1])
     # the best pose of all iterations is the search's result
     best = [poses[k] for poses, k in zip(seen.poses, seen.best, strict=True)]
     assert any(np.array_equal(one, again.motion.poses[0]) for one in best)

@@ -7,10 +7,11 @@ import pytest
 
 from posefit import Start
 from posefit.arrays import Array
+from posefit.fitting.weights import weigh
 from posefit.testing.toy import Toy, ball
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
-from posefit_filters.weighting import sharpness, survival, systematic_rows, weigh
+from posefit_filters.weighting import sharpness, survival, systematic_rows
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)

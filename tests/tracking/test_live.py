@@ -26,7 +26,7 @@ from posefit.silhouette.cost import project
 from posefit.tracking.live import track_live, write_live
 from tests.cases import each
 
-QUICK = {"evaluations": 200, "population_size": 20, "restarts": 2, "view_degrees": 45.0}
+QUICK = {"evaluations": 200, "restarts": 2, "view_degrees": 45.0}
 
 
 def pgm(mask):

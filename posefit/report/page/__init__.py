@@ -19,9 +19,9 @@ so that each has a contrast of at least 4.5 to 1 with its background. Marks dist
 
 from typing import Any
 
+from posefit.output.drawing import OTHER, hexadecimal
+from posefit.output.page import BODY_DARK, BODY_LIGHT
 from posefit.page.document import assembled, colour_style, one_script, part
-from posefit.tracking.drawing import OTHER, hexadecimal
-from posefit.tracking.page import BODY_DARK, BODY_LIGHT
 
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
 SCRIPTS = ("methods", "curves", "first", "tables", "compare", "gallery", "main")  # in this order

@@ -11,12 +11,11 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.errors import LOST, Table
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import project
-from posefit.silhouette.foreground import Image
-from posefit.tracking.drawing import (
+from posefit.output.drawing import (
     BACKGROUND,
     BOTH,
     LINES,
@@ -32,10 +31,12 @@ from posefit.tracking.drawing import (
     width_of,
     write,
 )
-from posefit.tracking.evaluation import LOST
+from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Image
 from posefit.uncertainty.calibration import MAIN_LEVEL
 from posefit.uncertainty.modes import Mode, other_mode
 
+Row = Mapping[str, float]  # of a table
 PANEL = 480  # pixels high
 OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)  # of neither, the mask, the body, and both
 SUMMARY_STILLS = 6  # frames on the summary
@@ -61,7 +62,7 @@ class Painter:
         self,
         frame: Frame,
         observation: Observation,
-        row: Mapping[str, float],
+        row: Row,
         filmed: Image | None = None,
         radii: Array | None = None,
     ) -> Image:
@@ -100,7 +101,7 @@ class Painter:
         self._count += 1
         return image
 
-    def _still(self, image: Image, row: Mapping[str, float]) -> Image:
+    def _still(self, image: Image, row: Row) -> Image:
         """Return a small picture whose words are large enough to be read in a page."""
         still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
@@ -144,7 +145,7 @@ class Painter:
         panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]
         return _grid(panels, columns, 0)
 
-    def summary(self, rows: Sequence[Mapping[str, float]], notes: Sequence[str] = ()) -> Image:
+    def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
         """Return notes and stills of the track, above a curve of its error, or of its cost where truth is unknown."""
         grid = _grid(self._stills, 2, BACKGROUND[0])
         width = grid.shape[1]
@@ -157,8 +158,8 @@ class Painter:
         if self._scene.pictures is None:
             parts.append(blank(LABEL_HEIGHT, width))
             _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
-        name = "error_degrees" if "error_degrees" in rows[0] else "cost"
-        return np.vstack([*parts, curve([row[name] for row in rows], name.replace("_", " "), width, 180)])
+        name = "error_degrees" if "error_degrees" in table else "cost"
+        return np.vstack([*parts, curve(table[name].tolist(), name.replace("_", " "), width, 180)])
 
 
 def _draw_border(image: Image, width: int) -> None:

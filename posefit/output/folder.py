@@ -4,50 +4,33 @@ Until it is whole it stands beside its place, hidden, with every frame that was 
 early, because a disk is full or it is stopped, those frames are kept, and the same track can go on from them.
 """
 
-import csv
 import json
 import os
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import repeat
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.evaluation.errors import Table
 from posefit.files import MARK, Unfinished, other_entries
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.footage.video import VideoWriter
-from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
+from posefit.measuring.gait import Gait
+from posefit.output.files import FILES, write_files
+from posefit.output.identity import Digest, difference
 from posefit.reading import cut, parsed_json, read_text
-from posefit.silhouette.foreground import Image
-from posefit.tracking.evaluation import unseen
-from posefit.tracking.identity import Digest, difference
-from posefit.tracking.measures import Rows
-from posefit.tracking.page import track_document
-from posefit.tracking.page.content import track_data
-from posefit.tracking.page.stills import Stills
-from posefit.tracking.picture import Painter
-from posefit.tracking.table import undetermined
-from posefit.tracking.trajectory import motion_of
-from posefit.uncertainty.calibration import LEVELS
-from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import Posterior
 
-_MOTION_FILES = ("poses.npz", "track.amc", "skeleton.asf", "track.bvh", "track.glb", "track.trc", "track.c3d")
-_OPENSIM = ("track.mot", "model.osim")
-_TABLES = ("frames.csv", "angles.csv", "gait.csv", "summary.json", "camera.json")
-FILES = (*_MOTION_FILES, *_OPENSIM, *_TABLES, "overlay.mp4", "summary.png", "track.html")
 _RECORD = "frames.jsonl"
 SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 
 
-class Output:
-    """Where a track goes; here nowhere."""
+class Recorder:
+    """Where the frames of a track are recorded as they come; here nowhere."""
 
     def __enter__(self) -> Self:
         return self
@@ -62,11 +45,11 @@ class Output:
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
 
-    def finish(self, scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> None:
+    def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
         """Write everything."""
 
 
-class OutputFolder(Output):
+class OutputFolder(Recorder):
     """Writes beside the target and renames at the end. Raises ValueError where the target may not be written.
 
     `spec` is what a track has to have in common with the one that it resumes.
@@ -116,7 +99,7 @@ class OutputFolder(Output):
                 for earlier in Unfinished.interrupted(self.path):
                     earlier.remove(_MINE)
                 self._place = Unfinished.begin(self.path, self._spec)
-            self._building = self._place.path
+            self.building = self._place.path
         except OSError as error:
             raise InputError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
         return self
@@ -128,14 +111,14 @@ class OutputFolder(Output):
                 self._place.finish(_MINE, self._force)
             except OSError as taken:
                 self._place.close()
-                where = f"{taken.strerror}; the results are in {self._building}"
+                where = f"{taken.strerror}; the results are in {self.building}"
                 raise InputError(f"{self.path}: expected its name to be free, got {where}") from None
             (self.path / _RECORD).unlink(missing_ok=True)
             return
         kept = ""
         if self._recorded:
             for name in FILES:
-                (self._building / name).unlink(missing_ok=True)
+                (self.building / name).unlink(missing_ok=True)
             kept = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
             self._place.close()
         else:
@@ -152,7 +135,7 @@ class OutputFolder(Output):
         frames: list[Frame] = []
         kept: list[bytes] = []
         state: dict[str, Any] | None = None
-        path = self._building / _RECORD
+        path = self.building / _RECORD
         recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
         for number, line in enumerate(recorded.splitlines(keepends=True), 1):
             try:
@@ -174,35 +157,15 @@ class OutputFolder(Output):
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
         posterior = None if frame.posterior is None else frame.posterior.as_dict()
-        row = {**vars(frame), "posterior": posterior, "modes": (), "state": state}
+        row = {**vars(frame), "posterior": posterior, "state": state}
         text = json.dumps(row, default=_encoded).encode()
-        with (self._building / _RECORD).open("ab") as file:
+        with (self.building / _RECORD).open("ab") as file:
             file.write(b"%08x %s\n" % (zlib.crc32(text), text))
         self._recorded += 1
 
-    def finish(self, scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> None:
+    def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
         """Write everything."""
-        import cv2
-
-        folder, stills = self._building, Stills(scene)
-        painter = Painter(scene, [row["usable"] == 1.0 for row in rows])
-        intervals = intervals_of(scene.body.skeleton, frames)
-        radii = intervals.get("joint_radii", repeat(None))
-        _write_formats(folder, scene, frames, rows, summary, intervals)
-        writer: VideoWriter | None = None
-        for frame, observation, picture, row, frame_radii in zip(frames, *_filmed(scene), rows, radii, strict=False):
-            stills.add(frame, observation, picture)
-            image = painter.add(frame, observation, row, picture, frame_radii)
-            if writer is None:
-                writer = VideoWriter(folder / "overlay.mp4", scene.fps, (image.shape[1], image.shape[0]))
-            writer.write(image)
-        assert writer is not None
-        writer.close()
-        notes = ("" if summary["trust"] is None else summary["trust"]["sentence"], undetermined(summary))
-        if not cv2.imwrite(str(folder / "summary.png"), painter.summary(rows, [*filter(None, notes)])):
-            raise OSError("no room for summary.png")
-        page = track_document(track_data(scene, frames, rows, summary, intervals, stills))
-        (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
+        write_files(self.building, scene, frames, table, gait, summary)
 
 
 def _unmarked(folder: Path) -> list[str]:
@@ -214,14 +177,6 @@ def _unmarked(folder: Path) -> list[str]:
         return names
     marked = isinstance(summary, dict) and {"version", "method", "evaluations", "trust"} <= summary.keys()
     return [] if marked else names
-
-
-def page_of(scene: Scene, frames: Sequence[Frame], rows: Rows, summary: dict[str, Any]) -> str:
-    """Return the page of a track, `track.html`."""
-    stills = Stills(scene)
-    for frame, observation, picture in zip(frames, *_filmed(scene), strict=False):
-        stills.add(frame, observation, picture)
-    return track_document(track_data(scene, frames, rows, summary, intervals_of(scene.body.skeleton, frames), stills))
 
 
 def _encoded(value: Any) -> Any:
@@ -246,80 +201,3 @@ def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
     state, posterior = row.pop("state"), row.pop("posterior")
     np.random.default_rng(0).bit_generator.state = state  # raises where it is none
     return Frame(**row, posterior=None if posterior is None else Posterior.from_dict(posterior)), state
-
-
-def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
-    """Return how far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
-
-    `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
-    """
-    if all(frame.posterior is None for frame in frames):
-        return {}
-    radii = np.full((len(frames), len(LEVELS), len(JOINTS)), np.nan)
-    halves = np.full((len(frames), len(LEVELS), ANGLES), np.nan)
-    for k, frame in enumerate(frames):
-        if frame.posterior is not None:
-            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose)
-            halves[k] = angle_intervals(frame.posterior, frame.pose)
-    return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
-
-
-def _filmed(scene: Scene) -> tuple[Iterable[Observation], Iterable[Image | None]]:
-    """Return what was observed in each frame, and the footage of each, None where there is none."""
-    return scene.observations, repeat(None) if scene.pictures is None else scene.pictures()
-
-
-def _write_formats(
-    folder: Path,
-    scene: Scene,
-    frames: Sequence[Frame],
-    rows: Rows,
-    summary: dict[str, Any],
-    intervals: Mapping[str, Array],
-) -> None:
-    """Write every file of a track to a folder but for its pictures and its page; see `FILES`."""
-    from posefit.measuring.c3d import write_c3d
-    from posefit.measuring.centres import PLACES
-    from posefit.measuring.gait import gait_of
-    from posefit.measuring.tables import write_angles, write_gait, write_trc
-    from posefit.motion.amc import write_amc
-    from posefit.motion.asf import write_asf
-    from posefit.motion.bvh import write_bvh
-    from posefit.motion.gltf import write_glb
-    from posefit.motion.opensim import write_mot, write_osim
-
-    estimate = motion_of(scene, frames)
-    np.savez_compressed(
-        folder / "poses.npz",
-        poses=estimate.poses,
-        translations=estimate.translations,
-        fps=np.array(estimate.fps),
-        joints=np.array(JOINTS),
-        places=np.array(PLACES),
-        costs=np.array([frame.cost for frame in frames]),
-        radii=scene.body.radii,
-        **dict[str, Any](intervals),
-    )
-    write_asf(folder / "skeleton.asf", estimate.skeleton)
-    write_amc(folder / "track.amc", estimate)
-    write_bvh(folder / "track.bvh", estimate)
-    write_glb(folder / "track.glb", estimate, scene.body.radii)
-    write_osim(folder / "model.osim", scene.body, PLACES)
-    write_mot(folder / "track.mot", estimate)
-    blank = unseen(rows)
-    gait = gait_of(estimate, blank)
-    write_trc(folder / "track.trc", estimate, blank)
-    write_c3d(folder / "track.c3d", estimate, blank, gait)
-    write_angles(folder / "angles.csv", estimate, blank)
-    write_gait(folder / "gait.csv", gait)
-    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
-    names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
-    with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*rows[0], "activity", *names])
-        for k, (row, frame, points) in enumerate(zip(rows, frames, estimate.joints, strict=True)):
-            values = ["" if np.isnan(value) else value for value in row.values()]
-            writer.writerow(
-                [*values, frame.activity, *("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))]
-            )
-    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
