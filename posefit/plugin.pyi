@@ -21,6 +21,7 @@ from posefit.fitting.check import whole as whole
 from posefit.fitting.optimiser import Adapter as Adapter
 from posefit.fitting.optimiser import Filter as Filter
 from posefit.fitting.optimiser import Optimiser as Optimiser
+from posefit.fitting.optimiser import check_tell as check_tell
 from posefit.fitting.optimiser import finite_costs as finite_costs
 from posefit.fitting.prior import Prior as Prior
 from posefit.fitting.tracker import Frame as Frame

@@ -60,13 +60,19 @@ def without_settings(text: str) -> str:
     return _LIST.sub("", text).strip()
 
 
-def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Return nothing. Raises ValueError where a setting is unknown, listing the known, or its type is wrong."""
+def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings, numbers of NumPy as Python's own.
+
+    Raises ValueError where one is unknown, listing the known, or its type is wrong.
+    """
     known = {setting.name: setting for setting in settings_of(factory)}
+    values = {}
     for name, value in given.items():
-        setting = _known(plugin, name, known)
-        if not accepts(setting.annotation, value):
+        setting, plain = _known(plugin, name, known), _plain(value)
+        if not accepts(setting.annotation, plain):
             raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(value)}")
+        values[name] = plain
+    return values
 
 
 def planned(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> dict[str, Any]:
@@ -145,6 +151,13 @@ def accepts(annotation: Any, value: Any) -> bool:
     if annotation is int:
         return isinstance(value, int) and not isinstance(value, bool)
     return not (annotation in (bool, str) and not isinstance(value, annotation))
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of NumPy as Python's own, in a tuple too; anything else as it is."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return value.item() if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,)) else value
 
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:

@@ -176,7 +176,6 @@ def _stepwise(optimiser: Optimiser, evaluations: int) -> Generator[Array, float,
 
 def _optimiser(space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]) -> Optimiser:
     offer = registry().offer("optimiser", name)
-    all_settings = planned(offer.factory, settings, evaluations)
-    check(offer.name, offer.factory, all_settings)
+    all_settings = planned(offer.factory, check(offer.name, offer.factory, settings), evaluations)
     optimiser: Optimiser = offer.factory(space, np.random.default_rng(seed), **all_settings)
     return optimiser

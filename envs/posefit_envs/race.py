@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posefit import Optimiser
 from posefit.arrays import Array
-from posefit.fitting.check import whole
+from posefit.fitting.check import pair, whole
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import planned, settings_of
@@ -214,10 +214,8 @@ class RaceEnv(SearchEnv):
 
 def _bounds(generations: Any) -> tuple[int, int]:
     """Return the least and the largest budget. Raises ArgumentError where they are not two numbers in this order."""
-    several = isinstance(generations, Sequence) and not isinstance(generations, str) and len(generations) == 2
-    if not several:
-        raise ArgumentError(f"generations must be two whole numbers such as (100, 220), got {quoted(generations)}")
-    least, most = (int(checked(whole, "generations", number, 1)) for number in generations)
+    ends = checked(pair, "generations", generations, "two whole numbers such as (100, 220)")
+    least, most = (checked(whole, "generations", number, 1) for number in ends)
     if least > most:
         raise ArgumentError(f"generations must be the least and the largest, got {least} and {most}")
     return least, most

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.fitting.check import whole
 
 REDRAWS = 100  # Interpretation S7
 BATCH = 8  # ours: redraws that `sample_normal` makes at once
@@ -75,8 +76,10 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
     itself: the coordinates of (6) are independent and the box is a product, so that this has the distribution of
     redrawing the whole proposal. One still out of the box is then folded back into it. An infeasible proposal is
     redrawn as a whole, and then becomes the start's mean, or the copy of a feasible one. Where nothing around the
-    start is feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
+    start is feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is, and where the
+    count is no whole number above 0.
     """
+    count = whole("count", count, 1)
     drawn = _drawn(space, space.start, rng, count)
     if drawn is None and space.start is not None:
         drawn = _drawn(space, None, rng, count)

@@ -53,9 +53,10 @@ def finite_number(name: str, value: object) -> float:
 
 def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
     """Return two values. Raises ValueError where it is anything else; `what` says what was expected."""
-    if not isinstance(value, tuple | list) or len(value) != 2:
+    values = value.tolist() if hasattr(value, "tolist") else value  # an array
+    if not isinstance(values, tuple | list) or len(values) != 2:
         raise InputError(f"{name} must be {what}, got {quoted(value)}")
-    return value[0], value[1]
+    return values[0], values[1]
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:

@@ -14,8 +14,9 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
-from posefit.fitting.optimiser import finite_costs
+from posefit.fitting.optimiser import check_tell, finite_costs
 from posefit.fitting.weights import effective_sample_size
+from posefit.reading import cut
 
 ALPHA_COV = 2.0
 LAG = 0.1  # of the decomposition, appendix B.2
@@ -75,6 +76,8 @@ class Strategy:
 
     def __init__(self, mean: Array, spread: Array, population: int) -> None:
         """Start around `mean` (d,) with standard deviations `spread` (d,), generations of `population` proposals."""
+        if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
+            raise InputError(f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}")
         d = len(mean)
         self.mean, self.sigma = np.array(mean, dtype=np.float64), math.sqrt(float((spread**2).mean()))
         self.covariance = np.diag(np.maximum(spread / self.sigma, 1e-6) ** 2)  # the least is ours
@@ -157,7 +160,7 @@ class CMAES:
         if population_size != 0:
             at_least("population_size", population_size, 5)
         positive("spread", spread)
-        self.space, self.rng = space, rng
+        self.space, self.rng, self.waiting = space, rng, 0
         self.population_size = population_size or max(default_population_size(space.dimensions), 5)
         self.anywhere = np.full(space.dimensions, spread)
         self._start(self.anywhere if space.start is None else space.start.spread)
@@ -182,12 +185,13 @@ class CMAES:
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
+        self.waiting = len(self.asked)
         return self.asked.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Adapt mean, step size and covariance, and start again where the search has come to an end."""
-        if len(proposals) != self.population_size:
-            raise InputError(f"tell must get a population of {self.population_size}, got {len(proposals)}")
+        check_tell(self.waiting, proposals, costs)
+        self.waiting = 0
         known, mean = finite_costs(costs), self.strategy.mean
         self.home = self.asked[known.argmin()]
         if self.space.periodic.any():  # the mean goes on past the end of a circle, and so must what it learns from

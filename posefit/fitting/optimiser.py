@@ -54,6 +54,19 @@ def finite_costs(costs: Array) -> Array:
     return finite
 
 
+def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
+    """Return nothing. Raises InputError where `tell` gets anything else than a cost for each proposal of `ask`.
+
+    So many proposals wait for their costs; 0 before `ask`, and once they are told.
+    """
+    if not waiting:
+        raise InputError("tell must follow ask, got costs before proposals")
+    for name, values in (("costs", costs), ("proposals", proposals)):
+        if np.shape(values)[:1] != (waiting,):
+            came = len(values) if np.ndim(values) else "one number"
+            raise InputError(f"tell must get {waiting} {name}, got {came}")
+
+
 class Adapter(ABC):
     """Asks a library for proposals and tells it costs: infeasible proposals are repaired, and costs are finite.
 
@@ -80,10 +93,7 @@ class Adapter(ABC):
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the library learn the costs (n,). Raises ValueError where they are not those of what was asked for."""
-        if self._asked is None:
-            raise InputError("tell must follow ask, got costs before proposals")
-        if len(costs) != len(self._asked):
-            raise InputError(f"tell must get {len(self._asked)} costs, got {len(costs)}")
+        check_tell(0 if self._asked is None else len(self._asked), proposals, costs)
         self.learn(np.asarray(proposals), finite_costs(costs))
         self._asked = None
 

@@ -57,7 +57,9 @@ def swept(
         if retry_quarantined:
             count = ledger.release_quarantined()
             say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
-        bar = tqdm(total=ledger.counts().total(), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
+        bar = tqdm(
+            total=ledger.counts().total(), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9, disable=None
+        )
         start: list[int] = []
 
         def watch(tally: Tally) -> None:

@@ -278,7 +278,7 @@ def _method(entry: Entry) -> tuple[str, dict[str, Any], str, str]:
     method = entry["method"]
     chosen = {name.rpartition(".")[2]: value for name, value in entry.get("settings", {}).items()}
     offer = registry().offer("optimiser", method)
-    settings.check(method, offer.factory, chosen)
+    chosen = settings.check(method, offer.factory, chosen)
     return method, chosen, label("name", entry.get("name", "")), version_of([offer.origin])
 
 

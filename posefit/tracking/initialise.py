@@ -1,7 +1,7 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -55,8 +55,7 @@ def initialise(
 
     Also the clocks (2,), see `posefit.fitting.driving.clocks`, at the moment when everything was compiled.
     """
-    with _compiling_announced(progress.log):
-        _warm_up(method, task, scene)
+    _warm_up(method, task, scene)
     start, footage = clocks(), scene.truth is None
     restarts = (RESTARTS if footage and not method.looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
@@ -103,23 +102,3 @@ def _warm_up(method: Method, task: Task, scene: Scene) -> None:
     few = replace(task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size))
     with suppress(ValueError):  # what fails for want of evaluations is reported where it fails with all of them
         next(method.follow(few, [next(iter(scene.observations))], np.random.default_rng(0)))
-
-
-@contextmanager
-def _compiling_announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Announce once that something is compiled that is not in numba's cache."""
-    from numba.core import event
-
-    class Once(event.Listener):  # type: ignore[misc]
-        announced = False
-
-        def on_start(self, _event: event.Event) -> None:
-            if not self.announced:
-                self.announced = True
-                say("compiling the kernels, once on this machine; this takes ten seconds or more ...")
-
-        def on_end(self, _event: event.Event) -> None:
-            pass
-
-    with event.install_listener("numba:compile", Once()):
-        yield

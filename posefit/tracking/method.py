@@ -128,7 +128,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     mine.setdefault("prior", {})
     given = mine["optimiser"]
     mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations)
-    settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
+    mine["optimiser"] = settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
     if prior is not None:
         with _rules(prior):
             learned = prior.factory(**mine["prior"]).fit(task.angles, task.body.skeleton)
@@ -184,7 +184,7 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
         each[name][setting] = value
     for name, (_, factory) in places.items():
         if isinstance(given, Mapping):
-            settings.check(name, factory, each[name])
+            each[name] = settings.check(name, factory, each[name])
         else:
             each[name] = settings.parse(name, factory, each[name])
     return {kind: each[name] for name, (kind, _) in places.items()}

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -70,15 +71,48 @@ def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) ->
     assert run() == (12.0, [])
 
 
-def test_an_empty_or_cut_file_is_a_miss(run: Any, tmp_path: Path) -> None:
+def emptied(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:20])
+
+
+def garbled(file: Path) -> None:
+    file.write_bytes(b"\x80\x05garbage" * 99)
+
+
+def with_zeros(file: Path) -> None:  # what a machine without power leaves
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2] + bytes(len(content) - len(content) // 2))
+
+
+def unreadable(file: Path) -> None:  # whoever reads, the administrator too
+    file.unlink()
+    file.symlink_to(file.name)
+
+
+@pytest.mark.parametrize("damage", [emptied, cut, garbled, with_zeros, unreadable])
+def test_a_damaged_file_is_a_miss(run: Any, tmp_path: Path, damage: Callable[[Path], None]) -> None:
     run()
-    for suffix, length in ((".nbi", 0), (".nbi", 20), (".nbc", 0), (".nbc", 20)):
-        files = list((tmp_path / "cache").rglob(f"*{suffix}"))
+    for pattern in ("*.nbi", "*.nbc", "*.nb?"):
+        files = list((tmp_path / "cache").rglob(pattern))
         assert files
         for file in files:
-            file.write_bytes(file.read_bytes()[:length])
+            damage(file)
         assert run() == (12.0, ["scaled"])
     assert run() == (12.0, [])
+
+
+def test_what_changes_a_number_in_a_file_is_noticed(run: Any, tmp_path: Path) -> None:
+    run()
+    (file,) = (tmp_path / "cache").rglob("*.nbc")
+    content = file.read_bytes()
+    for place in range(40, len(content), len(content) // 4):
+        file.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        assert run() == (12.0, ["scaled"])
+        assert file.read_bytes() == content
 
 
 @pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"])

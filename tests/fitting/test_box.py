@@ -8,6 +8,7 @@ from scipy.stats import kstest, truncnorm
 
 from posefit import SearchSpace, Start
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting import box
 from posefit.fitting.box import converted, draw_population, repair, sample_normal
 from posefit.motion import built_in
@@ -120,3 +121,9 @@ def test_moving_to_another_box_keeps_the_pose() -> None:
     moved_poses, moved_places = new.decode(converted(new, proposals, old))
     np.testing.assert_allclose(moved_poses, poses, atol=1e-12)
     np.testing.assert_allclose(moved_places, places, atol=1e-12)
+
+
+def test_a_population_has_a_whole_number_of_proposals() -> None:
+    for count in (-1, 0, 2.5, True):
+        with pytest.raises(InputError, match="^count must be .*at least 1, got "):
+            draw_population(Toy(3), np.random.default_rng(0), count)  # type: ignore[arg-type]

@@ -57,13 +57,6 @@ def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the
     assert_equals_the_cpu(body, camera, random_poses(np.random.default_rng(3), len(places)), np.array(places))
 
 
-def test_a_pose_that_is_no_number_draws_nothing_and_spoils_no_other(body: Body, camera: Camera) -> None:
-    for bad in [np.nan, np.inf]:
-        poses, places = random_poses(np.random.default_rng(4), 3), np.zeros((3, 3))
-        places[1] = bad
-        assert_equals_the_cpu(body, camera, poses, places)
-
-
 def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit.silhouette.cuda.areas.PART", 3)
     rng = np.random.default_rng(6)

@@ -290,4 +290,4 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     np.testing.assert_allclose(wider.joint_spreads[1:], 0.010)  # 8 mm more, by squares
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]
-    np.testing.assert_allclose(moved.translations[1] - both.frames[0].translation, apart)
+    np.testing.assert_allclose(moved.translations[1] - both[0].translation, apart)

@@ -151,7 +151,7 @@ def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -
     single = posefit.track("walk", view_degrees=90.0, **method, **QUICK)
     summary, hypotheses = track.summary, track.summary["hypotheses"]
     assert summary["warnings"] == []
-    assert summary["evaluations"] == sum(row["evaluations"] for row in track.frames) <= drawn.poses
+    assert summary["evaluations"] == track.table["evaluations"].sum() <= drawn.poses
     assert summary["evaluations"] > 2 * single.summary["evaluations"]
     assert summary["evaluations_per_frame"] == 400
     totals = [hypothesis["cost"] + hypothesis["motion"] for hypothesis in hypotheses]

@@ -25,6 +25,7 @@ from posefit.tracking.restarts import (
     spin_mask,
     surest_ends,
 )
+from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 from tests.tracking.scenes import walk
@@ -138,7 +139,7 @@ def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spi
         for row in rows:
             yield frame(30.0 + 0.1 * row, posterior=posterior(0.2 if rows[-1] else -0.2))
 
-    retracked, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
+    retracked, _, stay = retrack_spins(TASK, OBSERVATIONS, Tracked(frames, []), follow, 0)
     assert stay == (8, 19)  # frames of a spin have no vote
     new = [30.0 if 8 <= k <= 19 else 30.0 + 0.1 * k for k in range(28)]
     assert [np.degrees(f.pose[0]) for f in retracked] == pytest.approx(new)
@@ -172,7 +173,7 @@ def test_a_track_that_gets_no_better_is_kept(
             yield frame(again[row], cost)
 
     frames = frames_facing(degrees)
-    kept, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
+    kept, _, stay = retrack_spins(TASK, OBSERVATIONS, Tracked(frames, []), follow, 0)
     assert stay is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
     assert calls == ([list(range(11, -1, -1))] if tried else [])  # nothing comes after what stays
