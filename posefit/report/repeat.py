@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from posefit.sweep.cell import setting_text
+from posefit.settings import setting_text
 from posefit.sweep.check import FIELDS
 
 LAST_FIELDS = ("instance", "seed")  # the fields that rows with the same head differ in

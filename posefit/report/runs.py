@@ -16,7 +16,8 @@ from posefit.errors import InputError, printable
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
 from posefit.report.searches import Searches
 from posefit.report.tracks import Tracks
-from posefit.sweep.cell import cell_from, setting_text, settings_text
+from posefit.settings import setting_text, settings_text
+from posefit.sweep.cell import cell_from
 
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger

@@ -38,6 +38,14 @@ def test_methods_share_a_letter_where_no_test_shows_a_difference(tmp_path: Path)
     assert {row["name"]: row["letters"] for row in board} == {"a": "a", "c": "a", "b": "b"}
 
 
+def test_letters_are_by_what_holds_for_all_comparisons_together(tmp_path: Path) -> None:
+    # of 6 blocks each method is better in all: p = 2 / 2^6 = 0.031 each, and 0.094 after Holm
+    board = leaderboard(contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0, "c": 3.0}, instances=3)))
+    assert [(row["name"], row["letters"]) for row in board] == [("a", "a"), ("b", "a"), ("c", "a")]
+    (p,) = {row["p"] for row in board if row["p"] is not None}
+    assert p == pytest.approx(3 * 2 / 2**6)
+
+
 def test_the_leaderboard_has_interquartile_means_and_baselines_have_skills_too(tmp_path: Path) -> None:
     contest = contest_of_errors(tmp_path, {("a", i, 0): error for i, error in enumerate([1.0, 2.0, 3.0, 50.0])})
     (row,) = leaderboard(contest)
