@@ -1,10 +1,12 @@
 """The frames of a camera, a network stream or a pipe as they come, and the person in each of them."""
 
+import io
 import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
@@ -68,7 +70,9 @@ class Stream:
         frames: Iterator[Image]
         if source == "-":
             # a file of its own: Python ends by SIGABRT while a thread reads from its standard input
-            frames = netpbm_images(pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb"))
+            with suppress(io.UnsupportedOperation):  # a stream in memory has no file
+                pipe = pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+            frames = netpbm_images(pipe or sys.stdin.buffer)
         else:
             capture = cv2.VideoCapture(int(source) if source.isdigit() else source)
             if not capture.isOpened():
