@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from posefit.plugin import Array, effective_sample_size, weigh
 
+TOLERANCE = 1e-9  # ours: of the beta that is sought, as a share of it
 MAX_SHARPNESS = 1e12  # ours: where more particles than wanted share the lowest cost, none is sharp enough
 
 
@@ -30,8 +31,6 @@ def sharpness(costs: Array, wanted: float) -> float:
 
     The survival rate falls as beta rises.
     """
-    from scipy.optimize import brentq
-
     if survival(costs, 0.0) <= wanted:
         return 0.0
     low, high = 0.0, 1.0
@@ -39,4 +38,11 @@ def sharpness(costs: Array, wanted: float) -> float:
         low, high = high, 2.0 * high
         if high > MAX_SHARPNESS:
             return high
-    return float(brentq(lambda beta: survival(costs, beta) - wanted, low, high))  # DEUTSCHER2005 (beta)
+    above, below = survival(costs, low) - wanted, survival(costs, high) - wanted
+    while high - low > TOLERANCE * high and above - below > 0.0:  # false position, by the Illinois rule
+        beta = (low * below - high * above) / (below - above)  # DEUTSCHER2005 (beta)
+        if (rest := survival(costs, beta) - wanted) > 0.0:
+            low, above, below = beta, rest, 0.5 * below
+        else:
+            high, below, above = beta, rest, 0.5 * above
+    return high
