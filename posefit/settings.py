@@ -60,6 +60,11 @@ def without_settings(text: str) -> str:
     return _LIST.sub("", text).strip()
 
 
+def names(factory: Callable[..., Any]) -> list[str]:
+    """Return the names of a factory's settings."""
+    return [setting.name for setting in settings_of(factory)]
+
+
 def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings, numbers of NumPy as Python's own.
 

@@ -126,11 +126,10 @@ ENGINE = (
 )
 
 
-HEADINGS = {  # the options of a track in its help, by their names in Python
-    "What is seen": "live asf camera up view_degrees size fps frames frame height label holes",
+HEADINGS = {  # of the flags that are no options of a track, by their names in Python
+    "What is seen": "live frame frames",
+    "Method and budget": "without_subject",
     "How the person is taken out of video": "extraction background roi ignore width",
-    "Method and budget": "method settings train without_subject evaluations seed threads device",
-    "How it is followed": "translation first_pose restarts body_frames hypotheses smooth",
     "Results": "out force resume verbose quiet as_json",
 }
 
@@ -142,8 +141,16 @@ class TrackCommand(click.Command):
         """Write the options: those of no heading last."""
         flags = [one for one in self.get_params(context) if isinstance(one, click.Option)]
         records = {one.name: record for one in flags if (record := one.get_help_record(context))}
-        for heading, names in HEADINGS.items():
-            if rows := [records.pop(name) for name in names.split() if name in records]:
+        sections: dict[str, list[str]] = {}
+        heading = ""
+        for field in fields(TrackOptions):
+            heading = declared(field).heading or heading
+            if declared(field).flag != "":
+                sections.setdefault(heading, []).append(field.name)
+        for heading, listed in HEADINGS.items():
+            sections.setdefault(heading, []).extend(listed.split())
+        for heading, names in sections.items():
+            if rows := [records.pop(name) for name in names if name in records]:
                 with formatter.section(heading):
                     formatter.write_dl(rows)
         with formatter.section("Others"):

@@ -34,8 +34,8 @@ MAX_TRACE_POINTS = 64
 FRAME = {
     measure.name: measure
     for measure in (
-        Measure("frame", "frame", "", 0, "number of the frame, from 0"),
-        Measure("seconds", "seconds", "s", 2, "time of the frame, from 0"),
+        Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
+        Measure("seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"),
         Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
         Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
         Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
@@ -79,8 +79,8 @@ def evaluated(
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
     evaluations = np.array([float(frame.evaluations) for frame in frames])
     table = {
-        "frame": np.arange(len(frames)),
-        "seconds": np.arange(len(frames)) / scene.fps,
+        "frame": scene.first + np.arange(len(frames)),
+        "seconds": (scene.first + np.arange(len(frames))) / scene.fps,
         "cost": cost,
         "iou": iou,
         "usable": 1.0 - held,

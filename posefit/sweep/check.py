@@ -12,9 +12,8 @@ from typing import Any
 from posefit import settings
 from posefit.errors import InputError
 from posefit.fitting.check import between, finite_number, one_of, whole
-from posefit.footage.masks import FPS
-from posefit.footage.source import MOTIONS, load_motion, training_clips
 from posefit.motion import built_in, recorded
+from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
 from posefit.reading import SHOWN, quoted, suggestion
 from posefit.registry import Offer, registry, version_of
 from posefit.silhouette.corruption import CORRUPTIONS

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from posefit.errors import InputError
-from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text
+from posefit.reading import SHOWN, cut, parsed_toml, quoted, read_text, suggestion
 from posefit.suites.functions import FUNCTIONS, HELD_OUT
 from posefit.suites.problem import EVALUATIONS
 from posefit.sweep.cell import Cell
@@ -219,7 +219,7 @@ def _gridded(methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequen
 def _check_names(what: str, table: Mapping[str, Any], known: Sequence[str] | Mapping[str, str]) -> None:
     for name in table:
         if name not in known:
-            raise InputError(f"{what} must hold {', '.join(known)}, got {quoted(name)}")
+            raise InputError(f"{what} must hold {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}")
 
 
 def _check_count(lists: Mapping[str, Sequence[Any]]) -> None:
