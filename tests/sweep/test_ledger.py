@@ -320,13 +320,6 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again_
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
 
 
-def test_a_ledger_is_pickled_as_the_places_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(filled(tmp_path / "results", 2).parent)
-    pickled = pickle.dumps(ledger := Ledger("results"))
-    monkeypatch.chdir("/")
-    assert list(pickle.loads(pickled).rows()) == list(ledger.rows())
-
-
 def test_a_row_is_outdated_where_any_part_of_its_version_is_not_the_installed_one(tmp_path: Path) -> None:
     swarm = registry().offer("optimiser", "sapso").origin
     versions = [f"{posefit_build()}, {swarm}", f"{posefit_build()}, posefit_swarm 0ld", f"posefit 0.0.9 a1, {swarm}"]
@@ -336,6 +329,13 @@ def test_a_row_is_outdated_where_any_part_of_its_version_is_not_the_installed_on
         for cell in old:
             ledger.finish(cell.key, result(cell))
     assert Ledger(tmp_path / "results").outdated() == {versions[1]: 1, versions[2]: 1}
+
+
+def test_a_ledger_is_pickled_as_the_places_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(filled(tmp_path / "results", 2).parent)
+    pickled = pickle.dumps(ledger := Ledger("results"))
+    monkeypatch.chdir("/")
+    assert list(pickle.loads(pickled).rows()) == list(ledger.rows())
 
 
 def test_a_ledger_is_read_while_its_driver_writes(tmp_path: Path) -> None:
