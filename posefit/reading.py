@@ -14,6 +14,12 @@ from typing import Any
 
 from posefit.errors import InputError, printable
 
+# names that other libraries have for what is known here
+OTHER_WORDS = {
+    "optimizer": ("optimiser", "method"),
+    "optimizers": ("optimisers", "methods"),
+    "optimisers": ("methods",),
+}
 SHOWN = 80  # characters of a name or value in a message
 DOTS = 1_000  # in a line of TOML, those of decimal numbers aside
 # The sum of their squares over all lines: reading a key of n parts takes memory as n squared. A plan that names 300
@@ -46,8 +52,20 @@ def counted(count: int, word: str) -> str:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return the end of a message about a wrong name, which asks for the nearest known one; "" where none is near."""
-    near = get_close_matches(name[:SHOWN], list(known), 1)
+    names = list(known)
+    others = [other for other in OTHER_WORDS.get(name, ()) if other in names]
+    near = others or get_close_matches(name[:SHOWN], names, 1)
     return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def existing(path: Path) -> Path:
+    """Return a path. Raises InputError where there is nothing, or an empty file."""
+    if not path.exists():
+        expected = "a file" if path.suffix else "a file or a folder"
+        raise InputError(f"{path}: expected {expected}, got nothing of that name")
+    if path.is_file() and not path.stat().st_size:
+        raise InputError(f"{path}: expected a file with content, got an empty one")
+    return path
 
 
 def check_size(path: Path, most: int) -> None:

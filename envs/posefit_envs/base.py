@@ -1,5 +1,6 @@
 """Base classes: searches side by side, a single environment as a vector of one, checked actions, scales."""
 
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
@@ -107,7 +108,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         **arguments: Any,
     ) -> None:
         checked(whole, "num_envs", num_envs, 1)
-        self.world = world_of(**arguments)
+        own = inspect.signature(type(self)).parameters.values()
+        self.world = world_of([one.name for one in own if one.kind is one.KEYWORD_ONLY], **arguments)
         checked(lambda: self.world.learned)  # names motions and priors that are unknown
         check_mode(render_mode)
         mode = getattr(autoreset_mode, "value", autoreset_mode)

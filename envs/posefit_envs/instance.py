@@ -18,10 +18,10 @@ from posefit.arrays import Array
 from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
-from posefit.footage.instance import motion_of_instance, variation
-from posefit.footage.source import load_motion
 from posefit.geometry.body import varied
 from posefit.motion import built_in
+from posefit.motion.clips import load_motion
+from posefit.motion.instance import motion_of_instance, variation
 from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
@@ -78,16 +78,17 @@ class World:
         return int(generator.integers(*SPLITS[self.split])) if self.instance is None else self.instance
 
 
-def world_of(**arguments: Any) -> World:
-    """Return the world that an environment's arguments describe.
+def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
+    """Return the world that an environment's arguments describe; it has some of its `own` besides.
 
     Raises ArgumentError where a value is wrong, and TypeError where there is no argument of that name.
     """
     known = tuple(World.__dataclass_fields__)
     for name in arguments:
         if name not in known:
+            every = *known, *own
             raise TypeError(
-                f"an argument must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+                f"an argument must be one of {', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
             )
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)

@@ -76,8 +76,6 @@ class Strategy:
 
     def __init__(self, mean: Array, spread: Array, population: int) -> None:
         """Start around `mean` (d,) with standard deviations `spread` (d,), generations of `population` proposals."""
-        if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
-            raise InputError(f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}")
         d = len(mean)
         self.mean, self.sigma = np.array(mean, dtype=np.float64), math.sqrt(float((spread**2).mean()))
         self.covariance = np.diag(np.maximum(spread / self.sigma, 1e-6) ** 2)  # the least is ours
@@ -167,6 +165,8 @@ class CMAES:
 
     def _start(self, spread: Array) -> None:
         """Start around a feasible prediction, or else around a fresh draw."""
+        if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
+            raise InputError(f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}")
         start, self.home = self.space.start, draw_population(self.space, self.rng, 1)[0]
         if start is not None and self.space.feasible(start.mean[None])[0]:
             self.home = start.mean

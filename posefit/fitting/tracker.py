@@ -282,7 +282,6 @@ class SynthesisTracker:
 
 def _frame(problem: PoseProblem, best: Minimum) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
-    counts = problem.areas(poses, translations)[:, 0]
+    counts = problem.cost_and_areas(poses, translations)[1][:, 0]
     details = {COORDINATES: problem.space.coordinates(best.proposal)}
-    trace = np.column_stack([best.spent, best.history])
-    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, trace, details=details)
+    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, best.trace, details=details)

@@ -1,5 +1,6 @@
 """The frames of a camera, a network stream or a pipe as they come, and the person in each of them."""
 
+import os
 import sys
 import threading
 import time
@@ -15,11 +16,11 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.images import PIXELS
-from posefit.footage.masks import FPS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
+from posefit.motion.clips import FPS
 from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
@@ -66,7 +67,8 @@ class Stream:
         self._changed = threading.Condition()
         frames: Iterator[Image]
         if source == "-":
-            frames = netpbm_images(pipe or sys.stdin.buffer)
+            # a file of its own: Python ends by SIGABRT while a thread reads from its standard input
+            frames = netpbm_images(pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb"))
         else:
             capture = cv2.VideoCapture(int(source) if source.isdigit() else source)
             if not capture.isOpened():

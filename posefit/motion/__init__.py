@@ -3,6 +3,8 @@
 | looking for | file |
 |---|---|
 | a clip: poses, translations, frames a second; cutting and resampling it | motion.py |
+| a motion by what a user names, at any rate; what methods learn from | clips.py |
+| numbered variations of a motion, as in other benchmarks | instance.py |
 | Acclaim skeletons, such as CMU's `02.asf` | asf.py |
 | Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files at once | amc.py |
 | recorded clips of ten people, with the package | recorded.py |

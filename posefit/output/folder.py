@@ -5,6 +5,7 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 """
 
 import json
+import os
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,16 +15,17 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.evaluation.errors import Table
-from posefit.files import MARK, Unfinished, other_entries
+from posefit.files import MARK, Unfinished, opencv_name, other_entries
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.measuring.gait import Gait
 from posefit.output.files import FILES, write_files
 from posefit.output.identity import Digest, difference
-from posefit.reading import cut
+from posefit.reading import cut, parsed_json, read_text
 from posefit.uncertainty.modes import Posterior
 
 _RECORD = "frames.jsonl"
+SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
 _MINE = (*FILES, _RECORD)  # what a track writes to its folder
 
 
@@ -62,13 +64,16 @@ class OutputFolder(Recorder):
         say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
-        if self.path.exists() and not self.path.is_dir():
-            raise InputError(f"{self.path}: expected a folder to write to, got a file")
-        if self.path.exists() and not force:
-            raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
-        if self.path.exists() and (others := other_entries(self.path, _MINE)):
-            came = f"one with {cut(others[0])}"
-            raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
+        opencv_name(self.path)  # a name that it cannot write is refused before the work
+        if os.path.lexists(self.path):
+            if self.path.is_symlink() or not self.path.is_dir():
+                came = "a link" if self.path.is_symlink() else "a file"
+                raise InputError(f"{self.path}: expected a folder to write to, got {came}")
+            if not force:
+                raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
+            if others := other_entries(self.path, _MINE) or _unmarked(self.path):
+                came = f"one with {cut(others[0])}, which is none of posefit's"
+                raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
         self._recorded, self._force = 0, force
         self._place = self._same() if resume else None
 
@@ -162,6 +167,17 @@ class OutputFolder(Recorder):
     def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
         """Write everything."""
         write_files(self.building, scene, frames, table, gait, summary)
+
+
+def _unmarked(folder: Path) -> list[str]:
+    """Return the files of a folder, unless its summary is one of a track: those are nobody's whom we know."""
+    names = sorted(entry.name for entry in folder.iterdir())
+    try:
+        summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))
+    except (OSError, ValueError):
+        return names
+    marked = isinstance(summary, dict) and {"version", "method", "evaluations", "trust"} <= summary.keys()
+    return [] if marked else names
 
 
 def _encoded(value: Any) -> Any:

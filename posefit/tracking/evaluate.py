@@ -32,7 +32,8 @@ def evaluate(
 ) -> Track:
     """Return a track with errors against the truth where it is known, else signs of trust.
 
-    `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took.
+    `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
+    from the first mask that was read.
     """
     skeleton = scene.body.skeleton
     posteriors = [frame.posterior for frame in frames]

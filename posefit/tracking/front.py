@@ -10,10 +10,13 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
-from posefit.footage.readers import IMAGES, name_of
+from posefit.fitting.driving import clocks
+from posefit.footage.images import IMAGES
+from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
+from posefit.footage.source import Footage, check_used, kind_of, scene_of
 from posefit.motion import built_in
+from posefit.motion.clips import Source, training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
@@ -73,7 +76,11 @@ def track(
         recorder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
     with recorder:
         with progress.phase("masks"):
+            start = clocks()
             scene = scene or scene_of(sources, progress, **chosen.view)
+            if scene.truth is None:  # a known motion is drawn frame by frame, as it is tracked
+                seconds, cpu_seconds = (clocks() - start).tolist()
+                scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
         training = training_motions(clips, scene.fps)
         track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
         names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]

@@ -88,7 +88,9 @@ def track_scene(
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
         with progress.phase("evaluate"):
-            track = evaluate(scene, frames, tracked, shape, method, task, options, clocks() - start)
+            track = evaluate(
+                scene, frames, tracked, shape, method, task, options, clocks() - start + scene.reading_seconds
+            )
     for warning in track.course.warnings[len(scene.warnings) :]:
         progress.warn(warning)
     return track

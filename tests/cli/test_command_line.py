@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -205,9 +206,35 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     assert (out / "summary.json").read_text() == before
     assert run("track", "walk", "--frames", "0:3", "--out", out, "--force", *QUICK).exit_code == 0
     assert json.loads((out / "summary.json").read_text())["frames"] == 3
+    link = tmp_path / "link"
+    link.symlink_to(out)
+    force = ["track", "walk", "--frames", "0:2", "--force", *QUICK, "--out"]
+    assert "link: expected a folder to write to, got a link" in error_of(*force, link)
+    before = sorted(path.name for path in out.iterdir())
     (out / "precious.txt").write_text("mine")
-    assert "precious.txt" in error_of("track", "walk", "--out", out, "--force", *QUICK)
-    assert (out / "precious.txt").read_text() == "mine"
+    assert "got one with precious.txt, which is none of posefit's" in error_of(*force, out)
+    (out / "precious.txt").unlink()
+    (out / "gait.csv").rename(tmp_path / "gait.csv")
+    (out / "gait.csv").mkdir()
+    (out / "gait.csv" / "precious.txt").write_text("mine")
+    assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
+    assert (out / "gait.csv" / "precious.txt").read_text() == "mine"
+    shutil.rmtree(out / "gait.csv")
+    (out / "gait.csv").symlink_to(tmp_path / "gait.csv")
+    assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
+    assert (link.is_symlink(), sorted(path.name for path in out.iterdir())) == (True, before)
+
+
+def test_a_folder_of_somebodys_own_files_is_never_replaced(tmp_path: Path) -> None:
+    for name, content in (("summary.json", '{"version": "mine"}'), ("summary.json", "["), ("angles.csv", "mine")):
+        own = tmp_path / name.partition(".")[0] / str(len(content))
+        own.mkdir(parents=True)
+        (own / name).write_text(content)
+        message = error_of("track", "walk", "--frames", "0:2", "--force", "--out", own, *QUICK)
+        assert f"expected a folder of earlier results to replace, got one with {name}" in message
+        assert [(path.name, path.read_text()) for path in own.iterdir()] == [(name, content)]
+    (tmp_path / "empty").mkdir()
+    assert run("track", "walk", "--frames", "0:2", "--force", "--out", tmp_path / "empty", *QUICK).exit_code == 0
 
 
 def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
@@ -354,6 +381,11 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     passed = {"check": "ranges", "outcome": "passed", "detail": "4 latents", "traceback": ""}
     assert passed in report["results"]
     assert "optimiser must be one of" in error_of("check", "optimiser", "nothing")
+    assert error_of("check", "optimiser", "mixture").endswith("got 'mixture'; its kind is segmenter")
+    assert error_of("check", "optimiser", "pca").endswith("got 'pca'; its kind is prior")
+    assert error_of("check", "optimizer", "sapso").endswith("got 'optimizer'; did you mean 'optimiser'?")
+    assert error_of("track", "walk", "--method", "mixture").endswith("got 'mixture'; its kind is segmenter")
+    assert error_of("track", "walk", "--method", "pca").endswith("got 'pca'; as a prior it is @pca")
     assert "a setting of pca must be one of" in error_of("check", "prior", "pca", "--set", "colour=red")
     assert "a setting must be SETTING=VALUE" in error_of("check", "prior", "pca", "--set", "colour")
 

@@ -106,6 +106,24 @@ def test_fit_ends_at_the_target_or_with_the_budget() -> None:
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
 
 
+def test_the_last_proposal_that_reaches_the_target_terminates_and_does_not_truncate() -> None:
+    proposals = np.array([np.ones(9), np.zeros(9)], dtype=np.float32)
+    env = gym.make("posefit/FitImage-v0", instance=3, target_cost=0.0)
+    env.reset(seed=0)
+    far, near = (env.step(proposal)[4]["cost"] for proposal in proposals)
+    assert near < far
+    limits = {"instance": 3, "target_cost": near, "max_evaluations": 2}
+    env, vector = gym.make("posefit/FitImage-v0", **limits), gym.make_vec("posefit/FitImage-v0", 1, **limits)
+    env.reset(seed=0)
+    vector.reset(seed=0)
+    assert [env.step(proposal)[2:4] for proposal in proposals] == [(False, False), (True, False)]
+    ends = [vector.step(proposal[None])[2:4] for proposal in proposals]
+    assert [(bool(terminated[0]), bool(truncated[0])) for terminated, truncated in ends] == [
+        (False, False),
+        (True, False),
+    ]
+
+
 def test_the_reward_is_the_mismatch_of_the_two_channels() -> None:
     env = gym.make("posefit/FitImage-v0", instance=5, size=(160, 120))
     env.reset(seed=0)
@@ -216,6 +234,8 @@ def test_wrong_arguments_are_named(name: str, arguments: dict[str, Any], message
 def test_unknown_arguments_and_modes_are_named() -> None:
     with pytest.raises(TypeError, match="an argument must be one of motion, .*, got 'nois'; did you mean 'noise'"):
         gym.make("posefit/Track-v0", nois={"holes": 0.3})
+    with pytest.raises(TypeError, match="one of motion, .*, optimiser, .*, got 'optimizer'; did you mean 'optimiser'"):
+        gym.make("posefit/Race-v0", optimizer="cma")
     with pytest.raises(error.UnsupportedMode, match="render_mode must be one of rgb_array, got 'ansi'"):
         gym.make("posefit/Track-v0", render_mode="ansi")
 

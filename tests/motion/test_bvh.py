@@ -10,7 +10,6 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Task
-from posefit.footage.source import load_motion, training_clips
 from posefit.geometry.body import Body
 from posefit.geometry.rotation import rotation_from_joint_angles, wrapped
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS, PARENTS, Skeleton, channel_angles
@@ -21,6 +20,7 @@ from posefit.motion import built_in, bvh, recorded
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import NAMES, read_bvh, write_bvh
+from posefit.motion.clips import load_motion, training_clips
 from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about

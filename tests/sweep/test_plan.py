@@ -14,13 +14,14 @@ from typing import Any
 import pytest
 
 import posefit
+from posefit.evaluation.errors import anytime_trace
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Plugin, Registry
 from posefit.suites.functions import SUITE
 from posefit.sweep import check
-from posefit.sweep.cell import TrackCell, anytime_trace, cell_from, cell_scene, digest_of, run_cell
+from posefit.sweep.cell import TrackCell, cell_from, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking import method
