@@ -206,6 +206,13 @@ def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     assert (np.linalg.norm(forwards, axis=1) > 0.03).all()
     whole = read_bvh(write_rig(tmp_path / "whole.bvh", walk, STYLES["motionbuilder"]))
     assert whole.notes == ()
+    path = write_rig(tmp_path / "short.bvh", walk, STYLES["biovision to wrists and ankles"])
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())  # as some editors save it
+    short = read_bvh(path)
+    assert "without lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand, which are" in short.notes[0]
+    for joint in ("lradius", "rradius", "ltibia", "rtibia"):
+        off = short.joints[:, JOINTS.index(joint)] - walk.joints[:, JOINTS.index(joint)]
+        assert np.abs(off).max() < 1e-5
 
 
 @each(("unit", "axis"), [(unit, axis) for unit in UNITS for axis in ("y", "z")] + [("m", "x"), ("cm", "-y")])
