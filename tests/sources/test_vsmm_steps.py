@@ -476,7 +476,8 @@ def test_the_cycle_that_is_run_again_starts_from_the_frame_before(variant: str) 
         after = switching.cycle(belief, nothing, points)
     measure = twin._lifting(nothing)
     if variant == "patent":
-        expected = twin.decided(twin.imm.cycle(twin.joined(belief, "G3"), measure))
+        both = twin.joined(belief, "G3")
+        expected = twin.decided(twin.imm.cycle(both, measure))
     else:
         old, fused = twin.active, twin.imm.fused(belief)
         twin.bring_in("G3")
