@@ -241,7 +241,8 @@ def test_a_setting_counts_whatever_the_variant_is() -> None:
 
 @each("variant", ["default", "patent"])
 def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    task, observations = seen(frames=6)
+    task, observations = seen(frames=5)
+    observations[3] = blank(observations[3])  # where no joint is detected
     measured: list[np.ndarray] = []
     marks = np.arange(17)[:, None] + np.array([1000.0, 2000.0])  # where no joint is expected
     monkeypatch.setattr(tracker.JointFilter, "follow", lambda *_: marks)
@@ -258,5 +259,5 @@ def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch
         np.testing.assert_array_equal(frame.details["joints"][0][hidden], marks[hidden])
         assert (frame.details["joints"][0][~hidden] < 1000.0).all()
         hidden_joints += int(hidden.sum())
-    assert hidden_joints
+    assert hidden_joints >= 17
     assert any((points >= 1000.0).any() for points in measured) is (variant == "patent")
