@@ -17,7 +17,6 @@ from posefit.fitting.tracker import SynthesisTracker as SynthesisTracker
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
 from posefit.footage.segmentation import Extraction as Extraction
-from posefit.footage.source import load_motion as load_motion
 from posefit.geometry.body import Body as Body
 from posefit.geometry.camera import Camera as Camera
 from posefit.geometry.skeleton import JOINTS as JOINTS
@@ -30,6 +29,7 @@ from posefit.geometry.symmetry import turned_poses as turned_poses
 from posefit.measuring.angles import clinical_angles as clinical_angles
 from posefit.measuring.centres import joint_centres as joint_centres
 from posefit.measuring.gait import gait_of as gait_of
+from posefit.motion.clips import load_motion as load_motion
 from posefit.motion.motion import Motion as Motion
 from posefit.registry import optimiser as optimiser
 from posefit.registry import prior as prior

@@ -87,8 +87,12 @@ def mapped(path: Path) -> NDArray[Any]:
 
 
 @contextmanager
-def archived(path: Path, names: Sequence[str], what: str, packed: int) -> Iterator[dict[str, Stored]]:
+def archived(
+    path: Path, names: Sequence[str], what: str, packed: int, *, single: bool = False
+) -> Iterator[dict[str, Stored]]:
     """Yield those of `names` that an .npz file of at most `packed` bytes has; none of them is unpacked yet.
+
+    With `single` the only array of a file is the first of the names, whatever its own is.
 
     Raises InputError, also while they are read, where the file is damaged or larger; `what` describes the expected
     arrays in messages.
@@ -101,6 +105,8 @@ def archived(path: Path, names: Sequence[str], what: str, packed: int) -> Iterat
             file.longest = packed
             there = set(archive.namelist())
             arrays = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
+            if single and len(there) == 1 and (only := there.pop()).endswith(".npy"):
+                arrays = {names[0]: _stored(path, what, archive, only.removesuffix(".npy"))}
         yield arrays
 
 

@@ -45,6 +45,19 @@ def check_free(path: str | Path | None) -> None:
         check_place(path)
 
 
+def opencv_name(path: str | Path) -> str:
+    """Return a file's absolute name, as OpenCV needs it: a relative one with a colon would be an address.
+
+    Raises InputError where it is no UTF-8, with which OpenCV would end the process.
+    """
+    name = os.path.abspath(path)
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"{path}: expected a name in UTF-8, got one that OpenCV cannot open") from None
+    return name
+
+
 def new_folder(path: str | Path) -> AbstractContextManager[Path]:
     """Yield an empty folder to write to, which takes the name `path` where nothing fails; else nothing is left.
 

@@ -58,6 +58,16 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
+def existing(path: Path) -> Path:
+    """Return a path. Raises InputError where there is nothing, or an empty file."""
+    if not path.exists():
+        expected = "a file" if path.suffix else "a file or a folder"
+        raise InputError(f"{path}: expected {expected}, got nothing of that name")
+    if path.is_file() and not path.stat().st_size:
+        raise InputError(f"{path}: expected a file with content, got an empty one")
+    return path
+
+
 def check_size(path: Path, most: int) -> None:
     """Return nothing. Raises InputError where a file is too large to be read, or is a folder, a pipe or a device."""
     state = path.stat()

@@ -60,6 +60,11 @@ def without_settings(text: str) -> str:
     return _LIST.sub("", text).strip()
 
 
+def names(factory: Callable[..., Any]) -> list[str]:
+    """Return the names of a factory's settings."""
+    return [setting.name for setting in settings_of(factory)]
+
+
 def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings, numbers of NumPy as Python's own.
 
@@ -128,6 +133,20 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
             raise InputError(f"a setting must be given once, got {quoted(name)} twice")
         given[name] = value
     return parse(plugin, factory, given)
+
+
+def settings_text(settings: Mapping[str, Any]) -> list[str]:
+    """Return settings as `--set` takes them."""
+    return [f"{name}={setting_text(value)}" for name, value in settings.items()]
+
+
+def setting_text(value: Any) -> str:
+    """Return a setting's value as `--set` takes it."""
+    if isinstance(value, bool) or value is None:
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return ",".join(setting_text(one) for one in value)
+    return str(value)
 
 
 def accepts(annotation: Any, value: Any) -> bool:

@@ -28,7 +28,7 @@ from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.fitting import metrics
 from posefit.fitting.tracker import Frame
-from posefit.footage.masks import Range, existing, span
+from posefit.footage.masks import Range, span
 from posefit.footage.quality import extent_of
 from posefit.footage.scene import Scene
 from posefit.footage.segmentation import Extraction
@@ -37,7 +37,7 @@ from posefit.footage.video import Video
 from posefit.geometry.calibration import Calibration
 from posefit.motion.motion import Motion
 from posefit.output.drawing import draw_body, write
-from posefit.reading import read_text
+from posefit.reading import existing, read_text
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import ITERATIONS, TrackOptions

@@ -19,7 +19,7 @@ vector environment to Stable-Baselines3, and `check_vector_env` compares any vec
 | FitImage-v0, FitState-v0, Track-v0 | fit.py, track.py |
 | Race-v0: racing | race.py |
 | single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
-| arguments and numbered instances (as in sweeps: `posefit.footage.instance`) | instance.py |
+| arguments and numbered instances (as in sweeps: `posefit.motion.instance`) | instance.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
 | rendering | rendering.py |
 | optimisers that search an environment; references as policies | driving.py, policies.py |

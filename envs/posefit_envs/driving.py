@@ -11,7 +11,7 @@ from gymnasium.vector import VectorEnv
 from posefit import Minimum, Optimiser, SearchSpace, minimise
 from posefit.arrays import Array
 from posefit.fitting.optimiser import BudgetError, minimum_of
-from posefit.footage.source import training_clips, training_motions
+from posefit.motion.clips import training_clips, training_motions
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check, planned

@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from gymnasium import error
+from gymnasium import error, logger
 from numpy.typing import NDArray
 
 from posefit import Body, Camera, Motion, Observation, PoseProblem, SearchSpace, Silhouette, Task
@@ -18,10 +18,10 @@ from posefit.arrays import Array
 from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
-from posefit.footage.instance import motion_of_instance, variation
-from posefit.footage.source import load_motion
 from posefit.geometry.body import varied
 from posefit.motion import built_in
+from posefit.motion.clips import load_motion
+from posefit.motion.instance import motion_of_instance, variation
 from posefit.reading import quoted, suggestion
 from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS, corrupted
@@ -166,7 +166,10 @@ def instance_number(number: Any) -> int:
 
 @lru_cache(maxsize=32)
 def _source(motion: str) -> Motion:
-    return load_motion(motion, FPS)
+    source = load_motion(motion, FPS)
+    for note in source.notes:
+        logger.warn(note)
+    return source
 
 
 @lru_cache(maxsize=32)
@@ -177,8 +180,9 @@ def body_of(motion: str) -> Body:
 
 @lru_cache(maxsize=32)
 def _learned(prior: str, motion: str, train: tuple[str, ...]) -> Prior:
-    angles = np.concatenate([load_motion(name, FPS).poses[:, 3:] for name in train])
-    fitted: Prior = registry().prior(prior)().fit(angles, _source(motion).skeleton)
+    skeleton = _source(motion).skeleton
+    angles = np.concatenate([load_motion(name, FPS).about_axes_of(skeleton).poses[:, 3:] for name in train])
+    fitted: Prior = registry().prior(prior)().fit(angles, skeleton)
     return fitted
 
 

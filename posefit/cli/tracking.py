@@ -107,7 +107,7 @@ def _print(
 @click.argument("video")
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
 @options(EXTRACTION)
-@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Of the segmenter; repeatable.")
+@click.option("--set", "settings", multiple=True, metavar="[NAME.]SETTING=VALUE", help="Of the segmenter; repeatable.")
 @FRAMES
 @JSON
 def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:
@@ -153,7 +153,7 @@ def extraction_of(options: dict[str, Any], source: str, settings: Sequence[str] 
 
     given = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
     given = {name: value for name, value in given.items() if value is not None}
-    if (kind := kind_of(source)) != "video":
+    if (kind := kind_of(source)) not in ("video", "pictures"):
         for name, value in given.items():
             raise useless_for(kind, name, value, "video")
         return None

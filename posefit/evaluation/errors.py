@@ -15,25 +15,27 @@ from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import Skeleton
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL
+from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, reliability
 from posefit.uncertainty.intervals import joint_intervals
-from posefit.uncertainty.modes import nearer_mirrored, unknown_sides
+from posefit.uncertainty.modes import likeliest_is_right, nearer_mirrored, unknown_sides
 
 MAX_FULL_SIZE_POSES = 8_000  # training poses, more than which are not all drawn at full size in every frame
 SMALL_STRIDE = 4  # of so many poses each is drawn in a small picture
 FULL_SIZE_CANDIDATES = 200  # of these are drawn at full size, with their neighbours in the clip
 MIN_SMALL_SIDE, MAX_SMALL_FACTOR = 60, 4  # pixels of a small picture's side, and by how much it is smaller
 LOST = 0.5  # the probability of a frame to be lost from which on it is called so
+MAX_TRACE_POINTS = 64
 
 
 FRAME = {
     measure.name: measure
     for measure in (
-        Measure("frame", "frame", "", 0, "number of the frame, from 0"),
-        Measure("seconds", "seconds", "s", 2, "time of the frame, from 0"),
+        Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
+        Measure("seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"),
         Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
         Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
         Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
@@ -77,8 +79,8 @@ def evaluated(
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
     evaluations = np.array([float(frame.evaluations) for frame in frames])
     table = {
-        "frame": np.arange(len(frames)),
-        "seconds": np.arange(len(frames)) / scene.fps,
+        "frame": scene.first + np.arange(len(frames)),
+        "seconds": (scene.first + np.arange(len(frames))) / scene.fps,
         "cost": cost,
         "iou": iou,
         "usable": 1.0 - held,
@@ -241,3 +243,30 @@ def _costs(scene: Scene, training: Array, k: int, observation: Observation, beta
             camera, silhouette = coarser_camera(camera, factor), coarser_silhouette(silhouette, factor)
         costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
     return costs
+
+
+def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
+    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
+
+    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
+    """
+    searched = [frame.trace for frame in frames if len(frame.trace)]
+    if not searched:
+        return {"evaluations": [], "cost": []}
+    points = np.unique(np.concatenate([trace[:, 0] for trace in searched]))
+    points = points[points >= max(trace[0, 0] for trace in searched)]  # from where every frame has a cost
+    if len(points) > MAX_TRACE_POINTS:
+        wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
+        points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
+    mean = np.mean([trace[np.searchsorted(trace[:, 0], points, side="right") - 1, 1] for trace in searched], axis=0)
+    return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
+
+
+def mode_reliability(frames: Sequence[Frame], truth: Array, skeleton: Skeleton) -> list[list[float]]:
+    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
+    weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
+    if not weighed:
+        return []
+    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
+    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
+    return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]

@@ -130,7 +130,7 @@ class Measures:
         "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
     )
     seconds_per_frame: float = _figure(
-        "time", "ms a frame", 1, "wall time of the whole track but its reading and writing, over its frames", 1e3
+        "time", "ms a frame", 1, "wall time from the first mask read to the last pose smoothed, over the frames", 1e3
     )
     cpu_seconds_per_frame: float = _figure(
         "CPU time", "ms a frame", 1, "the same in CPU time of all threads; a busy machine does not add to it", 1e3

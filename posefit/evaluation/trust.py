@@ -188,7 +188,7 @@ SIGNS = (
 )
 # How the figures that are known are listed.
 LISTED = {
-    "size_ratio": "size {size_m:.2f} m of a body of {height_m:.2f} m",
+    "size_ratio": "size {size_m:.2f} m, the fitted body's {height_m:.2f} m",
     "depth_scatter": "distance steady to {depth_scatter:.1%}",
     "foot_share": "a foot stands in {foot_share:.0%} of frames",
     "stance_spread_m": "at heights {stance_spread_m:.2f} m apart",

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -106,8 +105,7 @@ class Minimum:
     proposal: Array  # (d,) the best one
     cost: float
     evaluations: int
-    history: Array = field(repr=False)  # (populations,) best cost so far after each population
-    spent: NDArray[np.int64] = field(repr=False)  # (populations,) evaluations so far after each population
+    trace: Array = field(repr=False)  # (populations, 2) evaluations so far and best cost, after each population
 
 
 class BudgetError(InputError):
@@ -161,7 +159,7 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
 
     A cost that is nan never counts as best. Raises ValueError where every cost is nan.
     """
-    best, cost, used, history, counts = None, np.inf, 0, [], []
+    best, cost, used, trace = None, np.inf, 0, list[tuple[int, float]]()
     for proposals, costs in searched:
         used += len(proposals)
         lowest = costs.argmin()
@@ -170,8 +168,7 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
             least = float(costs[lowest])
         if best is None or math.isnan(cost) or least < cost:
             best, cost = proposals[lowest].copy(), least  # SAPSO (5)
-        history.append(cost)
-        counts.append(used)
+        trace.append((used, cost))
     if best is None or math.isnan(cost):
         raise InputError(f"costs must be numbers, got nan for all {used} proposals")
-    return Minimum(best, cost, used, np.array(history), np.array(counts))  # SAPSO A1.3
+    return Minimum(best, cost, used, np.array(trace))  # SAPSO A1.3

@@ -122,10 +122,6 @@ class PoseProblem:
         poses, translations = self.space.decode(proposals)
         return poses, self._aligned(poses, translations)
 
-    def areas(self, poses: Array, translations: Array) -> Areas:
-        """Return R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
-        return self.cost_and_areas(poses, translations)[1]
-
     def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
         """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
         scene = self.body, self.cameras, self.silhouettes

@@ -45,9 +45,9 @@ NAMES = ("scale", *(f"{name} length" for name in LENGTHS), *(f"{name} girth" for
 SPREAD = np.array([0.10] + [0.06] * len(LENGTHS) + [0.30] * len(GIRTHS))
 REACH = 3.0  # spreads to either side that are searched
 PULL = 0.15  # cost of a factor that is one spread away from 1
-ROUNDS = 2  # poses with the body, then the body with the poses
-GENERATIONS, AGAIN = 60, 20  # of CMA-ES: in the first round, and where it begins near the end
-WIDTH, NEAR = 0.5, 0.2  # spreads that its first draws lie apart, in the same order
+# Of poses with the body, then of the body with the poses: the spread of CMA-ES's first draws, in spreads of the
+# factors, and its generations. The second round begins near the end of the first.
+ROUNDS = ((0.5, 60), (0.2, 20))
 
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
@@ -114,9 +114,9 @@ def fit_shape(
         return total / (len(observations) * len(cameras))
 
     factors = np.ones(len(NAMES))
-    for k in range(ROUNDS):
+    for width, generations in ROUNDS:
         frames = follow(shaped(body, factors, height))
-        factors = _search(cost, factors, rng, first=k == 0)
+        factors = _search(cost, factors, rng, width, generations)
     return Shape(shaped(body, factors, height), factors, SPREAD, cost(factors), height)
 
 
@@ -133,16 +133,18 @@ class FactorBox:
         return np.asarray((np.abs(proposals) <= 1.0).all(axis=1))
 
 
-def _search(cost: Callable[[Array], float], start: Array, rng: np.random.Generator, *, first: bool = False) -> Array:
+def _search(
+    cost: Callable[[Array], float], start: Array, rng: np.random.Generator, width: float, generations: int
+) -> Array:
     """Return the factors (17,) of least cost, by CMA-ES from the factors `start` (17,)."""
 
     def evaluate(proposals: Array) -> Array:
         points = REACH * proposals  # in spreads of the logarithms
         return np.array([cost(np.exp(SPREAD * point)) + PULL * float(point @ point) for point in points])
 
-    mean, width = np.clip(np.log(start) / (REACH * SPREAD), -1.0, 1.0), (WIDTH if first else NEAR) / REACH
-    box = FactorBox(Start(mean, np.full(len(NAMES), width), np.zeros(len(NAMES))))
+    mean = np.clip(np.log(start) / (REACH * SPREAD), -1.0, 1.0)
+    box = FactorBox(Start(mean, np.full(len(NAMES), width / REACH), np.zeros(len(NAMES))))
     population = default_population_size(len(NAMES))
-    evaluations = population * (GENERATIONS if first else AGAIN)
-    best = minimise(evaluate, CMAES(box, rng, population_size=population), evaluations, budget_known=True)
+    optimiser = CMAES(box, rng, population_size=population)
+    best = minimise(evaluate, optimiser, population * generations, budget_known=True)
     return np.asarray(np.exp(REACH * SPREAD * best.proposal))

@@ -87,6 +87,11 @@ class Task:
     backwards: bool = False  # whether observations and training come in reverse, the last one first
     fastest_turn: float | None = None  # radians a second that the yaw turns at most; None where it is unknown
 
+    def __post_init__(self) -> None:
+        """Count the angles of all training about the axes of the body's skeleton: turns in space stay what they are."""
+        training = [motion.about_axes_of(self.body.skeleton) for motion in self.training]
+        object.__setattr__(self, "training", training)
+
     @property
     def angles(self) -> Array:
         """The joint angles (T, 63) of all motions that may be learned from."""
@@ -277,7 +282,6 @@ class SynthesisTracker:
 
 def _frame(problem: PoseProblem, best: Minimum) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
-    counts = problem.areas(poses, translations)[:, 0]
+    counts = problem.cost_and_areas(poses, translations)[1][:, 0]
     details = {COORDINATES: problem.space.coordinates(best.proposal)}
-    trace = np.column_stack([best.spent, best.history])
-    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, trace, details=details)
+    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, best.trace, details=details)

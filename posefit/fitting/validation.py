@@ -118,7 +118,6 @@ class CheckedPrior:
     def __init__(self, prior: Prior, name: str) -> None:
         self._prior, self._name = prior, name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
-        self.affine = getattr(prior, "affine", None)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn from joint angles (T, 63), and return itself."""

@@ -1,23 +1,26 @@
-"""Motions, masks and videos become a `Scene`: the person, the cameras and what they observed.
+"""Masks and videos become a `Scene`: the person, the cameras and what they observed.
 
     from posefit.footage.source import scene_of
 
     scene = scene_of(["walk"], view_degrees=[0.0, 90.0])     # two cameras see a built-in motion
     print(scene.count, scene.observations[0].silhouettes[1].mask.shape)
 
-| looking for | file |
-|---|---|
-| a scene from the name of a motion, masks or a video; what a method learns from | source.py |
-| the scene itself; observations of a known motion, on a GPU, or corrupted on purpose | scene.py |
-| numbered variations of a motion, as in other benchmarks | instance.py |
-| several cameras: calibrations, lens distortion, one frame rate; which way the person faces | cameras.py |
-| masks in memory, a bit a pixel | masks.py |
-| masks of a folder or an .npz file: which values are the person's; images of any kind | readers.py, images.py |
-| inverted masks, holes, one of several people | cleaning.py |
-| video, read and written frame by frame | video.py |
-| the person in a video; the files of `posefit extract` | segmentation.py, extract.py |
-| whether masks can be a person's | quality.py |
+What happens to a mask, an arrow a file:
 
-Every image and video frame is decoded once, into `masks.PackedMasks`. From a mask to its cost it goes through
-`silhouette/mask.py`, `fitting/tracker.py`, `fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
+| from | to | file |
+|---|---|---|
+| what a user names | which kind it is, and its scene by the arrows below | source.py |
+| a picture | the values by which it marks a person | images.py |
+| images, an .npz or .npy file: their values | `masks.PackedMasks`, a bit a pixel | readers.py |
+| masks from elsewhere | those of one person, upright and without holes | cleaning.py |
+| a video file, or pictures one a frame | frames at even times | video.py |
+| frames | `masks.PackedMasks` of the person in them; the files of `posefit extract` | segmentation.py, extract.py |
+| masks of segmented frames | a verdict whether they can be a person's | quality.py |
+| a stream | the person in its latest frame | live.py |
+| masks and calibrations of one camera or several | the `Scene`, straightened, in metres, +y up | cameras.py |
+| a known motion | the `Scene` of its rendered masks, on a GPU, or corrupted on purpose | scene.py |
+
+Every image and video frame is decoded once. What a source does not state is guessed in one of these places, and is in
+`Scene.guesses`. From a mask to its cost it goes on through `silhouette/mask.py`, `fitting/tracker.py`,
+`fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
 """

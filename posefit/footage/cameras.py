@@ -1,7 +1,7 @@
 """The scene of real cameras: their masks or videos, with their calibrations."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -12,18 +12,22 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.masks import FPS, PackedMasks, Views, undistorted
-from posefit.footage.quality import disagreement, extent_of, meeting
+from posefit.footage.masks import PackedMasks, Views, undistorted
+from posefit.footage.quality import apparent_sizes, disagreement, extent_of, meeting
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up, read_calibrations, upright
+from posefit.geometry.calibration import Calibration, Up, guessed_up, read_calibrations, upright
 from posefit.geometry.camera import Camera
-from posefit.reading import quoted
+from posefit.geometry.units import METRES, UNIT_NAMES, Unit
+from posefit.motion.clips import FPS
+from posefit.reading import cut, quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
 
 AROUND = 0.5  # seconds before and after a frame whose facings are averaged
 AGREEMENT = 0.6  # the mean of unit vectors is at least so long: facings may not contradict each other
+GUESSED_UNITS: Sequence[Unit] = ("m", "cm", "mm", "inch")
+FAR, FARTHER = 100.0, 1000.0  # of a camera from its world's origin: no metres, and no centimetres either
 SAME_SHAPE = 0.01  # by how much the aspect ratios of masks and calibration may differ
 
 
@@ -47,6 +51,7 @@ def combined(
     view_degrees: float | None,
     up: Up | None,
     fps: float | None = None,
+    unit: Unit | None = None,
 ) -> Scene:
     """Return the scene of what cameras, those of `calibrated`, saw at the same times; true poses are unknown.
 
@@ -54,8 +59,14 @@ def combined(
     through the middles of the masks meet; with a single camera, as far away as their size in the image implies. Raises
     InputError where views and cameras do not fit each other, or several cameras cannot see one person of this size.
     """
-    rate = _rate(views, fps)
-    world = upright([camera for camera in known if isinstance(camera, Calibration)], up)
+    rate, stated = _rate(views, fps)
+    guesses = [guess for view in views for guess in view.masks.guesses]
+    if not stated:
+        guesses.append(f"{rate:g} frames a second")
+    if not known:
+        guesses.append("a level camera, 40 degrees across: distances and sizes are as good as that")
+    world, metres, of_cameras = world_of(known, up, unit)
+    unit_is_open = unit is None and any(isinstance(camera, Calibration) for camera in known)
     masks: list[PackedMasks] = []
     cameras: list[Camera] = []
     pictures = views[0].pictures
@@ -65,7 +76,7 @@ def combined(
         maps = None
         if isinstance(camera, Calibration):
             calibration = camera if view.filmed else _fitting(camera, size, scaled=True)
-            camera = calibration.camera(size, world)
+            camera = calibration.in_metres(metres).camera(size, world)
             maps = calibration.maps(size) if calibration.distorted else None
         if (camera.width, camera.height) != size:
             raise _of_another_size("", size, (camera.width, camera.height))
@@ -75,8 +86,17 @@ def combined(
             pictures = partial(_straightened, pictures, maps)
     # several cameras distinguish front and back themselves
     observations = Views(masks, yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate))
-    if len(views) > 1 and (wrong := disagreement(observations, cameras, body.stature)):
-        raise InputError(f"{name}: {wrong}")
+    if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
+        miss, tall = apparent
+        if unit_is_open and np.median(tall) > 0.0:
+            word = unit_of_heights(float(np.median(tall)) / metres / body.stature)
+            if METRES[word] != metres:
+                of_cameras["unit"] = f"the calibration is in {UNIT_NAMES[word]}"
+            factor = METRES[word] / metres
+            cameras = [replace(camera, translation=factor * camera.translation) for camera in cameras]
+            miss, tall = factor * miss, factor * tall
+        if wrong := disagreement(miss, tall, body.stature):
+            raise InputError(f"{name}: {wrong}")
     first = observations[observations.first]
     yaw = first.yaw
     if view_degrees is not None:
@@ -94,8 +114,34 @@ def combined(
         observations,
         "given" if known else "guessed",
         [warning for view in views for warning in view.warnings] + _unequal(views),
+        [*guesses, *of_cameras.values()],
         pictures,
+        views[0].masks.first,
     )
+
+
+def world_of(
+    known: Sequence[Camera | Calibration], up: Up | None, unit: Unit | None
+) -> tuple[Array, float, dict[str, str]]:
+    """Return how the world of calibrations is turned upright, their unit in metres, and what is guessed of both."""
+    calibrations = [camera for camera in known if isinstance(camera, Calibration)]
+    guesses = {"up": guess} if up is None and (guess := guessed_up(calibrations)) else {}
+    distances = [float(np.linalg.norm(one.translation)) for one in calibrations if one.translation is not None]
+    if unit is None and distances:
+        unit = "m" if max(distances) <= FAR else "cm" if max(distances) <= FARTHER else "mm"
+        if unit != "m" or not all(calibration.upright for calibration in calibrations):  # ours are in metres
+            guesses["unit"] = f"the calibration is in {UNIT_NAMES[unit]}"
+    for calibration in calibrations:
+        if calibration.rotation is None:
+            guesses["place"] = "the camera stands level, which its calibration does not state"
+        if calibration.size is None:
+            guesses["size"] = "the calibration is for pictures of this size, which it does not state"
+    return upright(calibrations, up), METRES[unit or "m"], guesses
+
+
+def unit_of_heights(ratio: float) -> Unit:
+    """Return the unit of calibrations in which the person is so many times as tall as they are in metres."""
+    return min(GUESSED_UNITS, key=lambda unit: abs(np.log(ratio * METRES[unit])))
 
 
 def yaws_of(facings: Array | Sequence[float], camera: Camera, fps: float) -> Array:
@@ -121,8 +167,8 @@ def _unequal(views: Sequence[CameraView]) -> list[str]:
     return [f"the videos differ in length; the first {min(lengths)} frames are used of {came}"]
 
 
-def _rate(views: Sequence[CameraView], fps: float | None) -> float:
-    """Return the frame rate of views: `fps`, or else what their files state, or 30.
+def _rate(views: Sequence[CameraView], fps: float | None) -> tuple[float, bool]:
+    """Return the frame rate of views: `fps`, or else what their files state, or 30; and whether it is stated.
 
     Raises InputError where views of masks differ in their rates, or in how many frames they have.
     """
@@ -132,13 +178,13 @@ def _rate(views: Sequence[CameraView], fps: float | None) -> float:
             came = f"{len(first.masks)} of {first.name} and {len(view.masks)} of {view.name}"
             raise InputError(f"views must have the same frames, got {came}")
     if fps is not None:
-        return fps
+        return fps, True
     stated = [(view.masks.fps, view.name) for view in views if view.masks.fps is not None]
     for rate, name in stated[1:]:
         if views[0].filmed is None and rate != stated[0][0]:
             came = f"{stated[0][0]:g} of {stated[0][1]} and {rate:g} of {name}"
             raise InputError(f"views must have one frame rate, frames a second, got {came}")
-    return stated[0][0] if stated else FPS
+    return (stated[0][0], True) if stated else (FPS, False)
 
 
 def place_of(silhouettes: Sequence[Silhouette], cameras: Sequence[Camera], stature: float) -> Array:
@@ -178,7 +224,9 @@ def calibrated(
     if not known and views > 1:
         raise InputError(f"camera must be given for each of several views, {views}, got none")
     if known and len(known) != views:
-        raise InputError(f"camera must be given for each view, {views}, got {len(known)}")
+        names = ", ".join(camera.name for camera in known if isinstance(camera, Calibration))
+        chosen = f": {cut(names)}; FILE:NAME is one of a file" if len(known) > views and names else ""
+        raise InputError(f"camera must be given for each view, {views}, got {len(known)}{chosen}")
     if views > 1 and any(isinstance(camera, Calibration) and camera.rotation is None for camera in known):
         raise InputError("camera must say where each of several cameras stands, got a file without rotation")
     return [
@@ -192,6 +240,9 @@ def _fitting(calibration: Calibration, size: tuple[int, int], *, scaled: bool = 
     padded = calibration.padded(size)
     if padded is not None:
         return padded
+    if calibration.size is None:
+        middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
+        raise InputError(f"camera {quoted(calibration.name)} must have its centre in {size[0]}x{size[1]}, got {middle}")
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from posefit.files import check_new, new_folder
+from posefit.files import check_new, new_folder, opencv_name
 from posefit.footage.masks import PackedMasks, Range
 from posefit.footage.segmentation import Extraction, Progress, Segmentation
 from posefit.footage.video import Video, VideoWriter
@@ -33,6 +33,7 @@ def extract(
     """
     target = Path(out)
     check_new(target)
+    opencv_name(target)  # a name that it cannot write is refused before the work
     video, how = Video.of(source), how or Extraction()
     segmentation = Segmentation(video, how, frames)
     with suppress(OSError):  # reported where the folder is made

@@ -2,9 +2,10 @@
 
 import logging
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import cv2
 import numpy as np
@@ -14,63 +15,93 @@ from PIL import Image, ImageOps
 from posefit.errors import InputError
 from posefit.reading import check_size
 
+IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".gif", ".webp")
+PAGED = (".tif", ".tiff", ".gif", ".webp")  # may hold several pictures
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
 LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
-FORMATS = "PNG, JPEG, BMP, TIFF or PGM"
-_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM")  # as Pillow calls them
-COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no mask
+FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"
+_JPEG = ("JPEG", "MPO")  # the latter of phones, with a preview
+_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "GIF", "WEBP")  # as Pillow calls them
+COLOUR_RANGE, COLOUR_SHARE = 32, 0.02  # of 255, and the share of an image's pixels: with more it is no grey one
+CHROMA_RANGE = 15  # the same, as a JPEG has it
+MANY_COLOURS = 64  # a picture of a place has more; so many labels are rare
+_GREY = ("1", "L", "LA", "I", "I;16", "I;16B", "F")  # as Pillow calls what has no colours
 logging.getLogger("PIL").addHandler(logging.NullHandler())  # what is wrong with a file is reported by posefit
+
 
 T = TypeVar("T")
 
 
-def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
+class Marks(NamedTuple):
+    """The values by which a picture marks a person, and of which kind they are."""
+
+    values: NDArray[Any]  # (height, width): grey levels, an alpha channel, indices of a palette, or colours 0xRRGGBB
+    soft: bool = False  # whether they are degrees
+    alpha: bool = False
+    photo: bool = False  # a picture in many colours
+
+
+def read_image(path: str | Path, grey: bool, page: int = 0) -> NDArray[np.uint8] | None:
     """Return a picture (height, width) in grey, or (height, width, 3) in blue, green and red; None where it is none.
 
     Raises InputError where it has more than `PIXELS` or `LARGEST_FILE`.
     """
-    return _read(Path(path), _grey if grey else _colours)
+    return next(_decoded(Path(path), [page], _grey if grey else _colours), None)
 
 
-def read_values(path: Path, labelled: bool = False) -> tuple[NDArray[Any], bool] | None:
-    """Return the values (height, width) by which an image marks a person, and whether they are degrees; None for none.
+def read_marks(path: Path, pages: Sequence[int] = (0,), labelled: bool = False) -> Iterator[Marks]:
+    """Yield the values by which the pages of a file mark a person; nothing, or too few, where it is no picture.
 
     They are its alpha channel, where it has one that is not all opaque and no label is wanted; else the indices of a
     palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises InputError as `read_image` does.
     """
-    return _read(path, lambda image: _values(image, labelled))
+    return _decoded(path, pages, partial(_marks, labelled=labelled))
 
 
-def is_colourful(path: Path) -> bool:
-    """Return whether a JPEG has colours, which no mask has; the values of other images show what they are."""
-    if path.suffix.lower() not in (".jpg", ".jpeg") or (image := read_image(path, grey=False)) is None:
+def page_count(path: Path) -> int:
+    """Return how many pictures a file holds; 1 where it is none."""
+    if path.suffix.lower() not in PAGED:
+        return 1
+    return next(_decoded(path, [0], lambda image: int(getattr(image, "n_frames", 1))), 1)
+
+
+@lru_cache(maxsize=64)
+def is_photo(path: Path) -> bool:
+    """Return whether a file is a picture in many colours, without alpha channel: of a place, not of a person's mask."""
+    try:
+        return any(_decoded(path, [0], lambda image: image.mode not in _GREY and _marks(image, False).photo))
+    except InputError:  # raised again where it is read
         return False
-    return bool((np.ptp(image, axis=2) > COLOUR_RANGE).mean() > COLOUR_SHARE)
 
 
-def _read(path: Path, decode: Callable[[Image.Image], T]) -> T | None:
-    """Return what `decode` makes of the image in a file; None where there is none. Raises InputError for too large."""
+def _decoded(path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T]) -> Iterator[T]:
+    """Yield what `decode` makes of pages of a file; no more where there is none. Raises InputError for large ones."""
     if not path.is_file():
-        return None
+        return
     check_size(path, LARGEST_FILE)
     expected = f"{path}: expected at most {PIXELS // 10**6} million pixels"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(path, formats=_FORMATS) as image:
-                if image.width * image.height > PIXELS:
-                    raise InputError(f"{expected}, got {image.width}x{image.height}")
-                return decode(image)
+                if image.format == "PNG" and getattr(image, "n_frames", 1) > 1:
+                    raise InputError(f"{path}: expected one picture, got an animation")
+                for page in pages:
+                    if page:
+                        image.seek(page)
+                    if image.width * image.height > PIXELS:
+                        raise InputError(f"{expected}, got {image.width}x{image.height}")
+                    yield decode(image)
     except Image.DecompressionBombError:
         raise InputError(f"{expected}, got far more") from None
     except InputError:
         raise
     except Exception:  # whatever the library trips over, the file is to blame
-        return None
+        return
 
 
 def _grey(image: Image.Image) -> NDArray[np.uint8]:
-    if image.format != "JPEG":
+    if image.format not in _JPEG:
         return np.asarray(cv2.cvtColor(_colours(image), cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     image.draft("L", None)  # which a JPEG has by itself
     return np.asarray(ImageOps.exif_transpose(image).convert("L"))
@@ -83,25 +114,38 @@ def _colours(image: Image.Image) -> NDArray[np.uint8]:
     return np.asarray(image.convert("RGB"))[..., ::-1]
 
 
-def _values(image: Image.Image, labelled: bool) -> tuple[NDArray[Any], bool]:
-    if image.format == "JPEG":
-        return _grey(image), True
+def _marks(image: Image.Image, labelled: bool) -> Marks:
+    if image.format in _JPEG:
+        if image.mode == "RGB":  # as which a JPEG has brightness and two distances from grey
+            image.draft("YCbCr", None)
+        image = ImageOps.exif_transpose(image)
+        if image.mode != "YCbCr":
+            return Marks(np.asarray(image.convert("L")), soft=True)
+        bright, *chroma = (np.asarray(channel) for channel in image.split())
+        off = np.maximum(*(cv2.absdiff(channel, np.full_like(channel, 128)) for channel in chroma))
+        return Marks(bright, soft=True, photo=bool((off > CHROMA_RANGE).mean() > COLOUR_SHARE))
     if not labelled and image.has_transparency_data:
         alpha = np.asarray(image.convert("RGBA").getchannel("A"))
         if (alpha != np.iinfo(alpha.dtype).max).any():
-            return alpha, True
+            return Marks(alpha, soft=True, alpha=True)
     if image.mode in ("1", "LA"):
         image = image.convert("L")
     if image.mode in ("L", "F") or image.mode.startswith("I"):
         grey = np.asarray(image)
-        return grey.astype(grey.dtype.newbyteorder("=")), False
+        return Marks(grey.astype(grey.dtype.newbyteorder("=")))
     colours = np.asarray(image.convert("RGB"))
     if (colours[..., 0] == colours[..., 1]).all() and (colours[..., 0] == colours[..., 2]).all():
-        return colours[..., 0], False
-    if image.mode == "P":
-        return np.asarray(image), False
+        return Marks(colours[..., 0])
+    if image.format == "WEBP" and not _is_colourful(colours):
+        return Marks(np.asarray(image.convert("L")), soft=True)
+    if image.mode == "P" and image.format != "GIF":
+        return Marks(np.asarray(image))
     numbers = colours[..., 0].astype(np.int32)
     for channel in (1, 2):
         numbers <<= 8
         numbers |= colours[..., channel]
-    return numbers, False
+    return Marks(numbers, photo=_is_colourful(colours) and len(np.unique(numbers[::3, ::3])) > MANY_COLOURS)
+
+
+def _is_colourful(colours: NDArray[np.uint8]) -> bool:
+    return bool((np.ptp(colours, axis=2) > COLOUR_RANGE).mean() > COLOUR_SHARE)

@@ -16,11 +16,11 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.images import PIXELS
-from posefit.footage.masks import FPS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
+from posefit.motion.clips import FPS
 from posefit.reading import quoted
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask

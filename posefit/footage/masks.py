@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -18,7 +17,6 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.limits import allowed_bytes
 from posefit.silhouette.mask import Silhouette
 
-FPS = 30.0  # of motions and masks that state no rate
 Range = tuple[int | None, int | None]
 Planes = NDArray[np.uint8]  # (T, bytes): of each frame the bits of its pixels, row by row
 
@@ -34,6 +32,8 @@ class PackedMasks:
     usable: NDArray[np.bool_] = field(repr=False)  # (T,) whether a frame shows enough of the person to be searched
     fps: float | None = None  # None where the source does not state it
     landmarks: Array | None = field(default=None, repr=False)  # (T, 27, 3), see `Segmenter`; None where there are none
+    first: int = 0  # the number of the first frame in the footage
+    guesses: Sequence[str] = ()  # what the source does not state
 
     def __len__(self) -> int:
         return len(self.masks)
@@ -123,13 +123,3 @@ def span(frames: Range, count: int) -> tuple[int, int]:
         low, high = ("" if value is None else value for value in frames)
         raise InputError(f"frames must choose some of the {count} frames, got {low}:{high}")
     return start, stop
-
-
-def existing(path: Path) -> Path:
-    """Return a path. Raises InputError where there is nothing, or an empty file."""
-    if not path.exists():
-        expected = "a file" if path.suffix else "a file or a folder"
-        raise InputError(f"{path}: expected {expected}, got nothing of that name")
-    if path.is_file() and not path.stat().st_size:
-        raise InputError(f"{path}: expected a file with content, got an empty one")
-    return path

@@ -158,6 +158,9 @@ def verdict(rows: Sequence[Mapping[str, Any]], method: str, *, learned: bool) ->
     usable = sum(row["usable"] for row in whole)
     instead = advice(method, learned=learned)
     none = f"expected masks of a person, got none in any of {len(rows)} frames{instead}"
+    cut = sum(bool(row["touches_border"]) for row in rows)
+    if cut > 0.5 * len(rows):
+        none = f"expected a person who is whole in the picture, got one at its edge in {cut} of {len(rows)} frames"
     if len(whole) < MIN_FRAMES:
         return None if usable else Verdict(none, True)
     outside = float(np.median([row["beside"] for row in whole]))
@@ -221,8 +224,11 @@ def meeting(cameras: Sequence[Camera], middles: Sequence[Array]) -> tuple[Array,
     return place, np.array([np.linalg.norm(a @ (place - p)) for a, p in zip(across, positions, strict=True)])
 
 
-def disagreement(views: Views, cameras: Sequence[Camera], stature: float) -> str | None:
-    """Return what is wrong between the masks of several cameras and a person of a height in metres, if anything."""
+def apparent_sizes(views: Views, cameras: Sequence[Camera]) -> tuple[float, Array] | None:
+    """Return by how much the rays of cameras to the person miss each other, and how tall the person is in each view.
+
+    Both are medians over frames, in the cameras' unit; None where no frame is usable in all views.
+    """
     usable = [k for k in range(len(views)) if all(masks.usable[k] for masks in views.masks)]
     if not usable:
         return None
@@ -234,8 +240,14 @@ def disagreement(views: Views, cameras: Sequence[Camera], stature: float) -> str
         misses.append(2.0 * away.max())
         per_view = zip(cameras, extents, depths, strict=True)
         heights.append([tall * depth / camera.focal[1] for camera, (_, tall), depth in per_view])
-    miss, tall = float(np.median(misses)), np.median(heights, axis=0)
-    reasons = "the masks show only parts of the person, or another one, or the calibrations are in another order"
+    return float(np.median(misses)), np.asarray(np.median(heights, axis=0))
+
+
+def disagreement(miss: float, tall: Array, stature: float) -> str | None:
+    """Return what is wrong between `apparent_sizes` and a person of a height, all in metres, if anything."""
+    reasons = (
+        "the masks show only parts of the person, or another one, or the calibrations are in another order or unit"
+    )
     if miss > APART * stature:
         return f"expected cameras that see one person, got views that pass each other by {miss:.1f} m: {reasons}"
     wrong = np.flatnonzero((tall < SHORT * stature) | (tall > TALL * stature))

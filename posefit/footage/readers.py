@@ -1,5 +1,11 @@
 """Masks from images, an array, or an .npz or .npy file: which pixels are the person's by the values of all of them.
 
+| arrow | |
+|---|---|
+| files to frames | `numbered`: a frame a page; numbers that are missing are frames in which nothing is known |
+| frames to values | `images.read_marks`, `archive.archived` |
+| values to bits | `ValueCounts.classifier`, `_above` |
+
 Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file does not show which, so the values of
 all files are counted before any pixel is decided. An image is decoded once: its values wait, compressed, in a temporary
 file, which is on the disk where they are many.
@@ -11,6 +17,8 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -20,23 +28,26 @@ from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, PIXELS, is_colourful, read_values
-from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, existing, span
+from posefit.footage.images import FORMATS, IMAGES, PIXELS, page_count, read_marks
+from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
-from posefit.reading import quoted
+from posefit.reading import existing, quoted
 from posefit.silhouette.mask import Mask
 
-IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
 SPOOLED = 64_000_000  # bytes of compressed values that are kept in memory; more are on the disk
 PACKED = 2_000_000_000  # bytes of an .npz file
 MAX_FPS = 1000.0
+_KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
 NAMES = ("masks", "valid", "usable", "fps", "landmarks")
 
+MOST_MISSING = 9.0  # missing numbers for each image: where there are more, the numbers count something else
 FEW_VALUES = 64  # masks with more values are soft
 COUNTED_VALUES = 4_096
 SCALES = (1.0, 255.0, 65_535.0)  # values of a pixel that is wholly the person's
+NEAR_SCALE = 1.25  # times a scale: degrees may go a little beyond, as resampling makes them
+SIGNED = 0.2  # of the highest value: where the lowest is as far below 0, they are logits, not degrees
 LISTED_LABELS = 6  # in a message
 
 Values = NDArray[Any]  # (height, width): grey levels, an alpha channel, indices of a palette, or colours 0xRRGGBB
@@ -57,9 +68,7 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
     if isinstance(source, np.ndarray):
         return _packed(name_of(source), {"masks": source}, frames, label)
     if source.is_dir():
-        # hidden files are ignored: some systems put one beside each image that they copy
-        files = (file for file in source.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
-        if not (images := sorted(files, key=_natural)):
+        if not (images := images_in(source)):
             raise InputError(f"{source}: expected a folder with mask images ({', '.join(IMAGES)}), got none")
         return read_images(images, str(source), frames, label)
     existing(source)
@@ -67,7 +76,7 @@ def read_masks(source: Path | Masks, frames: Range, label: int | None = None) ->
         stack = mapped(source)
         check_decoded(str(source), stack.nbytes)
         return _packed(str(source), {"masks": stack}, frames, label)
-    with archived(source, NAMES, "the key masks", PACKED) as arrays:
+    with archived(source, NAMES, "the key masks", PACKED, single=True) as arrays:
         check_decoded(str(source), sum(array.nbytes for array in arrays.values()))
         return _packed(str(source), arrays, frames, label)
 
@@ -81,39 +90,90 @@ def name_of(source: str | Path | Masks) -> str:
     return str(source[0].parent) if isinstance(source, tuple) and source[0].parent.name else "masks"
 
 
-def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
-    """Return the masks of images of one size. Raises InputError naming the file where one is none."""
-    chosen = images[slice(*span(frames, len(images)))]
-    if is_colourful(existing(chosen[0])):
-        raise _many_colours(name)
-    counts, shape = ValueCounts(), (0, 0)
-    stored: list[tuple[int, np.dtype[Any]]] = []
-    with tempfile.SpooledTemporaryFile(SPOOLED) as spool:
-        for file in chosen:
-            read = read_values(file, label is not None)
-            if read is None:
-                raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
-            values, soft = read
-            if not stored:
-                shape = values.shape
-                check_decoded(name, values.nbytes * len(chosen))
-            if values.shape != shape:
-                raise InputError(f"{file}: mask must have shape {shape}, got {values.shape}")
-            counts.add(values, soft)
-            stored.append((spool.write(zlib.compress(values.tobytes(), 1)), values.dtype))
-        is_person, size = counts.classifier(label, name), (shape[1], shape[0])
-        masks = empty_planes(len(chosen), size)
-        spool.seek(0)
-        for k, (length, dtype) in enumerate(stored):
-            values = np.frombuffer(zlib.decompress(spool.read(length)), dtype).reshape(shape)
-            masks[k] = np.packbits(is_person(values))
-    return PackedMasks([str(file) for file in chosen], size, masks, None, np.ones(len(chosen), dtype=bool))
+def images_in(folder: Path) -> list[Path]:
+    """Return the images of a folder in the natural order of their names."""
+    # hidden files are ignored: some systems put one beside each image that they copy
+    files = (file for file in folder.iterdir() if file.suffix.lower() in IMAGES and not file.name.startswith("."))
+    return sorted(files, key=_natural)
 
 
 def _natural(file: Path) -> tuple[Sequence[tuple[int, str]], str]:
     """Return the key that files are sorted by: numbers in their names count as such."""
     parts = re.findall(r"[0-9]+|[^0-9]+", file.name)
     return [(int(p), "") if p.isdigit() and len(p) < NUMBER_DIGITS else (-1, p) for p in parts], file.name
+
+
+def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list[str]]:
+    """Return the images of successive frames, None for a number that is missing, and what was guessed of them.
+
+    Raises InputError where files are of several kinds, or several have one number: some are no masks then.
+    """
+    kinds = Counter(_KINDS.get(suffix := file.suffix.lower(), suffix) for file in images)
+    if len(kinds) > 1:
+        came = " and ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        raise InputError(f"{name}: expected images of one kind, got {came}; name the files, such as masks/*.png")
+    parts = [re.split(r"([0-9]+)", file.stem) for file in images]
+    if len(images) < 2 or not all(len(part) >= 3 and len(part[-2]) < 19 for part in parts):
+        return list(images), []
+    numbers = [int(part[-2]) for part in parts]
+    if len({tuple(part[::2]) for part in parts}) > 1:
+        twice = next((k for k, number in enumerate(numbers) if number in numbers[:k]), None)
+        if twice is not None:
+            pair = f"{images[numbers.index(numbers[twice])].name} and {images[twice].name}"
+            raise InputError(f"{name}: expected one image a frame, got {pair}; name the files, such as masks/*.png")
+    steps = np.diff(numbers)
+    if len({(*part[:-2], part[-1]) for part in parts}) > 1 or not (steps > 0).all():
+        return list(images), [] if (steps > 0).all() else [f"{name}: the frames come as listed, not as numbered"]
+    step = int(np.gcd.reduce(steps))
+    missing = int((steps // step - 1).sum())
+    if missing > MOST_MISSING * len(images):
+        return list(images), [f"{name}: the numbers from {numbers[0]} to {numbers[-1]} do not count frames"]
+    places = dict(zip(numbers, images, strict=True))
+    guesses = [f"{name}: every {step}th number is a frame"] if step > 1 else []
+    if missing:
+        guesses.append(f"{name}: {missing} of the frames {numbers[0]} to {numbers[-1]} are missing, and are held")
+    return [places.get(number) for number in range(numbers[0], numbers[-1] + 1, step)], guesses
+
+
+def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
+    """Return the masks of images of one size. Raises InputError naming the file where one is none."""
+    files, guesses = numbered(images, name)
+    every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
+    chosen = every[slice(*span(frames, len(every)))]
+    counts, shape, known = ValueCounts(), (0, 0), [file is not None for file, _ in chosen]
+    stored: list[tuple[int, np.dtype[Any]]] = []
+    with tempfile.SpooledTemporaryFile(SPOOLED) as spool:
+        for file, group in groupby((one for one in chosen if one[0] is not None), key=itemgetter(0)):
+            wanted = len(stored) + len(pages := [page for _, page in group])
+            for marks in read_marks(file, pages, label is not None):
+                if marks.photo:
+                    raise _many_colours(str(file) if stored else name)
+                if not stored:
+                    shape = marks.values.shape
+                    check_decoded(name, marks.values.nbytes * sum(known))
+                if marks.values.shape != shape:
+                    raise InputError(f"{file}: mask must have shape {shape}, got {marks.values.shape}")
+                counts.add(marks.values, marks.soft)
+                stored.append((spool.write(zlib.compress(marks.values.tobytes(), 1)), marks.values.dtype))
+            if len(stored) < wanted:
+                raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+        is_person, kind = counts.classifier(label, name)
+        size, lengths = (shape[1], shape[0]), iter(stored)
+        masks = empty_planes(len(chosen), size)
+        spool.seek(0)
+        for k in range(len(chosen)):
+            masks[k] = 0
+            if known[k]:
+                length, dtype = next(lengths)
+                values = np.frombuffer(zlib.decompress(spool.read(length)), dtype).reshape(shape)
+                masks[k] = np.packbits(is_person(values))
+    valid = None
+    if not all(known):
+        valid = empty_planes(len(chosen), size)
+        valid[:] = np.where(known, 255, 0)[:, None]
+    paged = {file for file, page in chosen if page}
+    names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
+    return PackedMasks(names, size, masks, valid, np.array(known), guesses=[*guesses, *kind])
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:
@@ -127,13 +187,14 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     start, stop = span(frames, count)
     if not usable[start:stop].any():
         raise InputError(f"{name}: expected a frame that is usable, got none from {start} to {stop}")
-    masks = _pack(stack, start, stop, _stack_classifier(name, stack, start, stop, label))
+    is_person, guesses = _stack_classifier(name, stack, start, stop, label)
+    masks = _pack(stack, start, stop, is_person)
     valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
     names = [f"{name}[{k}]" for k in range(start, stop)]
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
     if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
         raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
-    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks)
+    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks, start, guesses)
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
@@ -172,10 +233,12 @@ def _described(stored: Stored | NDArray[Any]) -> str:
     return f"{quoted(tuple(stored.shape))} {stored.dtype}"
 
 
-def _stack_classifier(name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None) -> Classifier:
-    """Return how frames start to stop become masks; booleans need no count."""
+def _stack_classifier(
+    name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None
+) -> tuple[Classifier, list[str]]:
+    """Return how frames start to stop become masks, and what was guessed; booleans need no count."""
     if stored.dtype.kind == "b" and label is None:
-        return _above(0.0)
+        return _above(0.0), []
     counts = ValueCounts()
     for k, frame in enumerate(stored):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
@@ -199,31 +262,38 @@ class ValueCounts:
     """Counts the values in the masks of a source, one mask after the other, and decides which are the person's."""
 
     soft: bool = False  # whether a value is a degree: in lossy images, in fractions, in an alpha channel
+    fractions: bool = False
+    lowest: float = np.inf
     highest: float = 0.0
-    pixels: Counter[int] = field(default_factory=Counter)  # with each value, while these are few
-    solid: Counter[int] = field(default_factory=Counter)  # masks in which a value is more than an edge between others
+    # with each value, while these are few
+    pixels: Counter[int | float] = field(default_factory=Counter)
+    # masks in which a value is more than an edge between others
+    solid: Counter[int | float] = field(default_factory=Counter)
 
     def add(self, values: Values, soft: bool) -> None:
         """Count the next mask."""
-        self.highest = max(self.highest, float(values.max()))
-        self.soft |= soft or values.dtype.kind == "f"
+        low, high = values.min(), values.max()
+        self.lowest, self.highest = min(self.lowest, float(low)), max(self.highest, float(high))
+        self.fractions |= values.dtype.kind == "f" and bool((values != np.floor(values)).any())
+        self.soft |= soft
         if self.soft:
             return
-        if self.highest > 1:
+        top = int(np.count_nonzero(values == high))
+        if low == high or top + np.count_nonzero(values == low) == values.size:  # takes less time than sorting
+            different = slice(int(low == high), 2)
+            unique, counts = np.array([low, high])[different], np.array([values.size - top, top])[different]
+        else:
             unique, counts = np.unique(values, return_counts=True)
-        else:  # faster than sorting zeros and ones
-            ones = int(np.count_nonzero(values))
-            unique, counts = np.flatnonzero([values.size - ones, ones]), np.array([values.size - ones, ones])
-            counts = counts[counts > 0]
-        self.soft = len(unique) + len(self.pixels) > COUNTED_VALUES
-        if self.soft:
-            return
         self.pixels.update(dict(zip(unique.tolist(), counts.tolist(), strict=True)))
-        if len(unique) > 1:
+        self.soft = len(self.pixels) > (2 if self.fractions else COUNTED_VALUES)
+        if len(unique) > 1 and not self.soft:
             self.solid.update(_solid(values, unique))
 
-    def classifier(self, label: int | None, name: object) -> Classifier:
-        """Return how these values become masks. Raises InputError where it is open which label is the person."""
+    def classifier(self, label: int | None, name: object) -> tuple[Classifier, list[str]]:
+        """Return how these values become masks, and what was guessed of them.
+
+        Raises InputError where it is open which label is the person.
+        """
         if label is not None:
             if self.soft:
                 kinds = "masks whose values are labels, PNG or whole numbers"
@@ -231,28 +301,40 @@ class ValueCounts:
             if label not in self.pixels:
                 there = self._listed([value for value, _ in self.pixels.most_common()])
                 raise InputError(f"{name}: label must be one of those that are there, {there}, got {label}")
-            return lambda values: np.asarray(values == label)
+            return lambda values: np.asarray(values == label), []
         values = sorted(self.pixels)
         if self.highest > SCALES[-1] and (self.soft or len(values) > FEW_VALUES):
             raise _many_colours(name)
+        ends = f"{name}: masks of values from {self.lowest:.4g} to {self.highest:.4g}"
         if self.soft or len(values) > FEW_VALUES:
-            return _above(self._half)
+            half, kind = self._half
+            return _above(half), [f"{ends} are {kind}: the person is above {half:g}"]
         if len(values) <= 2:  # whichever two they are
-            return _above(float(values[0] if len(values) == 2 else min(values[0], 0)) if values else 0.0)
+            usual = not values or (min(values[0], 0) == 0 and values[-1] in (0, *SCALES[:2]))
+            threshold = float(values[0] if len(values) == 2 else min(values[0], 0)) if values else 0.0
+            return _above(threshold), [] if usual else [f"{ends}: the person is the higher of two"]
         labels = [value for value, _ in self.solid.most_common() if value]
         if len(labels) > 1:
             raise InputError(
                 f"{name}: expected masks of one person, got the labels {self._listed(labels)}; --label N chooses one"
             )
-        return _above(float(labels[0] // 2) if labels else self._half)
+        threshold = float(labels[0] // 2) if labels else self._half[0]
+        return _above(threshold), [f"{ends}: the person is above {threshold:g}, what is between is an edge"]
 
     @property
-    def _half(self) -> float:
-        """The value half way to a whole person: 127 of 255, as whole numbers have no middle."""
-        full = next((scale for scale in SCALES if self.highest <= scale), self.highest)
-        return 0.5 if full == 1.0 else float(full // 2)
+    def _half(self) -> tuple[float, str]:
+        """The value half way to a whole person, 127 of 255, as whole numbers have no middle; and what the values are.
 
-    def _listed(self, labels: list[int]) -> str:
+        Signed ones are a network's logits, of which 0 is the middle.
+        """
+        if self.lowest < -SIGNED * self.highest:
+            return 0.0, "logits"
+        if self.fractions and NEAR_SCALE < self.highest < SCALES[1] / 4.0:  # of no usual scale
+            return self.highest / 2.0, "degrees"
+        full = next((scale for scale in SCALES if self.highest <= NEAR_SCALE * scale), self.highest)
+        return (0.5 if full == 1.0 else float(full // 2)), "degrees"
+
+    def _listed(self, labels: Sequence[float]) -> str:
         """Return some labels, the commonest first; colours as hexadecimal numbers."""
         written = [str(value) if self.highest <= SCALES[-1] else f"0x{value:06x}" for value in labels[:LISTED_LABELS]]
         others = len(labels) - LISTED_LABELS

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import Parameter
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -16,7 +17,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span
-from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
+from posefit.footage.quality import MIN_FRAMES, PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
@@ -36,6 +37,7 @@ RIVAL_AREA = 0.4  # of the person's area: something so large may be another pers
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
 CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
+LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
@@ -161,6 +163,8 @@ class Segmentation:
         self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
         self._given, self._how = "background" in how.settings, how
         self._segmenter = how.segmenter(self._film) if self._given else None  # a background is checked now
+        self._masks, self._valid = (empty_planes(len(self), self.size) for _ in range(2))
+        self._pass: tuple[Iterator[Image], Segmenter, FrameQuality, CameraMotion] | None = None  # while frames are read
         self._shifts: list[float] = []
         self._facings: list[float] = []  # of each frame, as `Segmenter.facing`; NaN where unknown
         self._landmarks: list[Array] = []  # of each frame, as `Segmenter.landmarks`, in scaled pixels
@@ -177,12 +181,30 @@ class Segmentation:
         `on_frame` gets each frame, scaled, the person in it, and whether it is usable. Raises InputError where no frame
         shows a person.
         """
-        masks, valid = (empty_planes(len(self), self.size) for _ in range(2))
-        segmenter = self.learned()
-        quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
-        motion = CameraMotion(self.size)
-        frames = self.video.frames(self.start, self.stop, self.size)
-        for k, image in enumerate(progress(frames, len(self)) if progress else frames):
+        self.read(len(self) - len(self.rows), progress, on_frame)
+        self._pass = None
+        if not self.shown:
+            damage = f"; {self._damage}" if self._missing else ""
+            none = "expected a person who moves before a still background, got none in any frame"
+            raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
+        return self.packed()
+
+    def read(
+        self,
+        count: int,
+        progress: Progress | None = None,
+        on_frame: Callable[[Image, Person, bool], None] | None = None,
+    ) -> None:
+        """Take the person out of so many more frames."""
+        if self._pass is None:
+            segmenter = self.learned()
+            quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
+            frames = self.video.frames(self.start, self.stop, self.size)
+            self._pass = frames, segmenter, quality, CameraMotion(self.size)
+        frames, segmenter, quality, motion = self._pass
+        chosen = islice(frames, count)
+        for image in progress(chosen, count) if progress else chosen:
+            k = len(self.rows)
             if k % PERIOD == 0:
                 self._shifts.append(motion.shift(image))
             result, row = self.person(segmenter, image, quality, self.start + k)
@@ -193,18 +215,34 @@ class Segmentation:
             )
             row["usable"] = int(row["usable"] and self.video.is_filmed(self.start + k))
             self.rows.append(row)
-            masks[k], valid[k] = np.packbits(result.mask), np.packbits(result.valid)
+            self._masks[k], self._valid[k] = np.packbits(result.mask), np.packbits(result.valid)
             if on_frame is not None:
                 on_frame(image, result, bool(row["usable"]))
-        if not any(row["area"] for row in self.rows):
-            damage = f"; {self._damage}" if self._missing else ""
-            none = "expected a person who moves before a still background, got none in any frame"
-            raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
-        count, usable = len(self.rows), np.array([row["usable"] for row in self.rows], dtype=bool)
+
+    @property
+    def shown(self) -> bool:
+        """Whether any frame so far shows a person."""
+        return any(row["area"] for row in self.rows)
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which frames so far are usable (T,)."""
+        return np.array([row["usable"] for row in self.rows], dtype=bool)
+
+    @property
+    def refused_so_far(self) -> bool:
+        """Whether the frames so far show something as large as a person whose masks are refused."""
+        whole = [row for row in self.rows if not row["touches_border"] and row["longer_side"] > LARGE * self.size[1]]
+        return len(whole) >= MIN_FRAMES and bool((verdict := self.verdict) and verdict.refused)
+
+    def packed(self) -> PackedMasks:
+        """Return the masks of the frames so far."""
+        count, usable = len(self.rows), self.usable
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
         landmarks = np.array(self._landmarks)
         known = landmarks if landmarks[..., 2].any() else None
-        return PackedMasks(names, self.size, masks[:count], valid[:count], usable, self.video.fps, known)
+        masks, valid, guesses = self._masks[:count], self._valid[:count], self.video.guesses
+        return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, self.start, guesses)
 
     def learned(self) -> Segmenter:
         """Return the segmenter, which has learned the background."""

@@ -1,8 +1,8 @@
-"""What a user names, a motion or what one camera or several saw, becomes a scene, once; and what methods learn from."""
+"""What a user names, a motion or what one camera or several saw, becomes a scene, once."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -10,40 +10,38 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.footage.cameras import CameraView, calibrated, combined, listed
+from posefit.footage.cameras import CameraView, calibrated, combined, listed, world_of
 from posefit.footage.cleaning import cleaned
-from posefit.footage.masks import FPS, Range, existing
-from posefit.footage.quality import Verdict
-from posefit.footage.readers import IMAGES, Masks, name_of, read_masks
+from posefit.footage.images import IMAGES, is_photo, page_count
+from posefit.footage.masks import Range
+from posefit.footage.quality import MIN_FRAMES, Verdict
+from posefit.footage.readers import Masks, images_in, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.body import Body
-from posefit.geometry.calibration import Calibration, Up, upright
+from posefit.geometry.calibration import Calibration, Up
 from posefit.geometry.camera import Camera
-from posefit.limits import allowed_bytes
+from posefit.geometry.units import Unit
 from posefit.motion import built_in, recorded
-from posefit.motion.amc import read_clip
-from posefit.motion.asf import read_asf
-from posefit.motion.bvh import read_bvh
+from posefit.motion.asf import Acclaim, parse_asf
+from posefit.motion.clips import FPS, MOTIONS, FileOptions, Source, load_motion
 from posefit.motion.motion import Motion
 from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
 
-MOTIONS = (".amc", ".bvh")
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".npy", ".asf", ".json", ".csv", ".txt")
+FIRST_SECONDS = 2.0  # of several videos, by which they are refused before the rest is read
 SIZE = (320, 240)  # pixels of a rendered picture
-Kind = Literal["motion", "masks", "video"]
-_KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video"}
-Source = str | Path | Motion
+Kind = Literal["motion", "masks", "video", "pictures"]
+_KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video", "pictures": "pictures"}
 Footage = Source | Masks
-POSE_BYTES = 3_000  # that a method takes to learn from a pose: its angles, joints and codes, and copies
 _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
-    "extraction": ("video", ["video"]),
-    "fps": ("motions and masks", ["motion", "masks"]),
+    "extraction": ("video", ["video", "pictures"]),
+    "fps": ("motions, masks and pictures", ["motion", "masks", "pictures"]),
     "label": ("masks", ["masks"]),
     "holes": ("masks", ["masks"]),
-    "height": ("footage", ["masks", "video"]),
+    "height": ("footage", ["masks", "video", "pictures"]),
     "size": ("motions", ["motion"]),
 }
 
@@ -53,8 +51,10 @@ def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
     for name, (where, kinds) in _USED_FOR.items():
         if kind not in kinds and view.get(name) is not None:
             raise useless_for(kind, name, view[name], where)
-    if view.get("up") is not None and not view.get("camera"):
-        raise useless_for(kind, "up", view["up"], "calibrations")
+    if view.get("up") is not None and not view.get("camera") and kind != "motion":
+        raise useless_for(kind, "up", view["up"], "calibrations and files of motions")
+    if view.get("unit") is not None and kind != "motion" and view.get("asf") is None and not view.get("camera"):
+        raise useless_for(kind, "unit", view["unit"], "calibrations and files of motions")
 
 
 def useless_for(kind: Kind, name: str, value: object, where: str) -> InputError:
@@ -75,6 +75,8 @@ def scene_of(
     extraction: Extraction | None = None,
     height: float | None = None,
     up: Up | None = None,
+    unit: Unit | None = None,
+    rate: float | None = None,
     label: int | None = None,
     holes: float | None = None,
 ) -> Scene:
@@ -87,47 +89,78 @@ def scene_of(
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
     options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up})
+    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "asf": asf})
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
         known = listed(camera)
-        world = upright([one for one in known if isinstance(one, Calibration)], up)
-        cameras = [one if isinstance(one, Camera) else one.camera(one.size, world) for one in known]
-        motion = load_motion(cast(Source, sources[0]), fps or FPS, asf)
-        return synthetic(motion, view_degrees, size or SIZE, cameras, frames)
+        world, metres, guesses = world_of(known, up, unit)
+        cameras = [
+            one if isinstance(one, Camera) else one.in_metres(metres).camera(one.size or size or SIZE, world)
+            for one in known
+        ]
+        stated = FileOptions(asf, None if known else unit, None if known else up, rate)
+        motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
+        return synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()])
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
-    if kind == "video":
-        videos = [Video.of(Path(str(source))) for source in sources]
+    body, notes = body_of(asf, height, None if camera else unit)
+    facing = view_degrees[0] if view_degrees else None
+
+    def scene(views: Sequence[CameraView]) -> Scene:
+        return combined(views, Path(views[0].name).stem, body, known, facing, up, fps, unit)
+
+    if kind in ("video", "pictures"):
+        videos = [film_of(source, fps) for source in cast(Sequence[str | Path | tuple[Path, ...]], sources)]
         rates = {round(video.fps, 3) for video in videos}
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
         known = calibrated(camera, [video.size for video in videos])
-        views = _filmed(videos, extraction or Extraction(), frames, progress)
+        views = _filmed(videos, extraction or Extraction(), frames, progress, scene)
     else:
         known = calibrated(camera, [None] * len(sources))
         places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
         masks = [cleaned(read_masks(place, frames, label), name_of(place), holes) for place in places]
         views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
-    facing = view_degrees[0] if view_degrees else None
-    return combined(views, Path(views[0].name).stem, body_of(asf, height), known, facing, up, fps)
+    result = scene(views)
+    of_height = [f"a person of {body.stature:.2f} m"] if height is None and asf is None else []
+    result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
+    if result.guesses:
+        progress.log(f"guessed: {'; '.join(result.guesses)}")
+    return result
 
 
-def body_of(asf: str | Path | None, height: float | None) -> Body:
-    """Return the body of a skeleton file, or the average one, scaled to a height in metres."""
-    body = Body.of(built_in.average_skeleton() if asf is None else read_asf(asf))
-    return body if height is None else body.scaled(height / body.stature, height / body.stature)
+def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:
+    """Return the film of a video file, or of pictures, a folder of them or their files, taken at a rate."""
+    if isinstance(source, tuple):
+        return Video.of_pictures(source, Path(name_of(source)), fps)
+    path = Path(source)
+    return Video.of_pictures(images_in(path), path, fps) if path.is_dir() else Video.of(path)
 
 
-def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress) -> list[CameraView]:
-    """Return what videos show. Raises InputError where their masks cannot be those of a person.
+def body_of(asf: str | Path | None, height: float | None, unit: Unit | None = None) -> tuple[Body, Sequence[str]]:
+    """Return the body of a skeleton file, or the average one, scaled to a height in metres; and what was guessed."""
+    acclaim = Acclaim(built_in.average_skeleton(), 1.0) if asf is None else parse_asf(asf, unit)
+    body = Body.of(acclaim.skeleton)
+    if height is None:
+        return body, acclaim.notes
+    return body.scaled(height / body.stature, height / body.stature), ()
+
+
+def _filmed(
+    videos: Sequence[Video],
+    how: Extraction,
+    frames: Range,
+    progress: Progress,
+    scene: Callable[[Sequence[CameraView]], object],
+) -> list[CameraView]:
+    """Return what videos show. Raises InputError where their masks cannot be those of a person, or `scene` does.
 
     Of several ways to take the person out, the first is used whose masks are not doubted, or else are doubted least.
     """
     tried = []
     for way in how.ways(len(videos)):
-        tried.append((way.name, *_taken_out(videos, way, frames, progress)))
+        tried.append((way.name, *_taken_out(videos, way, frames, progress, scene)))
         if tried[-1][2] is None:
             break
     name, views, doubt = min(tried, key=lambda one: 0 if one[2] is None else 1 + one[2].refused)
@@ -141,164 +174,67 @@ def _filmed(videos: Sequence[Video], how: Extraction, frames: Range, progress: P
 
 
 def _taken_out(
-    videos: Sequence[Video], how: Extraction, frames: Range, progress: Progress
+    videos: Sequence[Video],
+    how: Extraction,
+    frames: Range,
+    progress: Progress,
+    scene: Callable[[Sequence[CameraView]], object],
 ) -> tuple[list[CameraView], Verdict | None]:
-    """Return what videos show, and the worst that is wrong with their masks, if anything."""
-    views, doubts = [], []
+    """Return what videos show, and the worst that is wrong with their masks, if anything.
+
+    Of several videos the first seconds come first: where all of them are refused, or contradict each other as a
+    `scene`, the rest need not be read.
+    """
     segmentations = [Segmentation(video, how, frames) for video in videos]  # all are checked before any is read
+
+    def view(part: Segmentation) -> CameraView:
+        pictures = partial(part.video.frames, part.start, part.stop, part.size)
+        return CameraView(part.packed(), part.warnings, str(part.video.path), part.video.size, pictures, part.facings)
+
+    if len(videos) > 1:
+        for part in segmentations:
+            part.read(round(FIRST_SECONDS * part.video.fps))
+        refused = [verdict for part in segmentations if (verdict := part.verdict) and verdict.refused]
+        if all(part.refused_so_far for part in segmentations):
+            return [], refused[0]
+        usable = zip(*(part.usable for part in segmentations), strict=False)
+        if sum(map(all, usable)) >= MIN_FRAMES:
+            try:
+                scene([view(part) for part in segmentations])
+            except InputError as error:
+                return [], refused[0] if refused else Verdict(str(error), True)
+    views, worst = [], None
     for part in segmentations:
         progress.log(f"taking the person out of {part.video.path} by {how.name}")
         try:
-            masks = part.masks(progress.steps)
+            part.masks(progress.steps)
         except InputError as error:
             return [], Verdict(str(error), True)
-        pictures = partial(part.video.frames, part.start, part.stop, part.size)
-        views.append(CameraView(masks, part.warnings, str(part.video.path), part.video.size, pictures, part.facings))
-        doubts += [part.verdict] if part.verdict else []
-    return views, max(doubts, key=lambda one: one.refused, default=None)
-
-
-@dataclass(frozen=True)
-class SourceClip:
-    """Gives a motion at any rate, which is `clip(fps)`; before it is made, `clip.count(fps)` says how long it is."""
-
-    motion: Callable[[float], Motion] = field(repr=False)
-    poses: int  # of the motion as it is stored
-    fps: float | None  # None for a built-in motion, which has as many at any rate
-
-    def __call__(self, fps: float) -> Motion:
-        """Return the motion at a rate."""
-        return self.motion(fps)
-
-    def count(self, fps: float) -> int:
-        """Return about how many poses the motion has at a rate."""
-        return self.poses if self.fps is None else round(self.poses * fps / self.fps)
-
-
-def clip_of(source: Source, asf: str | Path | None = None) -> SourceClip:
-    """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
-
-    A file is read once, now; the .asf of an .amc is `asf`, or the only one beside it. Raises InputError where there is
-    no such motion.
-    """
-    if source in built_in.names():
-        name = str(source)
-        return SourceClip(lambda fps: built_in.motion(name, fps=fps), len(built_in.motion(name)), None)
-    if recorded.is_recorded(source):
-        return recorded_clip(recorded.clip(str(source)))
-    motion = source if isinstance(source, Motion) else _motion_in(source, asf)
-    return SourceClip(motion.resampled, len(motion), motion.fps)
-
-
-def recorded_clip(clip: recorded.RecordedClip) -> SourceClip:
-    """Return what gives a recorded clip's motion at any rate, which is made only then."""
-    return SourceClip(lambda fps: clip.motion().resampled(fps), int(clip.times[-1]) + 1, recorded.FPS)
-
-
-def _motion_in(source: str | Path, asf: str | Path | None) -> Motion:
-    path = Path(source)
-    if path.suffix.lower() == ".amc":
-        return read_clip(_skeleton_file(path, asf), existing(path))
-    if path.suffix.lower() == ".bvh":
-        return read_bvh(existing(path))
-    if path.exists() or path.suffix or os.sep in str(source):
-        expected = "an .amc file, a .bvh file or a built-in motion"
-        raise InputError(f"{existing(path)}: expected {expected}, got {path.suffix or 'a folder'}")
-    return built_in.motion(str(source))  # raises: there is none of that name
-
-
-def load_motion(source: Source, fps: float = FPS, asf: str | Path | None = None) -> Motion:
-    """Return the motion that a source names, at a rate: built-in, recorded, or of an .amc or .bvh file.
-
-    The .asf of an .amc is `asf`, or the only one beside it. Raises InputError where there is no such motion.
-    """
-    return clip_of(source, asf)(fps)
+        views.append(view(part))
+        if part.verdict is not None and (worst is None or part.verdict.refused):
+            worst = part.verdict
+        if worst is not None and worst.refused:
+            break
+    return views, worst
 
 
 def kind_of(source: Footage) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
 
-    A name with folders in it and no suffix is a folder's, even where there is none.
+    A name with folders in it and no suffix is a folder's, even where there is none. Images are a film where there are
+    several, or pages, and the first is a picture in many colours; else they are masks.
     """
-    if isinstance(source, np.ndarray | tuple):
+    if isinstance(source, np.ndarray):
         return "masks"
+    if isinstance(source, tuple):
+        return "pictures" if is_photo(source[0]) and (len(source) > 1 or page_count(source[0]) > 1) else "masks"
     if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)
-    if path.is_dir() or path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
+    if path.suffix.lower() in IMAGES and not path.is_dir():
+        return kind_of((path,))
+    if path.is_dir():
+        return kind_of(tuple(images)) if (images := images_in(path)) else "masks"
+    if path.suffix.lower() in (".npz", ".npy") or (not path.suffix and os.sep in str(source)):
         return "masks"
     return "video" if path.suffix and path.suffix.lower() not in NO_VIDEO else "motion"
-
-
-def _skeleton_file(amc: Path, asf: str | Path | None) -> Path:
-    if asf is not None:
-        return existing(Path(asf))
-    existing(amc)
-    beside = sorted(amc.parent.glob("*.asf"))
-    if len(beside) != 1:
-        raise InputError(f"{amc}: expected --asf or exactly one .asf file beside it, got {len(beside)}")
-    return beside[0]
-
-
-def training_clips(
-    sources: Sequence[Source], asf: str | Path | None = None, *, followed: Source | None = None
-) -> list[SourceClip]:
-    """Return the clips that sources name, each of which gives its motion at any rate.
-
-    A source is what `clip_of` takes; a folder of .amc files with their .asf, or of .bvh files; or `library`,
-    `library:02,16` and `library:-16`: all recorded motions, some people's, all but some people's. The clip that is
-    `followed` is left out of a folder and the library. Raises InputError where there is no such motion, where none is
-    left, and where they would take more memory than this process may have.
-    """
-    clips, poses = [], 0
-    for source in sources:
-        for clip in _clips(source, asf, followed):
-            clips.append(clip)
-            poses += clip.count(FPS)
-            _check_memory(poses, FPS)
-    return clips
-
-
-def training_motions(clips: Sequence[SourceClip], fps: float) -> list[Motion]:
-    """Return the motions of clips at a rate. Raises InputError where they would take more memory than there may be."""
-    _check_memory(sum(clip.count(fps) for clip in clips), fps)
-    return [clip(fps) for clip in clips]
-
-
-def _check_memory(poses: int, fps: float) -> None:
-    """Raise InputError where learning from poses would take more memory than this process may have."""
-    most = allowed_bytes()
-    if poses * POSE_BYTES > most:
-        took = f"{poses * POSE_BYTES / 1e9:.1f} GB for {poses:,} poses at {fps:g} frames a second"
-        raise InputError(f"train must take at most the {most / 1e9:.1f} GB of memory that there may be, got {took}")
-
-
-def _clips(source: Source, asf: str | Path | None, followed: Source | None) -> Iterator[SourceClip]:
-    if isinstance(source, str) and recorded.is_library(source):
-        clips = [clip for clip in recorded.named(source) if clip.name != _stem(followed)]
-        if not clips:
-            raise InputError(f"train must hold another clip than the source, got {source} for {followed}")
-        yield from (recorded_clip(clip) for clip in clips)
-    elif not isinstance(source, Motion) and Path(source).is_dir():
-        paths = sorted(path for path in Path(source).iterdir() if path.suffix.lower() in MOTIONS and path.is_file())
-        if not paths:
-            raise InputError(f"{source}: expected a folder of {' or '.join(MOTIONS)} files, got none in it")
-        others = [path for path in paths if not _same(path, followed)]
-        if not others:
-            raise InputError(f"{source}: expected a folder with another clip than the source, got that one alone")
-        yield from (clip_of(path, asf) for path in others)
-    elif _same(source, followed):
-        raise InputError(f"train must not contain the source itself, got {source}")
-    else:
-        yield clip_of(source, asf)
-
-
-def _stem(source: Source | None) -> str | None:
-    """Return a clip's name: a recorded one's, or that of a file such as 16_15.amc."""
-    return source.name if isinstance(source, Motion) else None if source is None else Path(source).stem
-
-
-def _same(one: Source, other: Source | None) -> bool:
-    if isinstance(one, Motion) or isinstance(other, Motion) or other is None:
-        return one is other
-    return str(one) == str(other) or (Path(one).exists() and Path(one).resolve() == Path(other).resolve())

@@ -1,9 +1,11 @@
-"""Reads video frame by frame, so that memory does not grow with its length."""
+"""Reads video, or pictures of a film, frame by frame, so that memory does not grow with its length."""
 
 import errno
 import os
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,14 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.images import PIXELS
+from posefit.files import opencv_name
+from posefit.footage.images import PIXELS, page_count, read_image
+from posefit.footage.readers import numbered
+from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
 
+HEAD = 2_000  # bytes at the beginning of a file by which a text is recognised
+SQUARE = 0.02  # by how much the sides of a pixel may differ
 Order = NDArray[np.int64]  # (T,) numbers of frames
 CODE = "mp4v"
 UNEVEN = 0.75  # of the distance between frames: one that comes so much too early or too late is not in its place
@@ -26,12 +33,15 @@ os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 @dataclass(frozen=True)
 class Video:
-    """A video file, opened again for each pass through its frames."""
+    """A film: a video file, opened again for each pass through its frames, or pictures, one a frame."""
 
     path: Path
     fps: float
     size: tuple[int, int]  # width and height in pixels, as filmed
     claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
+    pictures: Sequence[tuple[Path, int]] = field(default=(), repr=False)  # files and their pages; of a video file none
+    warnings: Sequence[str] = ()  # what a user should know of its frames
+    guesses: Sequence[str] = ()  # what it does not state
     _order: Order = field(kw_only=True, repr=False, compare=False)  # of the file's frames: one for each moment
     _filmed: NDArray[np.bool_] = field(kw_only=True, repr=False, compare=False)  # (T,) at that moment
 
@@ -42,7 +52,8 @@ class Video:
         if not path.is_file():
             came = "a folder" if path.is_dir() else "nothing of that name"
             raise InputError(f"{path}: expected a video file, got {came}")
-        capture = cv2.VideoCapture(str(path))
+        _check_no_text(path)
+        capture = cv2.VideoCapture(opencv_name(path))
         try:
             wide, tall = (capture.get(key) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
             if wide * tall > PIXELS:
@@ -51,39 +62,73 @@ class Video:
             read, image = capture.read()
             if not read:
                 raise InputError(f"{path}: expected a video that OpenCV can read, got none or one without frames")
-            fps = float(capture.get(cv2.CAP_PROP_FPS))
-            claimed = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+            fps, claimed, across, down = (
+                float(capture.get(key))
+                for key in (cv2.CAP_PROP_FPS, cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_SAR_NUM, cv2.CAP_PROP_SAR_DEN)
+            )
+            _check_written(path, image, capture)
         finally:
             capture.release()
-        rate = fps if np.isfinite(fps) and 0.0 < fps <= 1000.0 else 30.0
-        order, filmed, rate = _even(_moments(path), rate)
-        video = cls(path, rate, (image.shape[1], image.shape[0]), _order=order, _filmed=filmed)
+        stated = np.isfinite(fps) and 0.0 < fps <= 1000.0
+        order, filmed, rate = _even(_moments(path), fps if stated else FPS)
+        warnings = []
+        if across > 0.0 < down and abs(across / down - 1.0) > SQUARE:
+            aspect = f"{across / down:.3g} times as wide as high"
+            warnings.append(
+                f"{path}: its pixels are {aspect}, which is not corrected: the person looks that much too slim"
+            )
+        if uneven := bool((np.diff(order) != 1).any()):
+            held = np.count_nonzero(~filmed)
+            warnings.append(
+                f"{path}: its frames come at uneven times; it is sampled {rate:.3g} times a second, so that {held} of "
+                f"{len(order)} frames stand for moments without a filmed one, and are held"
+            )
+        guesses = [] if stated else [f"{path}: {FPS:g} frames a second, which the file does not state"]
+        size = image.shape[1], image.shape[0]
+        video = cls(path, rate, size, warnings=warnings, guesses=guesses, _order=order, _filmed=filmed)
         # what a file says counts the frames as they were filmed
-        return replace(video, claimed=int(claimed)) if 0.0 < claimed < 1e9 and not video.uneven else video
+        return replace(video, claimed=int(claimed)) if 0.0 < claimed < 1e9 and not uneven else video
+
+    @classmethod
+    def of_pictures(cls, files: Sequence[Path], name: Path, fps: float | None) -> "Video":
+        """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
+        frames, guesses = numbered(files, str(name))
+        pictures = [(file, page) for file in files for page in range(page_count(file))]
+        image = _picture(*pictures[0])
+        filmed = np.array([file is not None for file in frames])
+        order = np.cumsum(filmed) - 1
+        if len(pictures) > len(files):
+            order, filmed = np.arange(len(pictures)), np.ones(len(pictures), dtype=bool)
+        size = image.shape[1], image.shape[0]
+        if fps is None:
+            guesses.append(f"{FPS:g} frames a second")
+        return cls(name, fps or FPS, size, 0, pictures, guesses=guesses, _order=order, _filmed=filmed)
 
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.
 
         Raises InputError where a frame has another size than the first.
         """
-        wanted = self._order[start:stop:step]
-        capture = cv2.VideoCapture(str(self.path))
+        wanted = Counter(self._order[start:stop:step].tolist())  # a frame may stand for several moments
+        decoded = self._decoded(list(wanted)) if not self.pictures else (_picture(*self.pictures[k]) for k in wanted)
+        for (number, times), filmed in zip(wanted.items(), decoded, strict=False):
+            if (filmed.shape[1], filmed.shape[0]) != self.size:
+                came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {number}"
+                raise InputError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
+            yield from repeat(scaled(filmed, size), times)
+
+    def _decoded(self, numbers: Sequence[int]) -> Iterator[Image]:
+        """Yield the frames of these numbers of a video file, as far as it can be read."""
+        capture, k = cv2.VideoCapture(opencv_name(self.path)), -1
         try:
-            k, image = -1, None
-            for number in wanted.tolist():
+            for number in numbers:
                 while k < number - 1 and capture.grab():
                     k += 1
-                if k < number:
-                    read, filmed = capture.read()
-                    if not read:
-                        return
-                    k += 1
-                    if (filmed.shape[1], filmed.shape[0]) != self.size:
-                        came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {k}"
-                        raise InputError(f"{self.path}: expected frames of {self.size[0]}x{self.size[1]}, got {came}")
-                    image = scaled(filmed, size)
-                assert image is not None
-                yield image
+                read, filmed = capture.read()
+                if not read:
+                    return
+                k += 1
+                yield np.asarray(filmed, dtype=np.uint8)
         finally:
             capture.release()
 
@@ -95,21 +140,42 @@ class Video:
         """Return whether frame k was filmed at its time; else it is the frame before or after it once more."""
         return bool(self._filmed[k])
 
-    @property
-    def warnings(self) -> list[str]:
-        """What a user should know of its frames' times."""
-        if not self.uneven:
-            return []
-        held = np.count_nonzero(~self._filmed)
-        return [
-            f"{self.path}: its frames come at uneven times; it is sampled {self.fps:.3g} times a second, so that "
-            f"{held} of {self.count()} frames stand for moments without a filmed one, and are held"
-        ]
 
-    @property
-    def uneven(self) -> bool:
-        """Whether its frames come at times so uneven that some are taken twice, or none at all."""
-        return bool((np.diff(self._order) != 1).any())
+def _picture(file: Path, page: int) -> Image:
+    image = read_image(file, grey=False, page=page)
+    if image is None:
+        raise InputError(f"{file}: expected a picture, got a file that is none")
+    return image
+
+
+def _check_no_text(path: Path) -> None:
+    """Return nothing. Raises InputError for a text, such as a playlist, by which FFmpeg would open other files."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    if head and not head.startswith(b"YUV4MPEG2") and (head.startswith((b"ffconcat", b"#EXTM3U")) or _is_text(head)):
+        raise InputError(f"{path}: expected a video that OpenCV can read, got a text")
+
+
+def _is_text(head: bytes) -> bool:
+    return all(byte >= 32 or byte in b"\t\n\r\f" for byte in head)
+
+
+def _check_written(path: Path, first: Any, capture: Any) -> None:
+    """Return nothing. Raises InputError where all frames are the same.
+
+    OpenCV 4.13 to 5.0 do not convert interlaced frames, and return what the memory held before.
+    """
+    more, image = capture.read()
+    if not more:
+        return
+    while more:
+        if not np.array_equal(first, image):
+            return
+        more, image = capture.read()
+    raise InputError(
+        f"{path}: expected a film, got the same picture in all frames; if it is interlaced, which this OpenCV cannot "
+        "read: ffmpeg -i FILE -vf yadif NEW.mp4"
+    )
 
 
 def scaled(image: Any, size: tuple[int, int]) -> Image:
@@ -123,7 +189,7 @@ def scaled(image: Any, size: tuple[int, int]) -> Image:
 
 def _moments(path: Path) -> Array:
     """Return when each frame is shown, in seconds, by going through them."""
-    capture, times = cv2.VideoCapture(str(path)), []
+    capture, times = cv2.VideoCapture(opencv_name(path)), []
     while capture.grab():
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
     capture.release()
@@ -159,7 +225,7 @@ class VideoWriter:
 
     def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
         self._path, self._count = path, 0
-        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*CODE), fps, size)
+        self._writer = cv2.VideoWriter(opencv_name(path), cv2.VideoWriter.fourcc(*CODE), fps, size)
         if not self._writer.isOpened():
             raise InputError(f"{path}: expected OpenCV to write {CODE} video, got a build or a disk that cannot")
 
@@ -171,7 +237,7 @@ class VideoWriter:
     def close(self) -> None:
         """Finish the file. Raises OSError where it does not hold all frames."""
         self._writer.release()
-        capture = cv2.VideoCapture(str(self._path))
+        capture = cv2.VideoCapture(opencv_name(self._path))
         written = round(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
         capture.release()
         if written != self._count:

@@ -1,16 +1,27 @@
-"""Calibration files of other programs, read into cameras: OpenCV's YAML and JSON, Qualisys' XML, and TOML.
+"""Calibration files of other programs, read into cameras.
 
-A file holds one camera or several. All give camera_from_world in OpenCV's frame; which way is up in their world
-differs, and is turned to +y here: the axis that the images of all cameras see pointing up, unless `up` names one.
+| from | file |
+|---|---|
+| OpenCV, as FileStorage writes it, or any names that its users give | YAML, JSON, XML |
+| ROS | camera_info, YAML |
+| EasyMocap | intri.yml, with extri.yml beside it |
+| Pose2Sim, Anipose, Caliscope | TOML |
+| Qualisys | XML |
+| posefit, `Camera.to_json` | JSON |
 
-What OpenCV's FileStorage writes, as YAML, JSON or XML, is read without OpenCV, whose reader trusts the file: values
-become numbers, texts, lists and dictionaries, nothing is expanded, and a matrix is as large as the numbers that are
-there.
+A file holds one camera or several; `cameras.toml:left` is one of them by its name. All give camera_from_world in
+OpenCV's frame; which way is up in their world differs, and is turned to +y here: the axis that the images of all
+cameras see pointing up, unless `up` names one. Lengths are in the file's own unit, see `footage/cameras.py`.
+
+Each file but Qualisys' and our own becomes texts, numbers, lists and dictionaries, without OpenCV, whose reader trusts
+the file: nothing is expanded, and a matrix is as large as the numbers that are there. One reader looks for cameras in
+that, whatever the format. A key that seems to describe a lens in a way that is not known here is an error, not a
+straight lens.
 """
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +31,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.camera import Camera
+from posefit.geometry.camera import Camera, check_focal
 from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
@@ -35,14 +46,34 @@ SUBPIXELS = 64.0  # Qualisys counts lengths on the sensor in 64ths of a pixel
 HALF = 0.5  # pixels: files count the centre of the first pixel as 0, we as 0.5
 # The rotation of the world that turns an axis to +y.
 TURNS = {"x": [[0, -1, 0], [1, 0, 0], [0, 0, 1]], "y": np.eye(3), "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]}
+LEVEL = 0.5  # of the images' up direction: where less of it is along the axis that a file says is up, it is doubted
+
+# Names of what describes a camera, in small letters and without signs between: Camera_Matrix is cameramatrix
+MATRIX = ("cameramatrix", "matrix", "k", "m", "mtx", "intrinsic", "intrinsics", "intrinsicmatrix")
+LENS = (
+    *("distortioncoefficients", "distortioncoeffs", "distortions", "distortion", "distcoefficients", "distcoeffs"),
+    *("distcoefs", "distcoeff", "dist", "d", "kc"),
+)
+MODEL = ("distortionmodel", "fisheyemodel", "fisheye", "isfisheye", "lensmodel", "cameramodel", "model")
+SIZE = ("imagesize", "size", "resolution", "imgsize", "imsize")
+SIDES = (("imagewidth", "width", "w"), ("imageheight", "height", "h"))
+ROTATION = ("r", "rotation", "rvec", "rot", "rmat", "rotationmatrix", "rotationvector")
+TRANSLATION = ("t", "translation", "tvec", "translationvector")
+_FISHEYES = ("1", "true", "yes", "fisheye", "equidistant", "kannalabrandt", "kannalabrandt4", "opencvfisheye", "kb4")
+_POLYNOMIALS = (
+    *("0", "false", "no", "none", "null", "", "plumbbob", "brown", "brownconrady", "pinhole", "perspective"),
+    *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
+)
+_OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
+_OF_LENS = re.compile(r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|k[1-9]|xi")
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """One camera's entry in a calibration file. Lengths are metres and pixels."""
+    """One camera's entry in a calibration file. Lengths are metres, or the file's unit, and pixels."""
 
     name: str
-    size: tuple[int, int]  # width, height
+    size: tuple[int, int] | None  # width, height; None where the file does not state it: that of its pictures
     matrix: Array = field(repr=False)  # (3, 3) of the pinhole, skew ignored; pixel centres at 0, as OpenCV counts them
     distortion: Array = field(repr=False)  # (4,) to (14,): OpenCV's k1, k2, p1, p2, k3, ...; none is all 0
     rotation: Array | None = field(repr=False)  # (3, 3) camera_from_world; None where the file does not place it
@@ -52,15 +83,19 @@ class Calibration:
 
     @property
     def distorted(self) -> bool:
-        """Whether the lens bends straight lines."""
-        return bool(np.any(self.distortion))
+        """Whether the lens bends straight lines; a fisheye does so by itself."""
+        return self.fisheye or bool(np.any(self.distortion))
+
+    def in_metres(self, metres: float) -> "Calibration":
+        """Return the calibration of a file whose unit is so many metres."""
+        return self if self.translation is None else replace(self, translation=metres * self.translation)
 
     def camera(self, size: tuple[int, int], world: Array) -> Camera:
         """Return the camera of pictures scaled to `size` without their distortion; `world` (3, 3) turns its up to +y.
 
         A camera that the file does not place stands at the origin and looks level along -z.
         """
-        scale = np.array(size) / self.size
+        scale = np.array(size) / (self.size or size)
         rotation = np.diag([1.0, -1.0, -1.0]) if self.rotation is None else self.rotation @ world.T
         translation = np.zeros(3) if self.translation is None else self.translation
         focal = np.diag(self.matrix)[:2] * scale
@@ -71,8 +106,12 @@ class Calibration:
         """Return the calibration of pictures of another size that only have rows or columns more or less at their end.
 
         Codecs fill up a picture to blocks of 16 pixels, so that 1080 rows become 1088, and some programs leave them
-        there. None where the sizes differ otherwise.
+        there. None where the sizes differ otherwise; a calibration of no size fits where its centre is in the middle
+        half of the picture.
         """
+        if self.size is None:
+            middle = self.matrix[:2, 2] / size
+            return replace(self, size=size) if ((middle > 0.25) & (middle < 0.75)).all() else None
         for mine, other in zip(self.size, size, strict=True):
             if mine != other and (abs(mine - other) >= BLOCK or max(mine, other) % BLOCK):
                 return None
@@ -103,77 +142,188 @@ class Calibration:
 def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
-    It is +y where the file states it; otherwise, without `up`, the axis, in either direction, that points up in the
+    It is `up`, or else +y where the file states it; otherwise the axis, in either direction, that points up in the
     images most. Raises ValueError where `up` is none.
     """
     if up is not None and up not in TURNS:
         raise InputError(f"up must be one of x, y, z, got {quoted(up)}")
-    placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
-    if not placed or any(camera.upright for camera in calibrations):
+    image_up = _image_up(calibrations)
+    if image_up is None or (up is None and any(camera.upright for camera in calibrations)):
         return np.eye(3)
-    image_up = -np.sum([rotation[1] for rotation in placed], axis=0)  # images' up, in the world
-    axis: Up = up or ("x", "y", "z")[int(np.abs(image_up).argmax())]
+    axis = up or _axis(image_up)
     turn = np.array(TURNS[axis], dtype=np.float64)
     return turn if up is not None or (turn @ image_up)[1] > 0.0 else np.diag([1.0, -1.0, -1.0]) @ turn
 
 
+def guessed_up(calibrations: Sequence[Calibration]) -> str:
+    """Return what `upright` assumes of calibrations without `up`, as a message says it; "" where nothing is."""
+    image_up = _image_up(calibrations)
+    if image_up is None:
+        return ""
+    axis = _axis(image_up)
+    if not any(camera.upright for camera in calibrations):
+        return f"{'+' if image_up['xyz'.index(axis)] > 0.0 else '-'}{axis} is up in the cameras' world"
+    if image_up[1] < LEVEL * np.linalg.norm(image_up):
+        return f"+y is up in the cameras' world, as posefit's own files have it, though {axis} is in their images"
+    return ""
+
+
+def _image_up(calibrations: Sequence[Calibration]) -> Array | None:
+    """Return the images' up direction in the world (3,); None where no camera is placed."""
+    placed = [camera.rotation for camera in calibrations if camera.rotation is not None]
+    return -np.sum([rotation[1] for rotation in placed], axis=0) if placed else None
+
+
+def _axis(direction: Array) -> Up:
+    axes: Sequence[Up] = ("x", "y", "z")
+    return axes[int(np.abs(direction).argmax())]
+
+
 def read_calibrations(path: str | Path) -> list[Calibration]:
-    """Return the cameras of a calibration file, in its order. Raises ValueError naming the file and what is wrong."""
-    path = Path(path)
+    """Return the cameras of a calibration file, in its order; of `FILE:NAME` that of this name.
+
+    Raises ValueError naming the file and what is wrong.
+    """
+    path, chosen = Path(path), ""
+    file, colon, name = str(path).rpartition(":")
+    if colon and not path.is_file():
+        path, chosen = Path(file), name
     if not path.is_file():
         raise InputError(f"{path}: expected a calibration file, got nothing of that name")
     text = read_text(path, LARGEST_FILE)
     try:
-        calibrations = _reader(path, text)(path, text)
+        calibrations = _cameras(path, text)
         for calibration in calibrations:
-            calibration.camera(calibration.size, np.eye(3))
+            calibration.camera(calibration.size or (1000, 1000), np.eye(3))
     except (ValueError, TypeError, KeyError, OverflowError, AttributeError, RecursionError, cv2.error) as error:
         cause = " ".join(str(error).split()) or type(error).__name__
         reason = cut(f"no {cause}" if isinstance(error, KeyError) else cause, MESSAGE)
         raise InputError(f"{path}: expected a calibration of OpenCV, Qualisys, TOML or posefit, got {reason}") from None
     if not calibrations:
         raise InputError(f"{path}: expected a calibration with a camera, got none")
-    return calibrations
+    names = [calibration.name for calibration in calibrations]
+    if chosen and chosen not in names:
+        raise InputError(f"{path}: expected the name of a camera, {cut(', '.join(names))}, got {quoted(chosen)}")
+    return [calibration for calibration in calibrations if chosen in ("", calibration.name)]
 
 
-def _reader(path: Path, text: str) -> Callable[[Path, str], list[Calibration]]:
+def _cameras(path: Path, text: str) -> list[Calibration]:
+    """Return the cameras of a file. Raises an error that says what it is instead."""
     start = text.lstrip()[:100]
     if start.startswith("<") and "opencv_storage" not in start:
-        return _qualisys
+        return _qualisys(text)
     if start.startswith("{") and "camera_from_world" in text:
-        return _own
-    if start.startswith(("{", "%YAML", "<")):
-        return _opencv
-    if path.suffix.lower() == ".toml":
-        return _toml
-    raise InputError(
-        f"a file that is none of them, {path.suffix or 'without a suffix'}; OpenCV's YAML begins with %YAML"
-    )
+        return _own(path)
+    values = _stored_values(path, start, text)
+    if "names" in values and any(key.startswith("K_") or key.startswith("Rot_") for key in values):
+        return _easymocap(path, values)
+    return list(_described(path.stem, values, set(), 2))
 
 
-def _own(path: Path, _: str) -> list[Calibration]:
+def _own(path: Path) -> list[Calibration]:
     camera = Camera.from_json(path)
     matrix, size = _pinhole(camera.focal, camera.centre - HALF), (camera.width, camera.height)
     return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation, upright=True)]
 
 
-def _toml(_: Path, text: str) -> list[Calibration]:
-    return [
-        _stated(
-            str(camera.get("name", name)),
-            camera["size"],
-            camera["matrix"],
-            camera.get("distortions", []),
-            camera.get("rotation"),
-            camera.get("translation"),
-            bool(camera.get("fisheye", False)),
-        )
-        for name, camera in parsed_toml(text).items()
-        if name != "metadata" and isinstance(camera, dict)
-    ]
+def _described(name: str, values: Mapping[str, Any], read: set[int], depth: int) -> Iterator[Calibration]:
+    """Yield the camera that values describe by their keys, or those of the values that are such, to some depth.
+
+    `read` are those read already, as an alias of YAML may give the same values again and again.
+    """
+    known = {_plain(key): value for key, value in values.items()}
+    if str(known.get("ignore")).lower() == "true":  # a camera that Caliscope left out
+        return
+    if {"fx", "fy", "cx", "cy"} <= known.keys():
+        known["matrix"] = _pinhole(*([_number_of(known[kind + axis]) for axis in "xy"] for kind in "fc")).tolist()
+    if _first(known, MATRIX) is not None:
+        yield _camera(name, values, known)
+        return
+    if _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
+        raise InputError(f"{quoted(name)} without camera_matrix, image_width and image_height")
+    for key, value in values.items() if depth else ():
+        several = value if isinstance(value, list) else [value]
+        for number, entry in enumerate(several):
+            if isinstance(entry, dict) and id(entry) not in read and key != "metadata":
+                read.add(id(entry))
+                own = f"{key}{number}" if isinstance(value, list) else key
+                yield from _described(str(entry.get("name", own)), entry, read, depth - 1)
 
 
-def _qualisys(_: Path, text: str) -> list[Calibration]:
+def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> Calibration:
+    """Return the camera that values describe, whose keys in small letters and digits are those of `known`."""
+    matrix = _matrix_of(_first(known, MATRIX))
+    if matrix.shape == (4,):  # as Kalibr has it
+        matrix = _pinhole(matrix[:2], matrix[2:])
+    fisheye = _is_fisheye(known)
+    numbered = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")  # in OpenCV's order
+    lens = _first(known, LENS)
+    if lens is None or (isinstance(lens, dict) and "k1" in lens):
+        lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
+    for key, value in values.items():
+        if _OF_LENS.fullmatch(plain := _plain(key)) and plain not in (*LENS, *MODEL, *numbered) and _counts(value):
+            raise InputError(f"the lens key {quoted(key)} of {quoted(name)}, which is not known")
+    size = _first(known, SIZE) or [_first(known, names) for names in SIDES]
+    rotation, translation = _first(known, ROTATION), _first(known, TRANSLATION)
+    if "distortionmodel" in known and "p" in known:  # a message of ROS, whose R rectifies and does not place
+        rotation = translation = None
+    if (rotation is None) != (translation is None):
+        raise InputError("one with a rotation or a translation, but not both")
+    return _stated(
+        name,
+        None if None in size else [_number_of(side) for side in size],
+        matrix,
+        _matrix_of(lens),
+        None if rotation is None else _matrix_of(rotation),
+        None if translation is None else _matrix_of(translation).reshape(-1),
+        fisheye,
+    )
+
+
+def _plain(key: object) -> str:
+    return re.sub(r"[^a-z0-9]", "", str(key).lower())
+
+
+def _first(known: Mapping[str, Any], names: Sequence[str]) -> Any:
+    return next((known[name] for name in names if name in known), None)
+
+
+def _counts(value: Any) -> bool:
+    """Return whether a value has a number other than 0."""
+    try:
+        return bool(_matrix_of(value).any())
+    except (ValueError, TypeError, KeyError):
+        return False
+
+
+def _is_fisheye(known: Mapping[str, Any]) -> bool:
+    """Return whether the lens is OpenCV's fisheye. Raises ValueError for a model that OpenCV has not."""
+    for key in (name for name in MODEL if name in known):
+        model = _plain(known[key])
+        if model in _FISHEYES:
+            return True
+        if model not in _POLYNOMIALS and (key not in ("cameramodel", "model") or _OTHERS.search(model)):
+            raise InputError(f"the lens model {quoted(known[key])}, which is not known")
+    return False
+
+
+def _easymocap(path: Path, values: dict[str, Any]) -> list[Calibration]:
+    """Return the cameras of EasyMocap's intri.yml and extri.yml; either is the file, the other stands beside it."""
+    for here, there in (("intri", "extri"), ("extri", "intri")):
+        other = path.with_name(path.name.replace(here, there, 1))
+        if other != path and other.is_file():
+            values = {**_stored_values(other, "%", read_text(other, LARGEST_FILE)), **values}
+    keys = {"K": "K", "dist": "dist", "R": "Rot", "rvec": "R", "T": "T", "width": "W", "height": "H"}
+    calibrations: list[Calibration] = []
+    for name in values["names"]:
+        entry = {key: values[f"{kind}_{name}"] for key, kind in keys.items() if f"{kind}_{name}" in values}
+        if not (_counts(entry.get("width")) and _counts(entry.get("height"))):
+            entry.pop("width", None)
+        calibrations += _described(str(name), entry, set(), 0) if entry else []
+    return calibrations
+
+
+def _qualisys(text: str) -> list[Calibration]:
     calibrations: list[Calibration] = []
     for number, camera in enumerate(_xml_of(text).iter("camera")):
         view, lens, place = (_tag(camera, name) for name in ("fov_video", "intrinsic", "transform"))
@@ -200,48 +350,34 @@ def _tag(camera: Any, name: str) -> Any:
     return tag
 
 
-def _opencv(path: Path, text: str) -> list[Calibration]:
-    values = _stored_values(text)
-
-    def matrix(*names: str) -> Array | None:
-        return next((_matrix_of(values[name]) for name in names if name in values), None)
-
-    own = matrix("camera_matrix", "cameraMatrix", "K", "M")
-    size = [values.get(f"image_{name.lower()}", values.get(f"image{name}")) for name in ("Width", "Height")]
-    if own is None or None in size:
-        raise InputError("one without camera_matrix, image_width and image_height")
-    distortion = matrix("distortion_coefficients", "dist_coeffs", "distCoeffs", "distortion", "D")
-    rotation, translation = matrix("R", "rotation", "rvec"), matrix("T", "translation", "tvec")
-    if (rotation is None) != (translation is None):
-        raise InputError("one with a rotation or a translation, but not both")
-    if rotation is not None and rotation.size == 3:
-        rotation = rotation.reshape(3)
-    if translation is not None:
-        translation = translation.reshape(-1)
-    sides = [_number_of(side) for side in size]
-    return [_stated(path.stem, sides, own, [] if distortion is None else distortion, rotation, translation)]
-
-
 def _stated(
     name: str, size: Any, matrix: Any, distortion: Any, rotation: Any, translation: Any, fisheye: bool = False
 ) -> Calibration:
-    """Return what a file states, checked; a rotation (3,) is its axis, as long as its angle."""
-    width, height = size
-    if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
-        raise InputError(f"an image size of {width} x {height}")
+    """Return what a file states, checked; a rotation of three numbers is its axis, as long as its angle."""
+    matrix = _numbers(np.reshape(matrix, (3, 3)) if np.shape(matrix) == (9,) else matrix, (3, 3))
+    if size is not None:
+        width, height = size
+        if not (float(width).is_integer() and float(height).is_integer() and width >= 1 and height >= 1):
+            raise InputError(f"an image size of {width} x {height}")
+        size = int(width), int(height)
+    if abs(matrix[1, 0]) > 1e-6 or np.abs(matrix[2] - [0.0, 0.0, 1.0]).max() > 1e-6:
+        raise InputError(f"a camera matrix that is not of the form fx 0 cx, 0 fy cy, 0 0 1: {quoted(matrix.tolist())}")
+    check_focal(np.diag(matrix)[:2], size or 2.0 * matrix[:2, 2])
     lens = np.array(distortion, dtype=np.float64).reshape(-1)
     if not np.isfinite(lens).all():
         raise InputError("a distortion that is not finite")
     if not lens.any():
         lens = np.zeros(4)
-    elif lens.size not in DISTORTIONS:
-        raise InputError(f"a distortion of {lens.size} numbers")
-    if np.shape(rotation) == (3,):
-        rotation = cv2.Rodrigues(_numbers(rotation, (3,)))[0]
+    elif lens.size not in DISTORTIONS or (fisheye and lens[4:].any()):
+        raise InputError(f"a distortion of {lens.size} numbers{' of a fisheye' if fisheye else ''}")
+    if rotation is not None and np.size(rotation) == 3:
+        rotation = cv2.Rodrigues(_numbers(np.reshape(rotation, 3), (3,)))[0]
+    elif np.shape(rotation) == (9,):
+        rotation = np.reshape(rotation, (3, 3))
     return Calibration(
         name,
-        (int(width), int(height)),
-        _numbers(matrix, (3, 3)),
+        size,
+        matrix,
         lens,
         None if rotation is None else _numbers(rotation, (3, 3)),
         None if translation is None else _numbers(translation, (3,)),
@@ -249,7 +385,7 @@ def _stated(
     )
 
 
-def _pinhole(focal: Array, centre: Array) -> Array:
+def _pinhole(focal: Sequence[float] | Array, centre: Sequence[float] | Array) -> Array:
     return np.array([[focal[0], 0.0, centre[0]], [0.0, focal[1], centre[1]], [0.0, 0.0, 1.0]])
 
 
@@ -269,10 +405,13 @@ def _orthonormal(rotation: Array) -> Array:
     return np.asarray(nearest)
 
 
-def _stored_values(text: str) -> dict[str, Any]:
-    """Return the values of a file by name. Raises ValueError where it is none of the three formats."""
-    start = text.lstrip()[:1]
-    values = _xml(text) if start == "<" else parsed_json(text) if start == "{" else _yaml(text)
+def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
+    """Return the values of a file by name. Raises ValueError where it is none of the four formats."""
+    if path.suffix.lower() == ".toml":
+        return parsed_toml(text)
+    if not (start.startswith(("<", "{", "%")) or path.suffix.lower() in (".yml", ".yaml")):
+        raise InputError(f"a file that is none of them, {path.suffix or 'without a suffix'}; YAML is .yml or .yaml")
+    values = _xml(text) if start.startswith("<") else parsed_json(text) if start.startswith("{") else _yaml(text)
     if not isinstance(values, dict):
         raise InputError(f"a file without names, {quoted(values)}")
     return values

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from posefit.reading import parsed_json, quoted, read_text
 LARGEST_SIDE = 16_384  # pixels
 LARGEST_FILE = 1_000_000  # bytes
 FIELD_OF_VIEW = math.radians(40.0)  # across the larger side; our guess for an unknown camera
+FOCALS = 0.05, 100.0  # times the larger side: lenses of 170 degrees to 0.6
 MARGIN = 0.06  # share of the image left free around what `framing` shows
 _KEYS = ("width", "height", "focal", "centre", "camera_from_world")
 
@@ -39,6 +41,7 @@ class Camera:
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         if (self.focal <= 0.0).any():
             raise InputError(f"focal must be positive, got {self.focal.tolist()}")
+        check_focal(self.focal, (self.width, self.height))
         if np.abs(self.rotation @ self.rotation.T - np.eye(3)).max() > 1e-5 or np.linalg.det(self.rotation) < 0.0:
             raise InputError(f"rotation must be orthonormal and right-handed, got {self.rotation.tolist()}")
 
@@ -121,9 +124,11 @@ class Camera:
 
     @classmethod
     def from_json(cls, path: str | Path) -> "Camera":
-        """Return the camera of a file written by `to_json`. Raises ValueError naming the file and the key."""
+        """Return the camera of what `to_json` wrote: a file or the text. Raises ValueError naming the key."""
+        text = path if isinstance(path, str) and path.lstrip().startswith("{") else ""
+        path = "camera" if text else path
         expected = f"{path}: expected a JSON object with {', '.join(_KEYS)}"
-        text = read_text(path, LARGEST_FILE)
+        text = text or read_text(path, LARGEST_FILE)
         try:
             values = parsed_json(text)
         except ValueError as error:
@@ -137,3 +142,11 @@ class Camera:
             return cls(**values, rotation=matrix[:3, :3], translation=matrix[:3, 3])
         except ValueError as error:
             raise InputError(f"{path}: {error}") from None
+
+
+def check_focal(focal: Array, size: Sequence[float] | Array) -> None:
+    """Return nothing. Raises InputError where no lens has such focal lengths (2,) for pictures of a size."""
+    low, high = (share * max(size) for share in FOCALS)
+    if not (low <= np.min(focal) and np.max(focal) <= high):
+        came = " and ".join(f"{length:g}" for length in focal)
+        raise InputError(f"focal must be in pixels, for such pictures {low:g} to {high:g}, got {came}")

@@ -18,7 +18,7 @@ LOCKED = 1e-7  # radians from the singularity, where the outer and the inner axi
 def rotation_from_root_angles(angles: Array) -> Array:
     """Return the rotations (..., 3, 3) of root angles (..., 3): yaw, pitch, roll. Interpretation S3."""
     yaw, pitch, roll = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
-    return _about(1, yaw) @ _about(0, pitch) @ _about(2, roll)
+    return rotation_about(1, yaw) @ rotation_about(0, pitch) @ rotation_about(2, roll)
 
 
 def yaw_first(angles: Array) -> Array:
@@ -27,7 +27,7 @@ def yaw_first(angles: Array) -> Array:
     `angles` (..., 3) are in the order of yaw, pitch and roll, too: about y, x and z.
     """
     y, x, z = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
-    return root_angles_from_rotation(_about(0, x) @ _about(1, y) @ _about(2, z))
+    return root_angles_from_rotation(rotation_about(0, x) @ rotation_about(1, y) @ rotation_about(2, z))
 
 
 def root_angles_from_rotation(rotations: Array) -> Array:
@@ -38,12 +38,32 @@ def root_angles_from_rotation(rotations: Array) -> Array:
 def rotation_from_joint_angles(angles: Array) -> Array:
     """Return the rotations (..., 3, 3) of joint angles (..., 3), Rz @ Ry @ Rx."""
     rx, ry, rz = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
-    return _about(2, rz) @ _about(1, ry) @ _about(0, rx)
+    return rotation_about(2, rz) @ rotation_about(1, ry) @ rotation_about(0, rx)
 
 
 def joint_angles_from_rotation(rotations: Array) -> Array:
     """Return rx, ry, rz (..., 3) of rotations (..., 3, 3), so that Rz @ Ry @ Rx gives them back."""
     return angles_about(JOINT_ORDER, rotations)[..., ::-1].copy()
+
+
+def shortest_turn(start: Array, end: Array) -> Array:
+    """Return the rotations (..., 3, 3) of the least angle that turn directions (..., 3) to others; none where one is 0.
+
+    Between opposite directions it is any of half a turn.
+    """
+    start, end = np.broadcast_arrays(np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64))
+    lengths = np.linalg.norm(start, axis=-1) * np.linalg.norm(end, axis=-1)
+    known = lengths > 0.0
+    cross = np.cross(start, end)
+    cosine, sine = (start * end).sum(axis=-1), np.linalg.norm(cross, axis=-1)
+    opposite = known & (sine <= 1e-12 * lengths) & (cosine < 0.0)
+    other = along_y(np.where(known[..., None], start, 1.0))[..., 0]  # across the direction
+    axis = np.where(opposite[..., None], other, cross / np.where(sine > 0.0, sine, 1.0)[..., None])
+    x, y, z = np.moveaxis(axis, -1, 0)
+    zero = np.zeros_like(x)
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    angle = np.where(known, np.arctan2(sine, cosine), 0.0)[..., None, None]
+    return np.asarray(np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * skew @ skew)
 
 
 def along_y(directions: Array) -> Array:
@@ -83,6 +103,33 @@ def wrapped(angles: Array) -> Array:
     return np.asarray(angles - 2.0 * np.pi * np.floor(angles / (2.0 * np.pi) + 0.5))  # faster than a remainder
 
 
+def unwrapped(angles: Array) -> Array:
+    """Return angles over time (T, ...) in radians without jumps of whole turns; frames of NaN are passed over."""
+    series = np.array(angles, dtype=np.float64)
+    for column in series.reshape(len(series), -1).T:
+        known = np.isfinite(column)
+        column[known] = np.unwrap(column[known])
+    return series
+
+
+def steady_angles(angles: Array) -> Array:
+    """Return the three angles (T, ..., 3) of successive rotations, about three different axes, without jumps.
+
+    Each rotation has two triples; of these the nearer to the one before is taken, and `unwrapped`.
+    """
+    first = np.asarray(angles, dtype=np.float64)
+    second = np.array(first)
+    second[..., ::2] += np.pi
+    second[..., 1] = np.pi - second[..., 1]
+    chosen = np.array(first)
+    for k in range(1, len(first)):
+        either = np.stack([first[k], second[k]])
+        near = chosen[k - 1] + wrapped(either - chosen[k - 1])
+        off = ((near - chosen[k - 1]) ** 2).sum(axis=-1)
+        chosen[k] = np.where((off[1] < off[0] - 1e-9)[..., None], near[1], near[0])
+    return unwrapped(chosen)
+
+
 def geodesic(first: Array, second: Array) -> Array:
     """Return the angle (...), 0 to pi, of the rotation that takes `first` to `second`, both (..., 3, 3)."""
     relative = np.swapaxes(first, -1, -2) @ second
@@ -91,7 +138,7 @@ def geodesic(first: Array, second: Array) -> Array:
     return np.asarray(np.arctan2(sine, 0.5 * (np.trace(relative, axis1=-2, axis2=-1) - 1.0)))
 
 
-def _about(axis: int, angles: Array) -> Array:
+def rotation_about(axis: int, angles: Array) -> Array:
     """Return the rotations (..., 3, 3) about an axis by angles (...)."""
     sines, cosines = np.sin(angles), np.cos(angles)
     rotations = np.zeros((*np.shape(angles), 3, 3))

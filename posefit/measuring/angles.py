@@ -8,7 +8,7 @@ down, as longitudes do at a pole; near it they are left out.
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.geometry.rotation import angles_about
+from posefit.geometry.rotation import angles_about, unwrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.measuring.segments import SIDES, segment_rotations
 
@@ -75,7 +75,9 @@ def shoulder_angles(thorax: Array, upper_arm: Array) -> Array:
 def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
     """Return the angles (T,) in degrees of poses (T, 66), by the names of `COLUMNS`.
 
-    A shoulder's plane and rotation are NaN within `NEAR_POLE` degrees of hanging or pointing straight up.
+    Poses are successive, and angles have no jumps of whole turns from one to the next; most lie in -180 to 180. A
+    joint's first and last angles are NaN within `NEAR_POLE` degrees of where they are about one axis, such as the plane
+    and the rotation of a shoulder that hangs or points straight up.
     """
     segments = segment_rotations(skeleton, poses)
     columns: dict[str, Array] = {}
@@ -86,9 +88,17 @@ def clinical_angles(skeleton: Skeleton, poses: Array) -> dict[str, Array]:
             for name, rotation in segments.items()
         }
         by_joint = {joint: joint_angles(joint, *(axes[one] for one in pair)) for joint, pair in BETWEEN.items()}
-        near_pole = np.sin(by_joint["shoulder"][:, 1]) < np.sin(np.radians(NEAR_POLE))
-        by_joint["shoulder"][near_pole] *= [np.nan, 1.0, np.nan]
         for joint, values in by_joint.items():
+            level = np.sin(values[:, 1]) if joint == "shoulder" else np.cos(values[:, 1])
+            values[level < np.sin(np.radians(NEAR_POLE))] *= [np.nan, 1.0, np.nan]
             for k, angle in enumerate(MEANINGS[joint]):
-                columns[f"{side}_{joint}_{angle}"] = np.degrees(values[:, k])
+                columns[f"{side}_{joint}_{angle}"] = np.degrees(_continuous(values[:, k]))
     return {name: columns[name] for name in COLUMNS}
+
+
+def _continuous(angles: Array) -> Array:
+    """Return angles (T,) without jumps, shifted by whole turns so that their median lies in -pi to pi."""
+    series = unwrapped(angles)
+    if np.isnan(series).all():
+        return series
+    return np.asarray(series - 2.0 * np.pi * np.floor(np.nanmedian(series) / (2.0 * np.pi) + 0.5))

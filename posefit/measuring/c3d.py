@@ -36,8 +36,8 @@ def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gai
     while start != 2 + len(parameters) // BLOCK:  # where the points start is a parameter itself
         start = 2 + len(parameters) // BLOCK
         parameters = _section(_parameters(motion, start, gait))
-    last = min(len(motion), MAX_FRAMES)
-    header = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, 1, last, 0, -1.0, start, 1, motion.fps)
+    first, last = (min(number, MAX_FRAMES) for number in (motion.first + 1, motion.first + len(motion)))
+    header = struct.pack("<BBHHHHHfHHf", 2, MAGIC, len(PLACES), 0, first, last, 0, -1.0, start, 1, motion.fps)
     data = points.tobytes()
     Path(path).write_bytes(header.ljust(BLOCK, b"\0") + parameters + data + bytes(-len(data) % BLOCK))
 
@@ -60,8 +60,8 @@ def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict
         "ANALOG": {"USED": 0, "GEN_SCALE": 1.0, "RATE": motion.fps},
         "FORCE_PLATFORM": {"USED": 0},
         "TRIAL": {
-            "ACTUAL_START_FIELD": [1, 0],
-            "ACTUAL_END_FIELD": [frames & MAX_FRAMES, frames >> 16],
+            "ACTUAL_START_FIELD": _in_words(motion.first + 1),
+            "ACTUAL_END_FIELD": _in_words(motion.first + frames),
             "CAMERA_RATE": motion.fps,
         },
         "MANUFACTURER": {"SOFTWARE": "posefit", "VERSION": __version__},
@@ -75,6 +75,11 @@ def _parameters(motion: Motion, start: int, gait: Gait | None) -> dict[str, dict
             "ICON_IDS": [_ICONS[label] for _, _, label in events],
         }
     return groups
+
+
+def _in_words(number: int) -> list[int]:
+    """Return a number of 32 bits as two of 16, the lower first."""
+    return [number & MAX_FRAMES, number >> 16]
 
 
 def _events(gait: Gait) -> Iterator[tuple[float, str, str]]:

@@ -78,7 +78,7 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     if motion.fps < MIN_FPS:
         return Gait(why=f"fewer than {MIN_FPS:g} frames a second")
     events = gait_events(motion)
-    steps = list(_steps(events, motion.fps, set(unknown)))
+    steps = list(_steps(events, motion.fps, motion.first, set(unknown)))
     if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
         return Gait(steps=steps, why=why)
     seconds, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
@@ -96,7 +96,7 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     )
 
 
-def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
+def _steps(events: GaitEvents, fps: float, first: int, unknown: set[int]) -> Iterator[Step]:
     """Yield every strike in the order of time, with what is known of its step and its stride."""
     strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
@@ -104,7 +104,7 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
         again = next((later for later, side in strikes[k + 1 :] if side == foot), np.inf)
         offs = [off for off in _known(events.offs[foot], unknown) if time < off < again]
         if offs:
-            measures["toe_off_seconds"] = offs[0] / fps
+            measures["toe_off_seconds"] = (first + offs[0]) / fps
         if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown):
             other = next(side for side in SIDES if side != foot)
             apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], strikes[k - 1][0])
@@ -124,7 +124,7 @@ def _steps(events: GaitEvents, fps: float, unknown: set[int]) -> Iterator[Step]:
             measures["stride_length"] = float(np.linalg.norm(moved))
             if offs:
                 measures["stance_share"] = (offs[0] - time) / (end - time)  # WHITTLE2007 (stance)
-        yield Step(foot=foot, strike_seconds=time / fps, **measures)
+        yield Step(foot=foot, strike_seconds=(first + time) / fps, **measures)
 
 
 def _known(times: Array, unknown: set[int]) -> list[float]:

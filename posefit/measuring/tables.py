@@ -33,7 +33,8 @@ def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) 
         writer.writerow(["frame", "seconds", *angles])
         for k, row in enumerate(np.column_stack(list(angles.values()))):
             cells = ["" if k in blank or np.isnan(value) else f"{value:.3f}" for value in row]
-            writer.writerow([k, f"{k / motion.fps:.6f}", *cells])
+            number = motion.first + k
+            writer.writerow([number, f"{number / motion.fps:.6f}", *cells])
 
 
 def write_gait(path: str | Path, gait: Gait) -> None:
@@ -56,12 +57,13 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "\t".join([*head, "OrigNumFrames"]),
-        "\t".join([fps, fps, str(count), str(len(PLACES)), "m", fps, "1", str(count)]),
+        "\t".join([fps, fps, str(count), str(len(PLACES)), "m", fps, str(motion.first + 1), str(count)]),
         "Frame#\tTime\t" + "\t".join(f"{place}\t\t" for place in PLACES),
         "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(PLACES) + 1) for axis in "XYZ"),
         "",
     ]
     for k, points in enumerate(motion.joints):
         values = "\t".join("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))
-        lines.append(f"{k + 1}\t{k / motion.fps:.6f}\t{values}")
+        number = motion.first + k
+        lines.append(f"{number + 1}\t{number / motion.fps:.6f}\t{values}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

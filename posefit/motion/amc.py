@@ -1,6 +1,8 @@
 """Acclaim motions (.amc): read into a `Motion`, and written from one."""
 
+import re
 from array import array
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,18 +10,24 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.geometry.calibration import TURNS, Up
 from posefit.geometry.rotation import (
     joint_angles_from_rotation,
     root_angles_from_rotation,
     rotation_from_joint_angles,
     rotation_from_root_angles,
+    steady_angles,
+    unwrapped,
 )
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
-from posefit.motion.asf import METRES_PER_UNIT, checked_unit, lines_of, mistake, parse_asf, shown, values_of
+from posefit.geometry.units import CMU_UNIT, Unit
+from posefit.limits import RATES
+from posefit.motion.asf import checked_unit, lines_of, mistake, parse_asf, shown, values_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size
 
-FPS = 120.0  # CMU's rate; the files do not state it
+FPS = 120.0  # CMU's rate; its files do not state it
+RATE = re.compile(rb"#\s*(\S{1,40}) frames a second")  # in posefit's own files
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; a root line has about 60
 VALUES = 20_000_000  # numbers of a file: 200,000 frames of 100 channels
@@ -27,20 +35,25 @@ VALUES = 20_000_000  # numbers of a file: 200,000 frames of 100 channels
 Spans = dict[bytes, tuple[int, int]]  # bone: where its values start and stop in a frame
 
 
-def read_clip(asf: str | Path, amc: str | Path, *, fps: float = FPS) -> Motion:
-    """Return the motion of an .amc file over the skeleton of its .asf file, in that file's length unit.
+def read_clip(
+    asf: str | Path, amc: str | Path, *, fps: float | None = None, unit: Unit | None = None, up: Up | None = None
+) -> Motion:
+    """Return the motion of an .amc file over the skeleton of its .asf file, in that file's length unit or in `unit`.
 
-    Raises ValueError with file and line where one of them is not what it should be.
+    `up` is the axis of the world that points up, by default y. Raises ValueError with file and line where one of them
+    is not what it should be.
     """
-    skeleton, metres = parse_asf(asf)
-    return read_amc(amc, skeleton, fps=fps, metres_per_unit=metres)
+    acclaim = parse_asf(asf, unit)
+    motion = read_amc(amc, acclaim.skeleton, fps=fps, metres_per_unit=acclaim.metres)
+    return replace(motion if up is None else motion.turned(np.array(TURNS[up])), notes=(*acclaim.notes, *motion.notes))
 
 
 def read_amc(
-    path: str | Path, skeleton: Skeleton, *, fps: float = FPS, metres_per_unit: float = METRES_PER_UNIT
+    path: str | Path, skeleton: Skeleton, *, fps: float | None = None, metres_per_unit: float = CMU_UNIT
 ) -> Motion:
     """Return the motion of an .amc file, named after it: every frame, in radians and metres.
 
+    The rate is `fps`, or else the one that posefit's own files state, or else CMU's, which is noted.
     `metres_per_unit` scales the root's translation; `read_clip` takes it from the .asf file. Angles of end bones and
     of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
     all channels of `skeleton`, in any order. Raises ValueError with file and line.
@@ -48,12 +61,18 @@ def read_amc(
     path, unit = Path(path), checked_unit(metres_per_unit)
     check_size(path, SIZE_LIMIT)
     spans, columns, targets = _layout(skeleton)
-    values, radians = _frames(path, spans, skeleton.name)
+    values, radians, stated = _frames(path, spans, skeleton.name)
+    notes: tuple[str, ...] = ()
+    if (rate := fps or stated) is None:
+        rate, notes = (
+            FPS,
+            (f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it",),
+        )
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
     poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
     poses[:, targets] = angles[:, columns]
-    return Motion(path.stem, skeleton, np.unwrap(poses, axis=0), values[:, :3] * unit, fps)
+    return Motion(path.stem, skeleton, unwrapped(poses), values[:, :3] * unit, rate, notes=notes)
 
 
 def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:
@@ -71,15 +90,17 @@ def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.in
     return spans, np.array(columns, dtype=np.int64), np.array(targets, dtype=np.int64)
 
 
-def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
-    """Return all frames (T, values of a frame) in file units, and whether their angles are radians."""
+def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool, float | None]:
+    """Return all frames (T, values of a frame) in file units, whether angles are radians, and the rate if stated."""
     width = max(stop for _, stop in spans.values())
     data, row = array("d"), [0.0] * width
     bones_read: set[bytes] = set()
-    frame, radians, number = -1, None, 0
+    frame, radians, number, rate = -1, None, 0, None
     for number, raw in lines_of(path, LONGEST_LINE):
         words = raw.split()
         if not words or words[0].startswith(b"#"):
+            if frame < 0 and (match := RATE.match(raw)):
+                rate = _rate(path, number, match[1])
             continue
         word = words[0]
         span = spans.get(word)
@@ -115,7 +136,15 @@ def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool]:
         raise mistake(path, max(number, 1), "at least one frame", "the end of the file")
     _check_whole(path, number, spans, bones_read, frame, "the end of the file")
     data.extend(row)
-    return np.array(data).reshape(-1, width), bool(radians)
+    return np.array(data).reshape(-1, width), bool(radians), rate
+
+
+def _rate(path: Path, number: int, word: bytes) -> float:
+    """Return the rate that a comment states."""
+    (rate,) = values_of(path, number, [b"rate", word], 1)
+    if not RATES[0] <= rate <= RATES[1]:
+        raise mistake(path, number, f"a rate of {RATES[0]:g} to {RATES[1]:g} frames a second", shown(word))
+    return rate
 
 
 def _check_whole(path: Path, number: int, spans: Spans, bones_read: set[bytes], frame: int, came: str) -> None:
@@ -124,8 +153,8 @@ def _check_whole(path: Path, number: int, spans: Spans, bones_read: set[bytes], 
         raise mistake(path, number, f"bone {shown(missing)} in frame {frame}", came)
 
 
-def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METRES_PER_UNIT) -> None:
-    """Write an .amc file that reads back as the same motion, up to whole turns of the root.
+def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = CMU_UNIT) -> None:
+    """Write an .amc file that reads back as the same motion, up to whole turns; a comment states its rate.
 
     Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError where the motion turns a
     joint about an axis that its skeleton has no channel for, as the file could not hold that.
@@ -138,11 +167,11 @@ def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = METR
     values = np.zeros((len(motion), max(stop for _, stop in spans.values())))
     values[:, :3] = motion.translations / unit
     root = joint_angles_from_rotation(rotation_from_root_angles(motion.poses[:, :3]))
-    values[:, 3:6] = np.rad2deg(root)
-    values[:, columns] = np.rad2deg(motion.poses[:, targets])
+    values[:, 3:6] = np.rad2deg(steady_angles(root))
+    values[:, columns] = np.rad2deg(unwrapped(motion.poses[:, targets]))
     bones = [(bone.decode(), start, stop) for bone, (start, stop) in spans.items()]
     with Path(path).open("w", encoding="utf-8", newline="\n") as file:
-        file.write(":FULLY-SPECIFIED\n:DEGREES\n")
-        for frame, row in enumerate(values.tolist(), 1):
+        file.write(f"# {motion.fps!r} frames a second\n:FULLY-SPECIFIED\n:DEGREES\n")
+        for frame, row in enumerate(values.tolist(), motion.first + 1):
             file.write(f"{frame}\n")
             file.writelines(f"{bone} {' '.join(map(repr, row[start:stop]))}\n" for bone, start, stop in bones)

@@ -10,12 +10,12 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.geometry.body import Body
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
+from posefit.geometry.units import CMU_UNIT, INCH, STATURES, UNIT_NAMES, Unit, metres_of, unit_of
 from posefit.reading import SHOWN, check_size, cut, quoted
 
-INCH = 0.0254  # metres
-METRES_PER_UNIT = INCH / 0.45  # CMU's files say `length 0.45`: a unit is 1 / 0.45 inch
 LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
@@ -87,17 +87,28 @@ class _Bone(NamedTuple):
     limits: Array | None  # (free, 2) radians
 
 
-def read_asf(path: str | Path) -> Skeleton:
-    """Return the skeleton of an .asf file, named after it, in metres.
+class Acclaim(NamedTuple):
+    """What an .asf file holds: a skeleton in metres, its unit in metres, and what was guessed."""
+
+    skeleton: Skeleton
+    metres: float
+    notes: tuple[str, ...] = ()
+
+
+def read_asf(path: str | Path, unit: Unit | None = None) -> Skeleton:
+    """Return the skeleton of an .asf file, named after it, in metres; see `parse_asf`.
 
     Only the 26 bones of `posefit.geometry.skeleton.BONES` are chosen; other bones may be there and keep their place
     in `channels`. Raises ValueError with file and line where the file is not an Acclaim skeleton of this tree.
     """
-    return parse_asf(path)[0]
+    return parse_asf(path, unit).skeleton
 
 
-def parse_asf(path: str | Path) -> tuple[Skeleton, float]:
-    """Return the skeleton of an .asf file and how many metres its length unit has."""
+def parse_asf(path: str | Path, unit: Unit | None = None) -> Acclaim:
+    """Return what an .asf file holds. Its unit is `unit`, or else the one that it states.
+
+    Where no person has the stature that it states, and a known unit gives a person's, the unit is that one, and noted.
+    """
     path = Path(path)
     check_size(path, SIZE_LIMIT)
     sections = _sections(path)
@@ -106,14 +117,25 @@ def parse_asf(path: str | Path) -> tuple[Skeleton, float]:
     bones = _bones(sections["bonedata"], np.pi / 180.0 if degrees else 1.0)
     _check_tree(path, sections["hierarchy"], bones)
     chosen = [bones[name] for name in BONES]
-    skeleton = Skeleton(
+    stated = Skeleton(
         name=path.stem,
         offsets=np.array([bone.vector for bone in chosen]) * metres,
         axes=rotation_from_joint_angles(np.array([bone.axis for bone in chosen])),
         channels=tuple((name, bone.free) for name, bone in bones.items() if bone.free),
         limits=_limits(bones),
     )
-    return skeleton, metres
+    wanted, notes = metres if unit is None else metres_of(unit), list[str]()
+    stature = Body.of(stated).stature
+    if unit is None and not STATURES[0] <= stature <= STATURES[1]:
+        guess = unit_of(stature / metres)
+        came = f"{path}: the length that it states makes a person of {stature:.2f} m"
+        if guess is not None:
+            wanted = metres_of(guess)
+            came += f"; lengths are taken for {UNIT_NAMES[guess]}: {stature / metres * wanted:.2f} m; --unit sets it"
+        notes.append(came)
+    ratio = wanted / metres
+    skeleton = stated if ratio == 1.0 else replace(stated, offsets=stated.offsets * ratio)
+    return Acclaim(skeleton, wanted, tuple(notes))
 
 
 def _limits(bones: dict[str, _Bone]) -> Array | None:
@@ -248,7 +270,7 @@ def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
             raise line.mistake(f"bone {name!r} under {JOINTS[above]!r}", f"it under {quoted(parent)}")
 
 
-def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = METRES_PER_UNIT) -> None:
+def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = CMU_UNIT) -> None:
     """Write an .asf file that reads back as the same skeleton. Lengths are divided by `metres_per_unit`.
 
     Bones of which only the channels are known, such as fingers, get the length 0.

@@ -1,25 +1,29 @@
-"""BVH motions: read through the optional library pybvh, and written.
+"""BVH motions: read from whatever program wrote them, and written.
 
 In a BVH file a joint's rotation turns everything that starts at it. In a `Skeleton` the angles named after a bone
 turn that bone about the joint it starts from. So the BVH joint that stands for a bone is the one at the bone's start:
 `LeftUpLeg` (the hip) holds the angles of `lfemur`, and the offset of its child `LeftLeg` (the knee) is that bone's
-vector. Where bones fork, as the thorax does into neck and shoulders, all BVH children must start at one point.
+vector. What the joints are is read off their names, see joint_names.py; how they go with posefit's, see rig.py.
 """
 
-import importlib
-import warnings
+from array import array
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.rotation import angles_about, joint_angles_from_rotation, root_angles_from_rotation
-from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Channels, Skeleton, angle_index
+from posefit.geometry.body import Body
+from posefit.geometry.calibration import TURNS, Up
+from posefit.geometry.rotation import angles_about, rotation_about, steady_angles
+from posefit.geometry.skeleton import ENDS, JOINTS, PARENTS
+from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.motion.amc import SIZE_LIMIT, VALUES
-from posefit.motion.asf import LARGEST, checked_unit, lines_of, mistake
+from posefit.motion.asf import LARGEST, lines_of, mistake, shown, values_of
+from posefit.motion.joint_names import joints_of
 from posefit.motion.motion import LONGEST, Motion
+from posefit.motion.rig import STANDING, Retargeted, Rig, retargeted, upward
 from posefit.reading import check_size, cut, quoted
 
 _LIMBS = {  # names in the CMU conversions by cgspeed, without their side
@@ -46,115 +50,236 @@ NAMES = {
     "lhipjoint": "LHipJoint",
     "rhipjoint": "RHipJoint",
 }
-CHANNELS: Channels = tuple((BONES[j - 1], ("rx", "ry", "rz")) for j in range(1, len(JOINTS)) if j not in ENDS)
 ROTATIONS = "Zrotation Xrotation Yrotation"
 LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
 NODES = 1_000  # joints and ends of a file
 FRAME_TIMES = (1e-4, 10.0)  # seconds
-SAME_PLACE = 1e-4  # share of the longest bone within which two joints are at one point
+WHOLE_RATE = 1e-4  # how far a rate may be from a whole number, as a share: files state 0.0083333 for 1 / 120
+MISSED = 1e-3  # metres that a joint may be off its place in the file without a word
 
 
-def read_bvh(path: str | Path, *, metres_per_unit: float = 1.0) -> Motion:
-    """Return the motion of a .bvh file, with a skeleton of its own, in radians and metres; y must be up.
+def read_bvh(path: str | Path, *, unit: Unit | None = None, up: Up | None = None) -> Motion:
+    """Return the motion of a .bvh file, with a skeleton of its own, in radians and metres, y up.
 
-    The joints may have the names of the CMU conversions by cgspeed (`Hips`, `LHipJoint`, `LeftUpLeg`, ...) or
-    Acclaim's (`root`, `lhipjoint`, `lfemur`, ...); further joints are left out, and so are the rotations of toes,
-    head and hands. `metres_per_unit` is the length of the file's unit: 0.01 where it is centimetres,
-    `posefit.motion.asf.METRES_PER_UNIT` where it is that of CMU's own files. The root is where its position channels
-    say; its OFFSET is not added. Raises ValueError where the file is not a BVH file of this tree, and ImportError
-    without pybvh.
+    Joints may have the names of many programs. Those that are missing, of toes, hands, neck or spine, are at rest, with
+    the lengths of an average person; further joints are left out, and so are the rotations of toes, hands and of a head
+    above a neck of two joints. The file does not state its unit or which axis is up: without `unit` it is the one in
+    which the person has a person's stature, and without `up` the axis along which they stand. Joint angles are counted
+    from the pose of rest and about the axes of the CMU database, as those of its .amc files. The root is where its
+    position channels say; its OFFSET is not added. What was guessed is in the motion's `notes`. Raises InputError where
+    the file is not one of a person.
     """
-    path, unit = Path(path), checked_unit(metres_per_unit)
-    bvh = _parsed(path)
-    from scipy.spatial.transform import Rotation  # a quarter of a second to import
-
-    nodes = {node.name: node for node in bvh.nodes if not node.is_end_site()}
-    missing = [f"{bone} ({NAMES[bone]})" for bone in JOINTS if not {bone, NAMES[bone]} & nodes.keys()]
-    if missing:
-        raise InputError(f"{path}: expected a BVH file with all 27 joints, got one without {', '.join(missing)}")
-    chosen = [nodes[NAMES[bone] if NAMES[bone] in nodes else bone] for bone in JOINTS]
-    offsets = _offsets(path, chosen) * unit
-    skeleton = Skeleton(path.stem, offsets, np.tile(np.eye(3), (len(BONES), 1, 1)), CHANNELS)
-    columns = [bvh.joint_index[node.name] for node in chosen]
-    poses = np.zeros((len(bvh.root_pos), ANGLES))
-    for joint, (node, column) in enumerate(zip(chosen, columns, strict=True)):
-        # capital letters: each channel turns about the axes that the channels before it have turned
-        order = "".join(node.rot_channels).upper()
-        rotations = Rotation.from_euler(order, bvh.joint_angles[:, column]).as_matrix()
-        if joint == 0:
-            poses[:, :3] = root_angles_from_rotation(rotations)
-        elif joint not in ENDS:
-            start = angle_index(joint)
-            poses[:, start : start + 3] = joint_angles_from_rotation(rotations)
-    return Motion(path.stem, skeleton, np.unwrap(poses, axis=0), bvh.root_pos * unit, bvh.fps)
-
-
-def _parsed(path: Path) -> Any:
-    try:
-        library = importlib.import_module("pybvh")
-    except ImportError as error:
-        raise ImportError("reading .bvh files needs the library pybvh: pip install posefit[bvh]") from error
+    path = Path(path)
+    known = None if unit is None else metres_of(unit)
     check_size(path, SIZE_LIMIT)
-    _check_lengths(path)
+    content = _parsed(path)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            bvh = library.read_bvh_file(path, world_up="+y")
-    except (OSError, MemoryError):
-        raise
-    except Exception as error:  # whatever the library trips over, the file is to blame
-        raise InputError(
-            f"{path}: expected a BVH file, got one that pybvh cannot read: {cut(str(error), 200)}"
-        ) from error
-    for values in (bvh.root_pos, bvh.joint_angles, np.array([node.offset for node in bvh.nodes])):
-        if not (np.abs(values) < LARGEST).all():
-            raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
-    if not FRAME_TIMES[0] <= bvh.frame_time <= FRAME_TIMES[1]:
-        low, high = FRAME_TIMES
-        raise InputError(f"{path}: expected a positive frame time, {low:g} to {high:g} s, got {bvh.frame_time:g}")
-    return bvh
+        rig = _rig(content)
+        axis, turn = _upright(rig, up)
+        result = retargeted(rig, turn)
+    except InputError as error:
+        raise InputError(f"{path}: expected a BVH file with {error}") from None
+    stature = Body.of(result.skeleton).stature
+    chosen = unit or unit_of(stature)
+    if chosen is None:
+        expected = f"a person of a stature in a unit that is known, or --unit {'|'.join(UNITS)}"
+        raise InputError(f"{path}: expected {expected}, got one of {stature:g} units")
+    metres = METRES[chosen] if known is None else known
+    skeleton = replace(result.skeleton, name=path.stem, offsets=result.skeleton.offsets * metres)
+    notes = _notes(path, result, unit or chosen, unit is None, stature, axis if up is None else "")
+    return Motion(path.stem, skeleton, result.poses, result.places * metres, content.fps, notes=tuple(notes))
 
 
-def _check_lengths(path: Path) -> None:
-    """Return nothing. Raises ValueError where a file has more lines, joints or frames than are read.
+def _notes(path: Path, result: Retargeted, unit: Unit, guessed: bool, stature: float, axis: str) -> list[str]:
+    """Return what a reader should know: what was guessed, what is missing, and how far joints are off."""
+    notes, metres = [], METRES[unit]
+    if guessed and unit != "m":
+        stands = f"as the person stands {stature:.4g} of them"
+        notes.append(f"{path}: lengths are taken for {UNIT_NAMES[unit]}, {stands}; --unit sets it")
+    elif not guessed and unit_of(stature * metres) is None:
+        notes.append(f"{path}: the person stands {stature * metres:.2f} m with lengths in {UNIT_NAMES[unit]}")
+    if axis not in ("", "y"):
+        notes.append(f"{path}: {axis} is taken to be up, as the person stands along it; --up sets it")
+    if result.filled:
+        notes.append(f"{path}: without {', '.join(result.filled)}, which are an average person's at rest")
+    if result.off * metres > MISSED:
+        notes.append(
+            f"{path}: bones change their lengths or fork; joints are up to {1e3 * result.off * metres:.1f} mm off"
+        )
+    return notes
 
-    Everything else that may be wrong is left to the library, which makes arrays as large as a file asks for.
-    """
-    nodes, rows, width, moving = 0, 0, 0, False
-    for number, line in lines_of(path, LONGEST_LINE):
-        words = line.split()
-        if moving and words:
-            rows, width = rows + 1, max(width, len(words))
+
+def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
+    """Return the axis that is up, such as -z, and the turn (3, 3) of the world that brings it to y."""
+    if up is not None:
+        if up not in TURNS:
+            raise InputError(f"an axis up of x, y or z, got {quoted(up)}")
+        return up, np.array(TURNS[up], dtype=np.float64)
+    number, alike = upward(rig)
+    name: Up = ("x", "y", "z")[number]
+    if abs(alike) < STANDING:
+        return "y", np.eye(3)
+    turn = np.array(TURNS[name], dtype=np.float64)
+    return (name, turn) if alike > 0.0 else (f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn)
+
+
+@dataclass
+class _Node:
+    name: str
+    parent: int
+    offset: Array | None = None
+    channels: list[tuple[bool, int]] = field(default_factory=list)  # whether it turns, and its axis
+    column: int = 0  # of its first channel
+    tips: list[Array] = field(default_factory=list)  # the offsets of its End Sites
+
+
+@dataclass
+class _Content:
+    nodes: list[_Node]
+    values: Array  # (T, channels)
+    fps: float
+
+
+def _parsed(path: Path) -> _Content:
+    """Return what a file says. Raises InputError with file and line where it is no BVH file."""
+    nodes: list[_Node] = []
+    opened: list[_Node | None] = []  # None for an End Site
+    waiting: _Node | str | None = None  # what the next brace opens
+    count, frame_time, width, ends = -1, 0.0, 0, 0
+    data, rows, number, moving = array("d"), 0, 0, False
+    for number, raw in lines_of(path, LONGEST_LINE):
+        words = raw.split()
+        if not words:
+            continue
+        if frame_time:
+            if len(words) != width:
+                raise mistake(path, number, f"{width} numbers of frame {rows + 1}", f"{len(words)}")
+            rows += 1
             if rows > LONGEST or rows * width > VALUES:
                 raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
-        elif words:
-            nodes += words[0] in (b"ROOT", b"JOINT", b"End")
-            if nodes > NODES:
+            try:
+                data.extend(map(float, words))
+            except ValueError:
+                raise mistake(path, number, f"{width} numbers of frame {rows}", shown(raw)) from None
+            continue
+        word = words[0].upper()
+        brace = words[-1] == b"{" and len(words) > 1
+        rest = words[1:-1] if brace else words[1:]
+        node = opened[-1] if opened else None
+        if moving:
+            if word == b"FRAMES:" and len(words) == 2 and words[1].isdigit() and len(words[1]) < 10:
+                count = int(words[1])
+            elif b" ".join(words[:2]).upper() == b"FRAME TIME:" and count >= 0:
+                (frame_time,) = values_of(path, number, words[1:], 1)
+                if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
+                    low, high = FRAME_TIMES
+                    raise mistake(path, number, f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}")
+            else:
+                raise mistake(path, number, "Frames: and Frame Time:", shown(raw))
+        elif word in (b"ROOT", b"JOINT", b"END"):
+            if waiting is not None or (word == b"ROOT") != (not opened) or (opened and node is None):
+                raise mistake(path, number, "a ROOT, with JOINT and End Site inside", shown(raw))
+            if len(nodes) + ends >= NODES:
                 raise mistake(path, number, f"at most {NODES} joints and ends", "more")
-            moving = words[:2] == [b"Frame", b"Time:"]
+            if word == b"END":
+                waiting, ends = "", ends + 1
+            else:
+                name = b" ".join(rest).decode("utf-8", errors="replace")
+                waiting = _Node(name, -1 if node is None else nodes.index(node))
+                nodes.append(waiting)
+        elif word == b"{" and waiting is not None:
+            brace = True
+        elif word == b"}" and opened:
+            if node is not None and node.offset is None:
+                raise mistake(path, number, f"an OFFSET of {quoted(node.name)}", "none")
+            opened.pop()
+        elif word == b"OFFSET" and opened:
+            offset = np.array(values_of(path, number, words, 3))
+            if node is not None:
+                node.offset = offset
+            else:
+                owner = opened[-2]
+                assert owner is not None
+                owner.tips.append(offset)
+        elif word == b"CHANNELS" and node is not None and not node.channels:
+            node.channels, node.column = _channels(path, number, words, raw), width
+            width += len(node.channels)
+        elif word == b"MOTION" and not opened and nodes:
+            moving = True
+        elif word != b"HIERARCHY" or nodes:
+            raise mistake(path, number, "HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION", shown(raw))
+        if brace and waiting is not None:
+            opened.append(waiting if isinstance(waiting, _Node) else None)
+            waiting = None
+    if not rows or rows != count:
+        raise mistake(path, max(number, 1), f"{max(count, 1)} frames", f"{rows}")
+    values = np.array(data).reshape(rows, width)
+    if not (np.abs(values) < LARGEST).all():
+        raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
+    rate = 1.0 / frame_time
+    return _Content(nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate)
 
 
-def _offsets(path: Path, nodes: list[Any]) -> Array:
-    """Return the bone vectors (26, 3) in file units: from each bone's own BVH joint to those of its child bones."""
-    for joint, above in enumerate(PARENTS):
-        parent, expected = nodes[joint].parent, nodes[above] if above >= 0 else None
-        if parent is not expected:
-            wanted = f"right under {expected.name!r}" if expected else "as the ROOT"
-            got = f"it under {quoted(parent.name)}" if parent else "it as the ROOT"
-            raise InputError(f"{path}: expected joint {nodes[joint].name!r} {wanted}, got {got}")
-    near = SAME_PLACE * max(float(np.linalg.norm(node.offset)) for node in nodes[1:])
-    offsets = np.zeros((len(nodes), 3))  # of the root, too: its children must start where it is
-    for joint, node in enumerate(nodes):
-        below = [nodes[child] for child, above in enumerate(PARENTS) if above == joint] or node.children[:1]
-        if not below:
-            raise InputError(f"{path}: expected an End Site under joint {node.name!r}, got none")
-        offsets[joint] = below[0].offset if joint > 0 else 0.0
-        for child in below:
-            if np.abs(child.offset - offsets[joint]).max() > near:
-                where = " ".join(f"{value:g}" for value in offsets[joint])
-                got = " ".join(f"{value:g}" for value in child.offset)
-                raise InputError(f"{path}: expected joint {child.name!r} at OFFSET {where}, got {got}")
-    return offsets[1:]
+def _channels(path: Path, number: int, words: list[bytes], raw: bytes) -> list[tuple[bool, int]]:
+    """Return the channels of a joint, in their order."""
+    channels = []
+    for word in words[2:]:
+        axis, kind = b"XYZ".find(word[:1].upper()), word[1:].lower()
+        if axis < 0 or kind not in (b"position", b"rotation"):
+            raise mistake(path, number, "channels such as Xposition or Zrotation", shown(raw))
+        channels.append((kind == b"rotation", axis))
+    if len(words) < 2 or words[1] != b"%d" % len(channels) or len(channels) > 6 or len(set(channels)) != len(channels):
+        raise mistake(path, number, "a count of at most 6 channels, and these", shown(raw))
+    return channels
+
+
+def _rig(content: _Content) -> Rig:
+    """Return the joints of a file, at rest and in each frame. Raises InputError where they are not a person's."""
+    nodes, values = content.nodes, content.values
+    names, parents = [node.name for node in nodes], [node.parent for node in nodes]
+    joints = joints_of(names, parents)
+    if isinstance(joints, list):
+        raise InputError(f"a person's joints, got one without {cut(', '.join(joints), 200)}")
+    wanted: set[int] = set()
+    for start in (joints.hips, joints.chest, *joints.limbs.values(), *joints.spine, *joints.neck, joints.head or 0):
+        while start >= 0 and start not in wanted:
+            wanted.add(start)
+            start = parents[start]
+    rest = np.zeros((len(nodes), 3))
+    turned: dict[int, Array] = {}
+    placed: dict[int, Array] = {}
+    for number, node in enumerate(nodes):
+        assert node.offset is not None
+        rest[number] = node.offset + (rest[node.parent] if node.parent >= 0 else 0.0)
+        if number not in wanted:
+            continue
+        local, moved = np.eye(3)[None], np.tile(node.offset, (len(values), 1))
+        positions = []
+        for column, (turning, axis) in enumerate(node.channels, node.column):
+            if turning:
+                local = local @ rotation_about(axis, np.radians(values[:, column]))
+            else:
+                moved[:, axis] = values[:, column]
+                positions.append(axis)
+        if positions and node.parent >= 0:
+            own = node.offset[positions]
+            shifts = moved[:, positions]
+            if np.abs(shifts).mean() < np.abs(shifts - own).mean():  # some programs write what is added to the offset
+                moved[:, positions] += own
+        local = np.broadcast_to(local, (len(values), 3, 3))
+        above = turned.get(node.parent)
+        if above is None:
+            turned[number], placed[number] = local, moved
+        else:
+            turned[number] = above @ local
+            placed[number] = placed[node.parent] + np.einsum("tij,tj->ti", above, moved)
+    shape = (len(nodes), len(values), 3)
+    turns, places = np.zeros((*shape, 3)), np.zeros(shape)
+    for number in turned:
+        turns[number], places[number] = turned[number], placed[number]
+    at_rest = np.tile(np.eye(3), (len(nodes), 1, 1))
+    tips = [node.tips for node in nodes]
+    return Rig(names, parents, joints, tips, (at_rest, rest), (turns, places))
 
 
 def write_bvh(path: str | Path, motion: Motion) -> None:
@@ -182,8 +307,8 @@ def write_bvh(path: str | Path, motion: Motion) -> None:
 
     visit(0, 0)
     turns = motion.skeleton.turns(motion.poses)[order]
-    angles = np.degrees(angles_about((2, 0, 1), turns))  # ZXY; at a gimbal lock any of the solutions will do
-    angles = np.swapaxes(angles.reshape(len(order), len(motion), 3), 0, 1).reshape(len(motion), -1)
+    angles = np.degrees(steady_angles(np.swapaxes(angles_about((2, 0, 1), turns), 0, 1)))  # ZXY
+    angles = angles.reshape(len(motion), -1)
     lines += ["MOTION", f"Frames: {len(motion)}", f"Frame Time: {1.0 / motion.fps!r}"]
     lines += [_plain(row) for row in np.hstack([motion.translations, angles])]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -43,7 +43,7 @@ def write_glb(path: str | Path, motion: Motion, radii: Array) -> None:
             "material": sides.index(side(name)),
         }
         meshes.append({"name": name, "primitives": [primitive]})
-    times = data.add(np.arange(len(motion))[:, None] / motion.fps, None, True)
+    times = data.add((motion.first + np.arange(len(motion)))[:, None] / motion.fps, None, True)
     turns = motion.skeleton.turns(motion.poses)
     moved = [(0, "translation", motion.translations)]
     moved += [(joint, "rotation", quaternions(turns[joint])) for joint in (0, *INNER)]

@@ -1,14 +1,19 @@
 """A clip of motion capture: one pose and one translation a frame."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, frozen
 from posefit.errors import InputError
-from posefit.geometry.rotation import root_angles_from_rotation, rotation_from_root_angles
-from posefit.geometry.skeleton import ANGLES, Skeleton
+from posefit.geometry.rotation import (
+    joint_angles_from_rotation,
+    root_angles_from_rotation,
+    rotation_from_root_angles,
+    unwrapped,
+)
+from posefit.geometry.skeleton import ANGLES, INNER, Skeleton, angle_index
 from posefit.limits import RATES
 from posefit.reading import quoted
 
@@ -26,6 +31,8 @@ class Motion:
     poses: Array = field(repr=False)  # (T, 66) radians, unwrapped along time by the readers
     translations: Array = field(repr=False)  # (T, 3) metres, the root joint in the world
     fps: float
+    first: int = 0  # the number of the first frame, in the footage or the longer motion that it was taken from
+    notes: tuple[str, ...] = ()  # what was guessed where a file was read
 
     def __post_init__(self) -> None:
         for name, columns in (("poses", ANGLES), ("translations", 3)):
@@ -48,11 +55,29 @@ class Motion:
         """Return frames start to stop - 1 as a motion. Raises ValueError where that leaves the clip or is empty."""
         if not 0 <= start < stop <= len(self):
             raise InputError(f"frames must be 0 <= start < stop <= {len(self)}, got start {start} and stop {stop}")
-        return Motion(self.name, self.skeleton, self.poses[start:stop], self.translations[start:stop], self.fps)
+        poses, translations = self.poses[start:stop], self.translations[start:stop]
+        return replace(self, poses=poses, translations=translations, first=self.first + start)
+
+    def turned(self, rotation: Array) -> "Motion":
+        """Return the motion in a world that is turned by a rotation (3, 3)."""
+        poses = self.poses.copy()
+        poses[:, :3] = unwrapped(root_angles_from_rotation(rotation @ rotation_from_root_angles(poses[:, :3])))
+        return replace(self, poses=poses, translations=self.translations @ rotation.T)
+
+    def about_axes_of(self, skeleton: Skeleton) -> "Motion":
+        """Return the motion with joint angles about another skeleton's axes: in space, each joint turns as before."""
+        if np.array_equal(self.skeleton.axes, skeleton.axes):
+            return self
+        own = replace(self.skeleton, axes=skeleton.axes, channels=skeleton.channels, limits=skeleton.limits)
+        turns, poses = self.skeleton.turns(self.poses), self.poses.copy()
+        for joint in INNER:
+            start, axes = angle_index(joint), skeleton.axes[joint - 1]
+            poses[:, start : start + 3] = joint_angles_from_rotation(axes.T @ turns[joint] @ axes)
+        return replace(self, skeleton=own, poses=unwrapped(poses))
 
     def reversed(self) -> "Motion":
         """Return the motion with its last frame first."""
-        return Motion(self.name, self.skeleton, self.poses[::-1], self.translations[::-1], self.fps)
+        return replace(self, poses=self.poses[::-1], translations=self.translations[::-1])
 
     def resampled(self, fps: float) -> "Motion":
         """Return the motion at another rate, over the times k / fps that lie within it.
@@ -64,7 +89,7 @@ class Motion:
         ratio = self.fps / fps
         step = round(ratio)
         if step >= 1 and abs(ratio - step) < 1e-9 * step:
-            return Motion(self.name, self.skeleton, self.poses[::step], self.translations[::step], fps)
+            return replace(self, poses=self.poses[::step], translations=self.translations[::step], fps=fps)
         last = len(self) - 1
         if last / ratio >= LONGEST:
             came = f"{last / ratio:.3g} frames at {fps:g} fps"
@@ -72,7 +97,7 @@ class Motion:
         # in frames of this motion; the last time may be off by rounding
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
         if last == 0:
-            return Motion(self.name, self.skeleton, self.poses, self.translations, fps)
+            return replace(self, fps=fps)
         poses, translations = at_frames(self.poses, times), at_frames(self.translations, times)
         from scipy.spatial.transform import Rotation, Slerp  # a quarter of a second to import
 
@@ -81,7 +106,7 @@ class Motion:
         angles = np.unwrap(root_angles_from_rotation(between), axis=0)
         turns = np.round((self.poses[0, :3] - angles[0]) / (2.0 * np.pi))
         poses[:, :3] = angles + 2.0 * np.pi * turns
-        return Motion(self.name, self.skeleton, poses, translations, fps)
+        return replace(self, poses=poses, translations=translations, fps=fps)
 
 
 def at_frames(series: Array, times: Array | float) -> Array:

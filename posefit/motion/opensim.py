@@ -13,7 +13,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.body import Body
-from posefit.geometry.rotation import JOINT_ORDER, ROOT_ORDER, along_y, angles_about
+from posefit.geometry.rotation import JOINT_ORDER, ROOT_ORDER, along_y, angles_about, unwrapped
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.motion.motion import Motion
 
@@ -40,8 +40,8 @@ def coordinates(skeleton: Skeleton) -> dict[str, int]:
 def write_mot(path: str | Path, motion: Motion) -> None:
     """Write a motion's coordinates, one row a frame: time in seconds, angles in degrees, the root's place in metres."""
     path, angles = Path(path), coordinates(motion.skeleton)
-    turns = np.degrees(np.unwrap(motion.poses[:, list(angles.values())], axis=0))
-    table = np.column_stack([np.arange(len(motion)) / motion.fps, turns, motion.translations])
+    turns = np.degrees(unwrapped(motion.poses[:, list(angles.values())]))
+    table = np.column_stack([(motion.first + np.arange(len(motion))) / motion.fps, turns, motion.translations])
     head = [path.name, "version=1", f"nRows={len(table)}", f"nColumns={table.shape[1]}", "inDegrees=yes", "endheader"]
     head.append("\t".join(["time", *angles, *_ROOT[3:]]))
     np.savetxt(path, table, "%.8f", "\t", header="\n".join(head), comments="", encoding="utf-8")

@@ -12,6 +12,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.evaluation.errors import Table, unseen
+from posefit.files import opencv_name
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
@@ -89,7 +90,7 @@ def write_files(
     assert writer is not None
     writer.close()
     notes = ("" if summary["trust"] is None else summary["trust"]["sentence"], undetermined(summary))
-    if not cv2.imwrite(str(folder / "summary.png"), painter.summary(table, [*filter(None, notes)])):
+    if not cv2.imwrite(opencv_name(folder / "summary.png"), painter.summary(table, [*filter(None, notes)])):
         raise OSError("no room for summary.png")
     page = track_document(track_data(scene, frames, table, summary, intervals, stills))
     (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
@@ -130,6 +131,7 @@ def _write_npz(path: Path, content: Content) -> None:
         poses=content.motion.poses,
         translations=content.motion.translations,
         fps=np.array(content.motion.fps),
+        frames=content.motion.first + np.arange(len(content.motion)),
         joints=np.array(JOINTS),
         places=np.array(PLACES),
         costs=content.table["cost"],

@@ -15,7 +15,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.evaluation.errors import Table
-from posefit.files import MARK, Unfinished, other_entries
+from posefit.files import MARK, Unfinished, opencv_name, other_entries
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.measuring.gait import Gait
@@ -64,6 +64,7 @@ class OutputFolder(Recorder):
         say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
+        opencv_name(self.path)  # a name that it cannot write is refused before the work
         if os.path.lexists(self.path):
             if self.path.is_symlink() or not self.path.is_dir():
                 came = "a link" if self.path.is_symlink() else "a file"

@@ -11,15 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from posefit.errors import InputError
+from posefit.settings import settings_text
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.arrays import Array
-    from posefit.fitting.tracker import Frame
     from posefit.footage.scene import Scene
-    from posefit.geometry.skeleton import Skeleton
 
-MAX_TRACE_POINTS = 64
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
@@ -81,7 +79,7 @@ class TrackCell(Cell):
     """A motion that is tracked.
 
     `method` is `OPTIMISER@PRIOR` or a tracker's name; `settings` are named `NAME.SETTING`, as for `--set`. `instance`
-    numbers what the cameras see of the motion, see `posefit.footage.instance`. `corruption` gives kinds of
+    numbers what the cameras see of the motion, see `posefit.motion.instance`. `corruption` gives kinds of
     `posefit.silhouette.corruption` their strength, 0 to 1, and `dropped` the share of frames without masks; the damage
     follows from the instance, so that it is the same for every method and seed. `hypotheses` is how many times the
     motion is tracked, see `posefit.tracking.restarts`. `files` holds the SHA-256 of every capture file that is read.
@@ -123,9 +121,10 @@ class TrackCell(Cell):
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
+        from posefit.evaluation.errors import anytime_trace, mode_reliability
         from posefit.evaluation.measures import MEASURES
-        from posefit.footage.source import training_clips, training_motions
         from posefit.geometry.skeleton import joint_distances
+        from posefit.motion.clips import training_clips, training_motions
         from posefit.tracking.options import VIEW, TrackOptions
         from posefit.tracking.pipeline import track_scene
 
@@ -148,7 +147,7 @@ class TrackCell(Cell):
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],
-            "mode_reliability": _mode_reliability(result.frames, truth, result.motion.skeleton),
+            "mode_reliability": mode_reliability(result.frames, truth, result.motion.skeleton),
             "trace": anytime_trace(result.frames),
         }
         return CellResult(row, packed_joints(estimate=estimate, truth=truth))
@@ -245,8 +244,8 @@ def _installed() -> frozenset[str]:
 
 def cell_scene(cell: TrackCell) -> "Scene":
     """Return the observations of a cell; the same for all methods and seeds."""
-    from posefit.footage.instance import motion_of_instance, variation
     from posefit.footage.scene import synthetic, with_corruption
+    from posefit.motion.instance import motion_of_instance, variation
 
     motion = motion_of_instance(cell.motion, cell.instance, frames=cell.frames, fps=cell.fps)
     scene = synthetic(motion, variation(cell.instance).views(cell.view_degrees), cell.size, [], (None, None))
@@ -286,45 +285,6 @@ def digest_of(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def settings_text(settings: Mapping[str, Any]) -> list[str]:
-    """Return settings as `--set` takes them."""
-    return [f"{name}={setting_text(value)}" for name, value in settings.items()]
-
-
-def anytime_trace(frames: "list[Frame]") -> dict[str, list[float]]:
-    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
-
-    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
-    """
-    import numpy as np
-
-    searched = [frame.trace for frame in frames if len(frame.trace)]
-    if not searched:
-        return {"evaluations": [], "cost": []}
-    points = np.unique(np.concatenate([trace[:, 0] for trace in searched]))
-    points = points[points >= max(trace[0, 0] for trace in searched)]  # from where every frame has a cost
-    if len(points) > MAX_TRACE_POINTS:
-        wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
-        points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
-    mean = np.mean([trace[np.searchsorted(trace[:, 0], points, side="right") - 1, 1] for trace in searched], axis=0)
-    return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
-
-
-def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:
-    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
-    import numpy as np
-
-    from posefit.uncertainty.calibration import reliability
-    from posefit.uncertainty.modes import likeliest_is_right
-
-    weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
-    if not weighed:
-        return []
-    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
-    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
-    return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]
-
-
 def packed_joints(**arrays: "Array") -> bytes:
     """Return arrays in metres as an .npz, float32."""
     import numpy as np
@@ -336,12 +296,3 @@ def packed_joints(**arrays: "Array") -> bytes:
     }
     np.savez_compressed(buffer, **rounded)
     return buffer.getvalue()
-
-
-def setting_text(value: Any) -> str:
-    """Return a setting's value as `--set` takes it."""
-    if isinstance(value, bool) or value is None:
-        return str(value).lower()
-    if isinstance(value, list | tuple):
-        return ",".join(setting_text(one) for one in value)
-    return str(value)

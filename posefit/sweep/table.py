@@ -15,28 +15,18 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
+from posefit.settings import settings_text
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
-from posefit.sweep.cell import settings_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
 _TEXTS = (
-    "key",
-    "version",
-    "status",
-    "reason",
-    "kind",
-    "method",
-    "name",
-    "motion",
-    "train",
-    "settings",
-    "view_degrees",
+    "key", "version", "status", "reason", "kind", "method", "name", "motion", "train", "settings", "view_degrees",
     "corruption",
-)
+)  # fmt: skip
 
 
 def is_search(spec: Mapping[str, Any]) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.evaluation.errors import LOST, evaluated, unseen
+from posefit.evaluation.errors import LOST, Table, evaluated, unseen
 from posefit.evaluation.trust import trust_of
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task
@@ -32,7 +32,8 @@ def evaluate(
 ) -> Track:
     """Return a track with errors against the truth where it is known, else signs of trust.
 
-    `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took.
+    `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
+    from the first mask that was read.
     """
     skeleton = scene.body.skeleton
     posteriors = [frame.posterior for frame in frames]
@@ -64,16 +65,17 @@ def evaluate(
         frames=len(frames),
     )
     modes = track_modes(skeleton, posteriors)
+    stay = None if tracked.stay is None else (scene.first + tracked.stay[0], scene.first + tracked.stay[1])
     course = Course(
         hypotheses=tracked.hypotheses,
         build=None if shape is None else shape.as_dict(),
         trace=frames[0].trace.tolist() if len(frames) == 1 else None,
         modes=[round(mode.weight, 6) for mode in modes] or None,
         none_of_modes=round(float(np.mean(none)), 6) if none else None,
-        unknown_sides=_numbers(table["unknown_sides"], 1.0),
-        lost_frames=_numbers(table["lost"], LOST),
-        relocalised=[k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
-        retracked_outside=tracked.stay,
+        unknown_sides=_numbers(table, "unknown_sides", 1.0),
+        lost_frames=_numbers(table, "lost", LOST),
+        relocalised=[scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
+        retracked_outside=stay,
         backwards_share=round(float(walks_back.mean()), 6),
         warnings=warnings,
     )
@@ -81,6 +83,7 @@ def evaluate(
     return Track(motion, frames, table, measures, trust, gait, setup, course, modes, scene)
 
 
-def _numbers(values: Array, least: float) -> list[int] | None:
-    """Return the frames whose values (T,) are so much or more; None where all are unknown."""
-    return None if np.isnan(values).all() else np.flatnonzero(values >= least).tolist()
+def _numbers(table: Table, name: str, least: float) -> list[int] | None:
+    """Return the frames that have so much or more in a column; None where all are unknown."""
+    values = table[name]
+    return None if np.isnan(values).all() else table["frame"][values >= least].tolist()

@@ -10,10 +10,13 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
-from posefit.footage.readers import IMAGES, name_of
+from posefit.fitting.driving import clocks
+from posefit.footage.images import IMAGES
+from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
-from posefit.footage.source import Footage, Source, check_used, kind_of, scene_of, training_clips, training_motions
+from posefit.footage.source import Footage, check_used, kind_of, scene_of
 from posefit.motion import built_in
+from posefit.motion.clips import Source, training_clips, training_motions
 from posefit.motion.motion import Motion
 from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
@@ -63,7 +66,7 @@ def track(
         chosen = chosen.changed(body_frames=0)
     chosen = resolved(sources[0], chosen)
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
-    clips = training_clips(chosen.train, chosen.asf, followed=followed)  # before the work, as a name may be wrong
+    clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:
             raise InputError(f"{name} must be given with out, the folder of the track, got none")
@@ -73,7 +76,11 @@ def track(
         recorder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
     with recorder:
         with progress.phase("masks"):
+            start = clocks()
             scene = scene or scene_of(sources, progress, **chosen.view)
+            if scene.truth is None:  # a known motion is drawn frame by frame, as it is tracked
+                seconds, cpu_seconds = (clocks() - start).tolist()
+                scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
         training = training_motions(clips, scene.fps)
         track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
         names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]
@@ -112,13 +119,16 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
 
 def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
     """Return nothing. Raises InputError for options that do not fit a source whose truth is known, or unknown."""
+    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
+    folders = any(Path(motion).is_dir() for motion in options.train if isinstance(motion, str | Path))
+    if options.rate is not None and not (captured or folders):
+        raise InputError(f"rate must be given for .amc files only, got {quoted(options.rate)}")
     if not known:
         if options.translation == "known":
             raise InputError("translation must be searched or aligned where only masks are given, got known")
         if options.first_pose == "given":
             raise InputError("first_pose must be searched where only masks are given, got given")
         return
-    captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
     if options.asf is not None and not captured:
         raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
     if options.restarts == 0:

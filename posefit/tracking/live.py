@@ -20,17 +20,17 @@ from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
 from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of, training_clips, training_motions
+from posefit.footage.source import body_of
 from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
+from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
-from posefit.tracking.options import TrackOptions
+from posefit.tracking.options import TrackOptions, declared
 from posefit.tracking.restarts import GAP, RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart, relocalised
 
 METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
-WHOLE = ("frames", "size", "label", "holes", "hypotheses", "smooth", "body_frames")  # need all frames
 LINES, ARRAYS = "frames.jsonl", "poses.npz"
 
 
@@ -67,11 +67,11 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     does not fit or needs all frames, and where the stream breaks off.
     """
     chosen = TrackOptions(**options)
-    for declared in fields(chosen):
-        if declared.name in WHOLE and getattr(chosen, declared.name) != declared.default:
-            raise InputError(f"{declared.name} must be left out with live, got {getattr(chosen, declared.name)}")
+    for each in fields(chosen):
+        if not declared(each).live and getattr(chosen, each.name) != each.default:
+            raise InputError(f"{each.name} must be left out with live, got {getattr(chosen, each.name)}")
     chosen = chosen.changed(method=chosen.method or METHOD, train=chosen.train or built_in.other_styles("walk"))
-    clips = training_clips(chosen.train, chosen.asf)
+    clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
     fps = chosen.fps or stream.fps
     masks = live_masks(stream, chosen.extraction, progress.log)
@@ -118,7 +118,8 @@ def _scene_of(
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
-    body, view = body_of(options.asf, options.height), CameraView(packed(first), (), name)
+    body, notes = body_of(options.asf, options.height, options.unit)
+    view = CameraView(packed(first), notes, name)
     scene = combined([view], name, body, known, facing, options.up, fps)
     bent = next(((each, each.maps(size)) for each in known if isinstance(each, Calibration) and each.distorted), None)
 

@@ -70,10 +70,10 @@ def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     known = isinstance(source, str) and source in built_in.names()
     prior, method = DEFAULT_FOOTAGE_PRIOR if kind_of(source) != "motion" else DEFAULT_PRIOR, options.method
     offers, set_names = registry().offers, {name.partition(".")[0] for name in options.settings}
-    searched = known or options.optimiser is not None or options.prior is not None or set_names - {DEFAULT_TRACKER}
+    searched = known or set_names - {DEFAULT_TRACKER}
     if method is None and not searched and DEFAULT_TRACKER in offers["tracker"]:
         method = DEFAULT_TRACKER
-    elif not callable(method):
+    elif method is None or isinstance(method, str):
         method = str(method_names(method or next(iter(set_names & {*offers["optimiser"]}), None), prior))
     train = options.train
     if not train and method == DEFAULT_TRACKER:
@@ -115,13 +115,14 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     BrokenRuleError where a plugin does not do what its kind has to.
     """
     chosen = options.method
-    if callable(chosen) or (names := method_names(chosen)).tracker is not None:
-        for name in ("optimiser", "prior"):
-            if (plugin := getattr(options, name)) is not None:
-                raise InputError(f"{name} must not be given beside a tracker, got {plugin} and {chosen}")
-        return _tracker_method(_offered("tracker", chosen), options.settings)
-    optimiser = _offered("optimiser", options.optimiser or names.optimiser)
-    prior = None if options.prior is not None else registry().offer("prior", names.prior)
+    if isinstance(chosen, tuple):
+        optimiser, given_prior = _offered("optimiser", chosen[0]), chosen[1]
+    else:
+        names = None if callable(chosen) else method_names(chosen)
+        if names is None or names.tracker is not None:
+            return _tracker_method(_offered("tracker", chosen), options.settings)
+        optimiser, given_prior = _offered("optimiser", names.optimiser), names.prior
+    prior = registry().offer("prior", given_prior) if isinstance(given_prior, str) else None
     mine = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     mine.setdefault("prior", {})
     given = mine["optimiser"]
@@ -133,8 +134,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
             _check_prior(learned, task.angles, prior)
         learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
-        assert options.prior is not None
-        learned, name = options.prior, type(options.prior).__name__
+        learned, name = given_prior, type(given_prior).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
     prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **mine["tracker"]})
     tilt = prediction.tilted(learned, task.training)
@@ -163,7 +163,8 @@ def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any
 def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
-    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`. Raises InputError where a
+    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
+    left out where it alone has such a setting. Raises InputError where a
     text has another form, names a plugin that is not among `offers` or a setting that it does not know, or where a
     value does not fit.
     """
@@ -172,7 +173,10 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
     for item in given:
         left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
         name, dot, setting = left.partition(".")
-        if not (equals and dot):
+        if not dot:  # the name may be left out where one plugin alone has the setting
+            having = [name for name, (_, factory) in places.items() if left in settings.names(factory)]
+            name, setting = (having[0], left) if len(having) == 1 else ("", "")
+        if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
             known = ", ".join(places)

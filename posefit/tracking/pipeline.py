@@ -11,6 +11,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -42,6 +43,8 @@ from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import smooth
 from posefit.tracking.trajectory import Hypothesis, cheapest
 
+MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
+
 
 def track_scene(
     scene: Scene,
@@ -57,7 +60,10 @@ def track_scene(
     """
     options = options or TrackOptions()
     options = options.changed(smooth=scene.truth is None if options.smooth is None else options.smooth)
-    scene = on_device(scene, options.device)
+    notes = dict.fromkeys(note for motion in training for note in motion.notes if note not in scene.warnings)
+    if len(notes) > MAX_NOTES:
+        notes = dict.fromkeys([*islice(notes, MAX_NOTES), f"and {len(notes) - MAX_NOTES} more of files to learn from"])
+    scene = replace(on_device(scene, options.device), warnings=[*scene.warnings, *notes])
     task = task_of(scene, options, training)
     if options.smooth and task.translation == "known":
         raise InputError("smooth must be given where the translation is searched or aligned, got known")
@@ -82,7 +88,9 @@ def track_scene(
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
         with progress.phase("evaluate"):
-            track = evaluate(scene, frames, tracked, shape, method, task, options, clocks() - start)
+            track = evaluate(
+                scene, frames, tracked, shape, method, task, options, clocks() - start + scene.reading_seconds
+            )
     for warning in track.course.warnings[len(scene.warnings) :]:
         progress.warn(warning)
     return track

@@ -143,7 +143,7 @@ class Track:
     @property
     def unknown_sides(self) -> NDArray[np.bool_]:
         """In which frames (T,) left and right are unknown; between two of these they may be exchanged as well."""
-        return np.isin(np.arange(len(self)), self.course.unknown_sides or [])
+        return np.isin(self.table["frame"], self.course.unknown_sides or [])
 
     def angles(self, name: str) -> Array:
         """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.

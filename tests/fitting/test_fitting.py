@@ -65,7 +65,7 @@ def test_a_search_gets_the_costs_of_the_areas_without_views_that_know_nothing(
     cameras = [problem.cameras[0]] * 3
     several = replace(problem, cameras=cameras, silhouettes=[blind, whole, half], beta=0.3, threads=threads)
     proposals = drawn(several, 40)
-    counts = several.areas(*several.decode(proposals))
+    counts = several.cost_and_areas(*several.decode(proposals))[1]
     shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
     np.testing.assert_allclose(several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0))
     nothing = replace(several, silhouettes=[blind] * 3, blank=True)
@@ -168,8 +168,7 @@ class Walker:
 def test_the_budget_is_used_in_whole_populations() -> None:
     best = minimise(lambda x: -x[:, 0], Walker(7), 40)
     assert (best.evaluations, best.cost) == (35, -4.0)
-    assert best.history.tolist() == [0.0, -1.0, -2.0, -3.0, -4.0]
-    assert best.spent.tolist() == [7, 14, 21, 28, 35]
+    assert best.trace.tolist() == [[7.0, 0.0], [14.0, -1.0], [21.0, -2.0], [28.0, -3.0], [35.0, -4.0]]
     with pytest.raises(BudgetError, match="evaluations must hold one population of 7, got 6"):
         minimise(lambda x: x[:, 0], Walker(7), 6)
 

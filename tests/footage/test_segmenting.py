@@ -16,7 +16,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.cameras import yaws_of
 from posefit.footage.masks import Views
-from posefit.footage.quality import FrameQuality, disagreement, verdict
+from posefit.footage.quality import FrameQuality, apparent_sizes, disagreement, verdict
 from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation, facings_on_the_spot
 from posefit.footage.source import scene_of
@@ -235,6 +235,13 @@ def rows(
     [
         (rows(), "mixture", True, None, ""),
         (rows(0.2, (100, 110)), "mixture", True, None, ""),
+        (
+            [{**row, "touches_border": 1, "usable": 0} for row in rows()],
+            "mixture",
+            True,
+            True,
+            "got one at its edge in 20 of 20 frames",
+        ),
         (rows(pieces=2), "median", True, None, ""),
         (rows(0.6, (100, 150)), "mixture", True, True, "in the background: 60% of what moves lies outside the masks"),
         (rows(0.0, (100, 150)), "mean", False, False, "parts of the person seem to be missing; --extraction mediapipe"),
@@ -266,15 +273,21 @@ def upper(mask: Any) -> Any:
     return part
 
 
+def wrong(observed: Views, cameras: list[Camera]) -> str | None:
+    sizes = apparent_sizes(observed, cameras)
+    assert sizes is not None
+    return disagreement(*sizes, 1.75)
+
+
 def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None:
     azimuths = [np.pi / 2, 0.6]
     cameras = [camera(azimuth) for azimuth in azimuths]
-    assert disagreement(views(tmp_path / "a", azimuths), cameras, 1.75) is None
-    parts = disagreement(views(tmp_path / "b", azimuths, upper), cameras, 1.75)
+    assert wrong(views(tmp_path / "a", azimuths), cameras) is None
+    parts = wrong(views(tmp_path / "b", azimuths, upper), cameras)
     assert parts is not None
     assert parts.startswith("expected a person of 1.75 m, got masks 0.")
     moved = [cameras[0], replace(cameras[1], translation=cameras[1].translation + [0.0, 1.5, 0.0])]
-    apart = disagreement(views(tmp_path / "c", azimuths), moved, 1.75)
+    apart = wrong(views(tmp_path / "c", azimuths), moved)
     assert apart is not None
     assert "expected cameras that see one person, got views that pass each other by 1.5 m" in apart
     with pytest.raises(ValueError, match=r"0: expected cameras that see one person, got views that pass"):

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from posefit.footage import source
-from posefit.footage.instance import SPEED, VIEW_DEGREES, motion_of_instance, variation
-from posefit.footage.source import POSE_BYTES, training_clips, training_motions
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
+from posefit.motion.clips import POSE_BYTES, training_clips, training_motions
+from posefit.motion.instance import SPEED, VIEW_DEGREES, motion_of_instance, variation
 from tests.cases import each
 from tests.commands import error_of
 

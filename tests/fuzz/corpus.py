@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from posefit import Camera
 from posefit.footage.video import VideoWriter
@@ -22,7 +23,9 @@ from posefit_priors.pca import PCA
 from posefit_priors.sklearn import Transformed
 from tests.footage.matroska import write_matroska
 from tests.fuzz.written import written
-from tests.geometry.calibrations import QUALISYS, TOML, opencv
+from tests.geometry.calibrations import EXTRI, KINDS, QUALISYS, TOML, opencv
+from tests.geometry.turns import about
+from tests.motion.rigs import STYLES, write_rig
 
 PLAN = """[defaults]
 frames = 3
@@ -56,6 +59,10 @@ def corpus(folder: Path) -> list[Seed]:
     write_amc(folder / "a.amc", motion)
     write_bvh(folder / "a.bvh", motion)
     seeds = [Seed(kind, f".{kind}", (folder / f"a.{kind}").read_bytes()) for kind in ("asf", "amc", "bvh")]
+    rigs = (("mixamo", "t", 100.0), ("lafan1", "along x", 39.37), ("biped", "cmu", 1.0), ("vrm", "t", 17.7))
+    for name, rest, scale in rigs:  # in centimetres, inches, metres and the CMU database's unit
+        path = write_rig(folder / "rig.bvh", motion, STYLES[name], scale, about(0, np.pi / 2), rest)
+        seeds.append(Seed("bvh", ".bvh", path.read_bytes()))
     body, camera = Body.of(motion.skeleton), Camera.around(motion.translations[0], 0.8, 3.5, (64, 48))
     masks = np.stack([project(body, camera, *where) for where in zip(motion.poses, motion.translations, strict=True)])
     usable = np.array([True, False, True])
@@ -63,6 +70,7 @@ def corpus(folder: Path) -> list[Seed]:
         for stack in (masks, masks.astype(np.uint8) * 255, np.asfortranarray(masks.astype(np.float32))):
             seeds.append(_npz("masks", save, masks=stack, valid=~masks, usable=usable, fps=np.array(30.0)))
     seeds += [Seed("images", suffix, _image(masks[0], suffix)) for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")]
+    seeds += [Seed("images", suffix, _pages(masks, suffix)) for suffix in (".gif", ".webp", ".tif")]
     angles = np.concatenate([built_in.motion(name).poses[:, 3:] for name in built_in.other_styles("walk")])
     for prior in (PCA, Full, Loose):
         path = folder / "prior.npz"
@@ -79,6 +87,9 @@ def corpus(folder: Path) -> list[Seed]:
         seeds.append(Seed("video", suffix, (folder / f"video{suffix}").read_bytes()))
     seeds.append(Seed("video", ".mkv", write_matroska(folder / "video.mkv", pictures, [0, 33, 99]).read_bytes()))
     texts = [(".json", camera.to_json()), (".toml", TOML), (".xml", QUALISYS)]
+    texts += [
+        (Path(name).suffix, text + EXTRI.partition("---")[2] * (name == "intri.yml")) for name, text in KINDS.items()
+    ]
     texts += [(suffix, opencv(folder / f"calibration{suffix}").read_text()) for suffix in (".yml", ".json", ".xml")]
     seeds += [Seed("calibration", suffix, text.encode()) for suffix, text in texts]
     seeds += [
@@ -97,3 +108,11 @@ def _image(mask: Any, suffix: str) -> bytes:
     written, content = cv2.imencode(suffix, np.where(mask, 255, 0).astype(np.uint8))
     assert written
     return content.tobytes()
+
+
+def _pages(masks: Any, suffix: str) -> bytes:
+    """Return an image of several pages."""
+    first, *others = [Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)) for mask in masks]
+    buffer = io.BytesIO()
+    first.save(buffer, Image.registered_extensions()[suffix], save_all=True, append_images=others)
+    return buffer.getvalue()

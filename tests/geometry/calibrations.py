@@ -1,5 +1,9 @@
-"""One calibration in every format: 640 x 480 pixels, a lens that bends, 4 m from the origin and 1 m up."""
+"""One calibration in every format: 640 x 480 pixels, a lens that bends, 4 m from the origin and 1 m up.
 
+`KINDS` are another one, as other programs write it.
+"""
+
+import json
 from pathlib import Path
 
 import cv2
@@ -42,3 +46,64 @@ def opencv(path: Path, placed: bool = True) -> Path:
         storage.write("tvec", np.array([[0.0], [1.0], [4.0]]))
     storage.release()
     return path
+
+
+ROTATION = cv2.Rodrigues(np.array([1.4, 0.3, -0.2]))[0]  # a camera that looks along a z-up world's ground
+TRANSLATION = np.array([0.3, 1.1, 4.2])
+K = [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]]
+LENS = [0.12, -0.05, 0.001, 0.002, 0.01]
+
+
+def matrix_text(name: str, values: object) -> str:
+    array = np.atleast_2d(np.asarray(values, dtype=float))
+    shape = f"   rows: {array.shape[0]}\n   cols: {array.shape[1]}\n   dt: d\n"
+    return f"{name}: !!opencv-matrix\n{shape}   data: {array.ravel().tolist()}\n"
+
+
+PLACED = {"rotation": cv2.Rodrigues(ROTATION)[0].tolist(), "translation": TRANSLATION[:, None].tolist()}  # columns
+ENTRY = f"size = [640, 480]\nmatrix = {K}\ndistortions = {LENS}\nrotation = {PLACED['rotation']}\ntranslation = {PLACED['translation']}\nfisheye = false\n"
+YAML_24 = (
+    "%YAML:1.0\nimage_Width: 640\nimage_Height: 480\n"
+    + matrix_text("Camera_Matrix", K)
+    + matrix_text("Distortion_Coefficients", LENS)
+)
+INTRI = (
+    '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n'
+    + matrix_text("K_left", K)
+    + matrix_text("dist_left", LENS)
+    + matrix_text("K_right", K)
+    + matrix_text("dist_right", np.zeros(5))
+)
+EXTRI = '%YAML:1.0\n---\nnames:\n   - "left"\n   - "right"\n' + "".join(
+    matrix_text(f"{kind}_{name}", value)
+    for name in ("left", "right")
+    for kind, value in (("R", PLACED["rotation"]), ("Rot", ROTATION), ("T", PLACED["translation"]))
+)
+ROS = (
+    "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+    f"  data: {np.ravel(K).tolist()}\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n"
+    f"  data: {LENS}\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+    f"projection_matrix:\n  rows: 3\n  cols: 4\n  data: {np.ravel(np.eye(3, 4)).tolist()}\n"
+)
+ROS_MESSAGE = (
+    "header:\n  seq: 1\n  frame_id: narrow\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n"
+    f"D: {LENS}\nK: {np.ravel(K).tolist()}\nR: [0, 1, 0, 1, 0, 0, 0, 0, -1]\nP: {np.ravel(np.eye(3, 4)).tolist()}\n"
+)
+KINDS = {
+    "caliscope.toml": f"[charuco]\ncolumns = 4\n[cameras.0]\ncam_id = 0\n{ENTRY}[cameras.1]\nignore = true\n",
+    "pose2sim.toml": f"[cam_01]\nname = 'cam_01'\n{ENTRY}[metadata]\nadjusted = false\n",
+    "opencv24.yml": YAML_24 + matrix_text("R", ROTATION) + matrix_text("T", PLACED["translation"]),
+    "tutorial.json": json.dumps({"mtx": K, "dist": [LENS], "R": ROTATION.tolist(), "tvec": PLACED["translation"]}),
+    "several.json": json.dumps({"cameras": [{"name": "a", "K": K, "dist_coeff": LENS, "image_size": [640, 480], "R": ROTATION.tolist(), "t": TRANSLATION.tolist()}]}),
+    "numbered.yaml": "w: 640\nh: 480\nfx: 500\nfy: 510\ncx: 319.5\ncy: 239.5\nk1: 0.12\nk2: -0.05\np1: 0.001\np2: 0.002\nk3: 0.01\n" + matrix_text("R", ROTATION) + matrix_text("T", TRANSLATION),
+    "kalibr.yaml": f"cam0:\n  camera_model: pinhole\n  intrinsics: [500, 510, 319.5, 239.5]\n  distortion_model: radtan\n  distortion_coeffs: {LENS}\n  resolution: [640, 480]\n  rvec: {PLACED['rotation']}\n  tvec: {PLACED['translation']}\n",
+    "intri.yml": INTRI,
+    "ros.yaml": ROS,
+    "ros_message.yaml": ROS_MESSAGE,
+}  # fmt: skip
+
+
+def kind_written(folder: Path, name: str) -> Path:
+    (folder / "extri.yml").write_text(EXTRI)
+    (folder / name).write_text(KINDS[name])
+    return folder / name

@@ -1,15 +1,29 @@
 """Calibration files: what each format says, which way is up, and lenses that bend."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from posefit.geometry.calibration import Calibration, read_calibrations, upright
+from posefit.geometry.calibration import Calibration, guessed_up, read_calibrations, upright
 from posefit.geometry.camera import Camera
 from tests.cases import each
-from tests.geometry.calibrations import QUALISYS, TOML, opencv
+from tests.geometry.calibrations import (
+    KINDS,
+    LENS,
+    QUALISYS,
+    ROTATION,
+    TOML,
+    TRANSLATION,
+    YAML_24,
+    K,
+    kind_written,
+    matrix_text,
+    opencv,
+)
 
 
 def written(tmp_path: Path, name: str) -> Path:
@@ -178,3 +192,102 @@ def test_a_picture_that_a_codec_filled_up_has_the_camera_that_it_had(
         before, after = one.camera(made_for, np.eye(3)), padded.camera(came, np.eye(3))
         np.testing.assert_array_equal([after.focal, after.centre], [before.focal, before.centre])
         assert (after.width, after.height) == came
+
+
+@each("name", list(KINDS))
+def test_cameras_of_every_program_project_as_opencv_does(tmp_path: Path, name: str) -> None:
+    read = read_calibrations(kind_written(tmp_path, name))
+    one = read[0]
+    assert len(read) == (2 if name == "intri.yml" else 1)
+    assert one.size == (None if name in ("tutorial.json", "intri.yml") else (640, 480))
+    placed = not name.startswith("ros")
+    assert (one.rotation is not None) == placed
+    points = np.random.default_rng(0).uniform(-0.8, 0.8, (40, 3))
+    turn, place = (ROTATION, TRANSLATION) if placed else (np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 3.0]))
+    bent = cv2.projectPoints(points, turn, place, np.array(K), np.array(LENS))[0].reshape(-1, 2) + 0.5
+    pixels = one.camera((640, 480), np.eye(3)).project(points if placed else points + [0.0, 0.0, -3.0])[0]
+    straight = one.straightened(np.concatenate([bent, np.ones((40, 1))], axis=1), (640, 480))[:, :2]
+    np.testing.assert_allclose(straight, pixels, atol=2e-2)
+
+
+@each(("name", "value"), [("fisheye_model", "1"), ("distortion_model", "equidistant"), ("fisheye", "true")])
+def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
+    for lens in ([0.1, -0.02, 0.003, 0.0], [0.0] * 4):  # without numbers, too
+        text = "%YAML:1.0\n---\nimage_width: 1280\nimage_height: 800\n" + f"{name}: {value}\n"
+        k = np.array([[600.0, 0.0, 639.5], [0.0, 600.0, 399.5], [0.0, 0.0, 1.0]])
+        (tmp_path / "a.yml").write_text(
+            text + matrix_text("camera_matrix", k) + matrix_text("distortion_coefficients", lens)
+        )
+        (one,) = read_calibrations(tmp_path / "a.yml")
+        assert one.distorted
+        rays = np.array([[1.0, 0.55, 1.0], [-0.4, 0.2, 1.0]])
+        bent = cv2.fisheye.projectPoints(rays[:, None], np.zeros(3), np.zeros(3), k, np.array(lens))[0].reshape(-1, 2)
+        straight = one.straightened(np.concatenate([bent + 0.5, np.ones((2, 1))], axis=1), (1280, 800))
+        np.testing.assert_allclose(straight[0, :2], [1240.0, 730.0], atol=0.01)  # 640 + 600 x, 400 + 600 y
+        across, down = one.maps((1280, 800))
+        np.testing.assert_allclose([across[729, 1239], down[729, 1239]], bent[0], atol=0.8)
+
+
+@each(
+    ("line", "message"),
+    [
+        ("dist_foo: [0.1, 0.2, 0, 0]", "the lens key 'dist_foo' of 'a', which is not known"),
+        ("lens_coefs: [0.1, 0, 0, 0]", "the lens key 'lens_coefs' of 'a', which is not known"),
+        ("xi: 1.2", "the lens key 'xi' of 'a', which is not known"),
+        ("k4: 0.2\nk1: 0.1", "the lens key 'k4' of 'a', which is not known"),
+        ("distortion_model: double_sphere", "the lens model 'double_sphere', which is not known"),
+        ("model: omnidirectional", "the lens model 'omnidirectional', which is not known"),
+        ("fisheye: true\ndist: [0.1, 0.1, 0.1, 0.1, 0.1]", "a distortion of 5 numbers of a fisheye"),
+    ],
+)
+def test_a_lens_that_is_not_known_is_named(tmp_path: Path, line: str, message: str) -> None:
+    fine = "image_size: [640, 480]\nlens: Canon 50 mm\nlens_focal_mm: 4.2\nmodel: HERO9\ndistance: 3.0\n" + matrix_text(
+        "K", K
+    )
+    (tmp_path / "a.yml").write_text(fine)
+    assert not read_calibrations(tmp_path / "a.yml")[0].distorted
+    (tmp_path / "a.yml").write_text(f"{fine}{line}\n")
+    with pytest.raises(ValueError, match=message):
+        read_calibrations(tmp_path / "a.yml")
+
+
+@each(
+    ("matrix", "message"),
+    [
+        (
+            [[1e8, 0, 319.5], [0, 1e8, 239.5], [0, 0, 1]],
+            "focal must be in pixels, for such pictures 32 to 64000, got 1e",
+        ),
+        ([[4.2, 0, 319.5], [0, 4.2, 239.5], [0, 0, 1]], "focal must be in pixels"),  # millimetres
+        (np.transpose(K).tolist(), "a camera matrix that is not of the form fx 0 cx"),  # as MATLAB has it
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused_before(tmp_path: Path, matrix: object, message: str) -> None:
+    (tmp_path / "a.json").write_text(json.dumps({"K": matrix, "image_size": [640, 480]}))
+    with pytest.raises(ValueError, match=message):
+        read_calibrations(tmp_path / "a.json")
+
+
+def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
+    path = kind_written(tmp_path, "intri.yml")
+    (one,) = read_calibrations(f"{path}:right")
+    assert (one.name, one.distorted) == ("right", False)
+    with pytest.raises(ValueError, match="intri.yml: expected the name of a camera, left, right, got 'middle'"):
+        read_calibrations(f"{path}:middle")
+    (tmp_path / "a:b.yml").write_text(YAML_24)  # a name of a file may have a colon
+    assert read_calibrations(tmp_path / "a:b.yml")[0].distorted
+
+
+def test_up_that_is_named_holds_for_our_own_cameras_and_a_guess_is_reported(tmp_path: Path) -> None:
+    level = Camera.around(np.zeros(3), 0.4, 3.0, (320, 240))
+    lying = replace(level, rotation=level.rotation @ upright([], None) @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
+    (tmp_path / "a.json").write_text(lying.to_json())
+    (one,) = read_calibrations(tmp_path / "a.json")
+    assert (
+        guessed_up([one])
+        == "+y is up in the cameras' world, as posefit's own files have it, though z is in their images"
+    )
+    np.testing.assert_allclose(one.camera((320, 240), upright([one], "z")).rotation, level.rotation, atol=1e-9)
+    (tmp_path / "a.json").write_text(level.to_json())
+    assert guessed_up(read_calibrations(tmp_path / "a.json")) == ""
+    assert guessed_up(read_calibrations(written(tmp_path, "a.toml"))) == "+z is up in the cameras' world"

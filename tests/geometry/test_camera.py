@@ -90,3 +90,10 @@ def test_a_wrong_camera_file_is_refused_in_one_line(tmp_path: Path, key: str, te
 def test_a_focal_length_in_millimetres_is_refused() -> None:
     with pytest.raises(ValueError, match="fx must be in pixels, for 640 of them at least 64, got 4.2"):
         Camera.pinhole(640, 480, fx=4.2)
+
+
+def test_a_camera_comes_back_from_its_text() -> None:
+    camera = Camera.around(np.zeros(3), 0.4, 5.0, (32, 24))
+    assert Camera.from_json(camera.to_json()).to_json() == camera.to_json()
+    with pytest.raises(ValueError, match="camera: expected a JSON object with width"):
+        Camera.from_json('{"width": 3}')

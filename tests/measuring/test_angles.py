@@ -11,15 +11,17 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS
 from posefit.geometry.symmetry import mirrored_poses
-from posefit.measuring.angles import COLUMNS, clinical_angles
+from posefit.measuring.angles import COLUMNS, NEAR_POLE, clinical_angles
 from posefit.measuring.c3d import MAX_EVENTS, write_c3d
 from posefit.measuring.centres import CENTRES, PLACES, joint_centres
 from posefit.measuring.gait import Gait, Step, gait_of
 from posefit.measuring.segments import bone_rotations
 from posefit.measuring.tables import STEP_COLUMNS, write_angles, write_gait, write_trc
 from posefit.motion import built_in, recorded
+from posefit.motion.amc import write_amc
 from posefit.motion.bvh import read_bvh, write_bvh
 from posefit.motion.motion import Motion
+from posefit.motion.opensim import write_mot
 from tests.cases import each
 from tests.measuring.walker import angle
 
@@ -136,7 +138,6 @@ def test_the_knee_of_a_walk_bends_as_published() -> None:
 
 
 def test_a_motion_that_went_through_bvh_has_the_same_angles(tmp_path: Path) -> None:
-    pytest.importorskip("pybvh")
     motion = recorded.clip("02_01").motion()
     write_bvh(tmp_path / "walk.bvh", motion)
     again = read_bvh(tmp_path / "walk.bvh")
@@ -265,6 +266,56 @@ def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion
             written = float(row[name]) if row[name] else np.nan
             value = np.nan if k in BLANK else expected[name][k]
             assert written == pytest.approx(value, abs=1e-3, nan_ok=True)
+
+
+def test_angles_of_recorded_people_do_not_jump() -> None:
+    """35 of the 216 clips had jumps of a whole turn, such as of a forearm that turns past half of one."""
+    for clip in recorded.clips():
+        motion = clip.motion()
+        for name, values in clinical_angles(motion.skeleton, motion.poses).items():
+            known = values[np.isfinite(values)]
+            assert np.abs(np.diff(known)).max(initial=0.0) <= 180.0, (clip.name, name)
+            assert -180.0 <= np.median(known) <= 180.0 if len(known) else name.split("_")[1] == "shoulder"
+
+
+def test_a_whole_turn_of_a_joint_is_one_angle_that_grows() -> None:
+    poses = np.zeros((73, ANGLES))
+    poses[:, angle("lwrist", "y")] = np.radians(np.linspace(-170.0, 190.0, 73))  # 5 degrees a frame
+    turned = clinical_angles(SKELETON, poses)["left_elbow_pronation"]
+    assert np.abs(np.diff(turned)) == pytest.approx(np.full(72, 5.0), abs=1e-6)
+    poses = np.zeros((61, ANGLES))
+    poses[:, angle("lfemur", "z")] = np.radians(np.linspace(20.0, 140.0, 61))  # a leg out to the side, past its pole
+    angles = clinical_angles(SKELETON, poses)
+    adduction, flexion = angles["left_hip_adduction"], angles["left_hip_flexion"]
+    near = np.abs(np.abs(adduction) - 90.0) < NEAR_POLE
+    assert near.any()
+    np.testing.assert_array_equal(np.isnan(flexion), near)
+    np.testing.assert_array_equal(np.isnan(angles["left_hip_internal_rotation"]), near)
+
+
+def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_path: Path) -> None:
+    ezc3d, part = pytest.importorskip("ezc3d"), walk.frames(20, 80)
+    gait = gait_of(part)
+    write_angles(tmp_path / "a.csv", part)
+    write_trc(tmp_path / "a.trc", part)
+    write_c3d(tmp_path / "a.c3d", part, (), gait)
+    write_mot(tmp_path / "a.mot", part)
+    write_amc(tmp_path / "a.amc", part)
+    rows = rows_of(tmp_path / "a.csv")
+    assert (rows[0]["frame"], rows[-1]["frame"]) == ("20", "79")
+    assert float(rows[0]["seconds"]) == pytest.approx(20 / 30.0, abs=1e-6)
+    lines = [line.split("\t") for line in (tmp_path / "a.trc").read_text().splitlines()]
+    assert dict(zip(lines[1], lines[2], strict=True))["OrigDataStartFrame"] == "21"
+    assert (lines[6][0], float(lines[6][1])) == ("21", pytest.approx(20 / 30.0, abs=1e-6))
+    read = ezc3d.c3d(str(tmp_path / "a.c3d"))
+    assert (read["header"]["points"]["first_frame"], read["header"]["points"]["last_frame"]) == (20, 79)
+    assert read["data"]["points"].shape[2] == 60
+    assert gait.steps[0].strike_seconds > 20 / 30.0
+    assert read["parameters"]["EVENT"]["TIMES"]["value"][1].min() > 20 / 30.0
+    table = (tmp_path / "a.mot").read_text().split("endheader\n")[1].splitlines()
+    assert float(table[1].split("\t")[0]) == pytest.approx(20 / 30.0, abs=1e-6)
+    assert (tmp_path / "a.amc").read_text().splitlines()[3] == "21"
+    assert walk.frames(20, 80).frames(5, 10).first == 25
 
 
 def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Acclaim files: real ones against a slow reader of the same text, small ones against numbers worked by hand."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefit.arrays import Array
+from posefit.geometry.body import Body
 from posefit.geometry.rotation import geodesic, rotation_from_root_angles
 from posefit.geometry.skeleton import ANGLES, BONES, ENDS, JOINTS, PARENTS, Skeleton, angle_index
+from posefit.geometry.units import CMU_UNIT
+from posefit.motion import recorded
 from posefit.motion.amc import read_amc, read_clip, write_amc
-from posefit.motion.asf import METRES_PER_UNIT, read_asf
+from posefit.motion.asf import read_asf, write_asf
 from posefit.motion.motion import Motion
 from tests.cases import each
 from tests.geometry.turns import about, chained
@@ -117,7 +121,7 @@ def test_joints_are_where_acclaim_puts_them(cmu: Path, clip: str) -> None:
 
 def test_a_skeleton_by_hand(skeleton: Skeleton, tmp_path: Path) -> None:
     # bone 2, lfemur's place in the text below root's three children, has length 4 in the direction -y
-    assert pytest.approx(0.056444, abs=1e-6) == METRES_PER_UNIT
+    assert pytest.approx(0.056444, abs=1e-6) == CMU_UNIT
     np.testing.assert_allclose(skeleton.offsets[BONES.index("lfemur")], [0.0, -4 * 0.0254 / 0.45, 0.0], atol=1e-12)
     np.testing.assert_allclose(skeleton.axes[7], turn(0.0, 0.0, 20.0), atol=1e-12)
     (tmp_path / "rad.asf").write_text(asf_text(angle="rad", turn=repr(np.pi / 9)))
@@ -236,3 +240,51 @@ def test_any_motion_survives_writing(workshop: Path, seed: int, frames: int) -> 
     ).max() < 1e-7  # fmt: skip
     np.testing.assert_allclose(again.poses, motion.poses, atol=1e-9)
     np.testing.assert_allclose(again.translations, motion.translations, atol=1e-9)
+
+
+def test_the_rate_is_the_files_own_or_given_or_assumed_and_said(tmp_path: Path) -> None:
+    walk = replace(recorded.clip("16_15").motion().frames(0, 30), fps=60000 / 1001)
+    write_asf(tmp_path / "a.asf", walk.skeleton)
+    write_amc(tmp_path / "a.amc", walk)
+    again = read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+    assert (again.fps, again.notes, len(again.resampled(30.0))) == (walk.fps, (), 15)
+    assert read_clip(tmp_path / "a.asf", tmp_path / "a.amc", fps=50.0).fps == 50.0
+    text = (tmp_path / "a.amc").read_text()
+    (tmp_path / "a.amc").write_text(text.partition("\n")[2])
+    assumed = read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+    assert assumed.fps == 120.0
+    assert assumed.notes == (
+        f"{tmp_path / 'a.amc'}: the file does not state its rate: 120 frames a second are assumed; --rate sets it",
+    )
+    (tmp_path / "a.amc").write_text("# 1e9 frames a second\n" + text)
+    with pytest.raises(ValueError, match=r"a.amc:1: expected .*got"):
+        read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+
+
+@each("stated", ["  length 1.0\n", "  length 0.001\n", None])
+def test_a_unit_that_makes_no_person_is_recognised_and_said(tmp_path: Path, stated: str | None) -> None:
+    walk = recorded.clip("16_15").motion().frames(0, 4)
+    write_asf(tmp_path / "a.asf", walk.skeleton)
+    write_amc(tmp_path / "a.amc", walk)
+    assert read_clip(tmp_path / "a.asf", tmp_path / "a.amc").notes == ()
+    text = (tmp_path / "a.asf").read_text()
+    length = next(line for line in text.splitlines(keepends=True) if line.strip().startswith("length"))
+    if stated is None:
+        start, rest = text.split(":units\n")
+        text = start + rest[rest.index(":root") :]
+    else:
+        text = text.replace(length, stated, 1)
+    (tmp_path / "a.asf").write_text(text)
+    motion = read_clip(tmp_path / "a.asf", tmp_path / "a.amc")
+    np.testing.assert_allclose(motion.joints, walk.joints, atol=1e-9)
+    (note,) = motion.notes
+    assert "the CMU database's unit (5.64 cm): 1.7" in note
+    assert Body.of(read_asf(tmp_path / "a.asf", "inch")).stature == pytest.approx(0.45 * Body.of(walk.skeleton).stature)
+
+
+def test_an_amc_may_have_another_axis_up(tmp_path: Path) -> None:
+    walk = recorded.clip("16_15").motion().frames(0, 4)
+    write_asf(tmp_path / "a.asf", walk.skeleton)
+    write_amc(tmp_path / "a.amc", walk.turned(about(0, np.pi / 2)))
+    motion = read_clip(tmp_path / "a.asf", tmp_path / "a.amc", up="z")
+    np.testing.assert_allclose(motion.joints, walk.joints, atol=1e-9)

@@ -14,8 +14,8 @@ from posefit.evaluation.errors import evaluated, nearest
 from posefit.evaluation.measures import Measures
 from posefit.fitting import metrics
 from posefit.footage.scene import Scene
-from posefit.footage.source import training_clips
 from posefit.geometry.body import varied
+from posefit.motion.clips import training_clips
 from tests.tracking.scenes import frame_of, truth_of, walk
 
 FRAMES, VIEWS = 4, (45.0, 135.0)

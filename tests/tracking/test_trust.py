@@ -143,7 +143,9 @@ def test_the_worst_sign_is_named_and_the_others_are_counted(changes: dict[str, A
 
 def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert signs_against(FINE) == []
-    assert sentence(FINE, []).startswith("Trust: good. No sign speaks against it: size 1.80 m of a body of 1.80 m, ")
+    assert sentence(FINE, []).startswith(
+        "Trust: good. No sign speaks against it: size 1.80 m, the fitted body's 1.80 m, "
+    )
     unknown = FINE | {sign.name: None for sign in SIGNS} | {"size_m": None}
     assert signs_against(unknown) == []
 

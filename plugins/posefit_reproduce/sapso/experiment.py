@@ -213,7 +213,8 @@ def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array
 
 def _first_frame(scene: Scene, motion: PaperMotion, scale: Scale, particles: int, seed: int, **method: Any) -> Frame:
     """Return what a method makes of a scene of one frame."""
-    name = method["optimiser"].__name__ if "optimiser" in method else OURS.partition("@")[0]
+    chosen = method["method"]
+    name = OURS.partition("@")[0] if isinstance(chosen, str) else chosen[0].__name__
     settings = {**DRIVEN, f"{name}.population_size": particles}
     how: dict[str, Any] = {"settings": settings, "evaluations": particles * (scale.iterations + 1), "seed": seed}
     return track(scene, train=motion.training, **how, **method).frames[0]
@@ -250,7 +251,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
             super().tell(proposals, costs)
 
     searches: list[Watched] = []
-    frame = _first_frame(scene, motion, scale, particles, seed, optimiser=Watched, method="@pca")
+    frame = _first_frame(scene, motion, scale, particles, seed, method=(Watched, "pca"))
     search = searches[-1]  # the one before it only compiles
     poses, translations = zip(*search.decoded, strict=True)
     return WatchedSwarm(scene, poses, translations, search.cheapest, frame.trace[:, 1])

@@ -10,8 +10,8 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
-from posefit.footage.source import load_motion
 from posefit.motion import built_in
+from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 from posefit_reproduce.sapso.paper import TRAINING_FRAMES, FirstYaw
 

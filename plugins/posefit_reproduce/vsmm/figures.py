@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.files import opencv_name
 from posefit.fitting.tracker import Frame
 from posefit.geometry.skeleton import PARENTS
 from posefit.output.drawing import draw_body, side_view
@@ -33,7 +34,7 @@ def patent_figures(film: Film, frames: Sequence[Frame], folder: Path) -> list[st
     for name, figure in figures.items():
         figure.savefig(folder / name, dpi=130)
     stills = "figure-9-joints.png"
-    if not cv2.imwrite(str(folder / stills), film_stills(film, frames, states)):
+    if not cv2.imwrite(opencv_name(folder / stills), film_stills(film, frames, states)):
         raise InputError(f"{folder / stills}: expected to write a picture, got nothing written")
     return [stills, *figures]
 

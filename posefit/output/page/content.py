@@ -11,7 +11,7 @@ from posefit.arrays import Array
 from posefit.evaluation.errors import FRAME, LOST, Table
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.rotation import wrapped
+from posefit.geometry.rotation import unwrapped, wrapped
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
@@ -56,7 +56,7 @@ def track_data(
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, estimate.skeleton.free
     true = None if truth is None else truth.joints[::step]
-    angles = np.unwrap(estimate.poses[::step], axis=0)
+    angles = unwrapped(estimate.poses)[::step]
     worth = "" if truth is None else f": {brief(summary)[0]}"
     curves = [name for name in CURVES if name in table]
     return {
@@ -72,6 +72,7 @@ def track_data(
         "sides": SIDES,
         "radii": np.round(scene.body.radii, 4).tolist(),
         "count": len(frames),
+        "first": scene.first,
         "step": step,
         "fps": estimate.fps,
         "cameras": [camera_from_origin(camera, origin) for camera in scene.cameras],
@@ -143,5 +144,5 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
 
 def _clinical(motion: Motion, step: int) -> Array:
     """Return the clinical angles (T, n) in degrees of every `step`-th frame."""
-    angles = clinical_angles(motion.skeleton, motion.poses[::step])
-    return np.column_stack([angles[name] for name in COLUMNS])
+    angles = clinical_angles(motion.skeleton, motion.poses)
+    return np.column_stack([angles[name] for name in COLUMNS])[::step]

@@ -8,7 +8,7 @@ const MARKS = [
 ].filter(([name]) => D.marks[name].length);
 const STRENGTHS = [0.85, 0.5, 0.25]; // of the bands, the narrowest first
 const cursors = new Map(); // from each box to the function that moves its line to a frame
-const seconds = (frame) => (frame * D.step) / D.fps;
+const seconds = (frame) => (D.first + frame * D.step) / D.fps;
 
 // A chart of `lines` {values, colour, name, dashed} over `bands` {low, high}, the narrowest first.
 function chart(width, { lines, bands, label, unit, digits }) {

@@ -28,12 +28,14 @@ function frameText(frame) {
   const other = otherOf(frame);
   const states = MARKS.filter(([name]) => D.marks[name].includes(frame)).map(([, , words]) => words);
   if (other) states.push(`may be the thin bones: ${whole(100 * other.weight)} %`);
-  return [`frame ${frame * D.step} of ${D.count}, ${number(seconds(frame), 2)} s`, ...figures, ...states].join("; ");
+  return [`frame ${D.first + frame * D.step} of ${D.first + D.count}, ${number(seconds(frame), 2)} s`, ...figures, ...states].join("; ");
 }
 
+const others = D.cameras.length > 1 ? D.cameras.map(() => make("canvas", { "aria-hidden": "true" })) : [];
 let last = "";
 function paint() {
-  const pictured = paintPicture();
+  const pictured = paintPicture($("picture"), show.camera);
+  others.forEach((canvas, number) => paintPicture(canvas, number));
   paintBody();
   cursors.forEach((move) => move(show.frame));
   const text = frameText(show.frame);
@@ -41,7 +43,7 @@ function paint() {
   last = `${show.camera} ${text}`;
   $("frame").value = show.frame;
   $("frame").setAttribute("aria-valuetext", text);
-  $("reading").textContent = pictured === show.frame ? text : `${text}; the picture is of frame ${pictured * D.step}`;
+  $("reading").textContent = pictured === show.frame ? text : `${text}; the picture is of frame ${D.first + pictured * D.step}`;
   $("picture").setAttribute("aria-label", `Camera ${show.camera + 1} with the body on it, ${text}`);
   $("turning").setAttribute("aria-label", `The body in 3D, which arrow keys turn, ${text}`);
 }
@@ -90,13 +92,14 @@ function player() {
   $("frame").oninput = () => seek(+$("frame").value);
   const speeds = [1, 0.5, 0.25, 0.1].map((speed) => [String(speed), `${speed}×`]);
   choose($("speed"), speeds, "1", () => {});
-  const cameras = D.cameras.map((_, k) => [String(k), String(k + 1)]);
-  choose($("camera"), cameras, "0", () => {
-    show.camera = +$("camera").value;
-    upright();
-    paint();
+  others.forEach((canvas, number) => {
+    const act = () => {
+      show.camera = number;
+      upright();
+      paint();
+    };
+    $("cameras").append(make("button", { type: "button", on: { click: act } }, canvas, `camera ${number + 1}`));
   });
-  $("camera-label").hidden = D.cameras.length < 2;
   $("with-film").parentNode.hidden = !D.film;
   $("with-mask").checked = !D.film;
   $("close-up").checked = closeness(0) > 1.4;

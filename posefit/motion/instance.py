@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.footage.source import load_motion
 from posefit.motion import built_in
+from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
 
 RNG_STREAM_INSTANCE = 2013

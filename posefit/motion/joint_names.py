@@ -1,0 +1,151 @@
+"""What the joints of somebody else's skeleton are, by their names and by how they hang together.
+
+Names of many programs are known: those of Acclaim, the CMU conversions by cgspeed, MotionBuilder and HumanIK, Mixamo,
+LAFAN1, Bandai Namco, 3ds Max's Biped, Biovision, Xsens, Poser, SMPL, Unreal, VRM, Blender and freemocap. Namespaces,
+prefixes, numbers and the ways to write a side do not matter: `mixamorig:LeftUpLeg`, `Bip01 L Thigh` and `thigh.L` are
+one joint. A limb's joints are named; the spine is what lies between the legs and the arms, whatever it is called.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+# Of each joint of a side, from the trunk outwards: its names, and those that it has where no other joint has the first.
+_LIMBS: Mapping[str, tuple[set[str], set[str]]] = {
+    "thigh": ({"upleg", "upperleg", "thigh", "femur", "uleg", "legupper"}, {"hip"}),
+    "shin": ({"leg", "lowleg", "lowerleg", "shin", "shank", "calf", "knee", "tibia", "leglower"}, set()),
+    "foot": ({"foot", "ankle"}, set()),
+    "toe": ({"toe", "toes", "toebase", "ball", "footindex", "forefoot"}, set()),
+    "clavicle": ({"clavicle", "collar", "collarbone"}, {"shoulder"}),
+    "arm": ({"arm", "uparm", "upperarm", "uarm", "shldr", "humerus", "armupper"}, {"shoulder"}),
+    "forearm": ({"forearm", "lowarm", "lowerarm", "farm", "elbow", "radius", "armlower"}, set()),
+    "hand": ({"hand", "wrist"}, set()),
+    "palm": ({"fingerbase", "handmiddle", "middle", "fmiddle", "handmid", "mid"}, set()),
+}
+_MIDDLE = {"head": {"head", "face", "skull"}, "neck": {"neck", "lowerneck", "upperneck"}}
+_SIDES = {"left": "left", "right": "right", "l": "left", "r": "right"}
+_JOINED = {"lu": ("left", "u"), "ru": ("right", "u"), "lf": ("left", "f"), "rf": ("right", "f")}  # LUArm, RFArm
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_KNOWN = set().union(*(first | second for first, second in _LIMBS.values()), *_MIDDLE.values())
+_ENDINGS = {"joint", "jnt", "bone"}
+LEGS, ARMS = ("thigh", "shin", "foot"), ("arm", "forearm", "hand")
+NEEDED = tuple((side, joint) for side in ("left", "right") for joint in (*LEGS, *ARMS))
+LONGEST_NAME = 200  # characters; of what is longer, the end counts
+
+
+class Part(NamedTuple):
+    """What a name says: the side, the part in one word, and how many other words stand before it."""
+
+    side: str
+    part: str
+    others: int
+
+
+def part_of(name: str) -> Part:
+    """Return what a joint's name says; without a known part, the part is ""."""
+    words = [word.lower() for word in _WORD.findall(name[-LONGEST_NAME:].rpartition(":")[2])]
+    sides: list[str] = []
+    rest: list[str] = []
+    for word in words:
+        if word in _SIDES:
+            sides.append(_SIDES[word])
+        elif word in _JOINED:
+            side, letter = _JOINED[word]
+            sides.append(side)
+            rest.append(letter)
+        elif word not in _KNOWN and word[0] in "lr" and word[1:] in _KNOWN:  # lThigh in small letters, lfemur
+            sides.append(_SIDES[word[0]])
+            rest.append(word[1:])
+        else:
+            for side in ("left", "right"):  # leftarm
+                if word.startswith(side) and word[len(side) :] in _KNOWN:
+                    sides.append(side)
+                    word = word[len(side) :]
+            rest.append(word)
+    side = sides[-1] if sides else ""
+    while rest and rest[-1] in _ENDINGS:
+        rest.pop()
+    for others in range(len(rest)):
+        if (part := "".join(rest[others:])) in _KNOWN:
+            return Part(side, part, others)
+    return Part(side, "", 0)
+
+
+class Joints(NamedTuple):
+    """Which nodes of a tree are a person's joints, by their numbers."""
+
+    limbs: Mapping[tuple[str, str], int]  # such as ("left", "thigh"); those of `NEEDED` at least
+    hips: int
+    chest: int  # from which arms and head go
+    spine: Sequence[int]  # from behind the hips to the joint that bears the neck
+    neck: Sequence[int]  # from the base of the neck to before the head
+    head: int | None
+
+
+def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str]:
+    """Return the joints of a tree whose nodes come after their parents, -1 for a root's; or what it lacks."""
+    parts = [part_of(name) for name in names]
+    paths: list[list[int]] = []  # of each node, from a root to it
+    for node, parent in enumerate(parents):
+        paths.append([*(paths[parent] if parent >= 0 else []), node])
+    limbs: dict[tuple[str, str], int] = {}
+    for side in ("left", "right"):
+        limbs.update({(side, joint): node for joint, node in _limbs(side, parts, paths).items()})
+    missing = [f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs]
+    for side in ("left", "right"):
+        for chain in (LEGS, ARMS):
+            for above, below in pairwise(chain):
+                first, second = limbs.get((side, above)), limbs.get((side, below))
+                if first is not None and second is not None and first not in paths[second][:-1]:
+                    missing.append(f"{side} {below} ({names[second]!r}) under {side} {above} ({names[first]!r})")
+    if missing:
+        return missing
+    legs = [limbs[side, "thigh"] for side in ("left", "right")]
+    arms = [limbs[side, "arm"] for side in ("left", "right")]
+    hips = _common(paths, legs)
+    heads = [node for node, part in enumerate(parts) if part.part in _MIDDLE["head"] and not part.side]
+    head = min(heads, key=lambda node: (parts[node].part != "head", parts[node].others, len(paths[node])), default=None)
+    if hips is None or (chest := _common(paths, arms if head is None else [*arms, head])) is None:
+        return ["a root from which legs, arms and head go"]
+    if hips not in paths[chest]:
+        return [f"arms and head above the hips ({names[hips]!r})"]
+    between = paths[chest][paths[chest].index(hips) + 1 :]
+    if head is None:
+        necks = [node for node, part in enumerate(parts) if part.part == "neck" and not part.side]
+        neck = min(necks, key=lambda node: len(paths[node]), default=None)
+        bearing = [] if neck is None or chest not in paths[neck] else paths[neck][paths[neck].index(chest) + 1 :]
+    else:
+        bearing = paths[head][paths[head].index(chest) + 1 : -1]
+    if parts[chest].part == "neck" and between:  # Biped's shoulders hang from the neck
+        bearing, between = [between[-1], *bearing], between[:-1]
+    return Joints(limbs, hips, chest, between, bearing, head)
+
+
+def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> dict[str, int]:
+    """Return the joints of a side's arm and leg."""
+
+    def named(names: set[str]) -> list[int]:
+        nodes = [node for node, part in enumerate(parts) if part.side == side and part.part in names]
+        fewest = min((parts[node].others for node in nodes), default=0)
+        return sorted((node for node in nodes if parts[node].others == fewest), key=lambda node: len(paths[node]))
+
+    nodes = {joint: named(first) for joint, (first, _) in _LIMBS.items()}
+    others = {joint: named(second) for joint, (_, second) in _LIMBS.items()}
+    nodes["thigh"] = nodes["thigh"] or others["thigh"]
+    if not nodes["arm"]:
+        nodes["arm"] = others["arm"]
+    elif not nodes["clavicle"]:
+        nodes["clavicle"] = others["clavicle"]
+    # `leg` and `knee`, `arm` and `elbow`, `ankle` and `foot`, `wrist` and `hand`: two names of one kind in a row
+    for above, below in (("thigh", "shin"), ("foot", "toe"), ("hand", "palm")):
+        wanted, spare = (above, nodes[below]) if above == "thigh" else (below, nodes[above])
+        if not nodes[wanted] and len(spare) > 1 and spare[0] in paths[spare[1]]:
+            nodes[above], nodes[below] = [spare[0]], [spare[1]]
+    return {joint: each[0] for joint, each in nodes.items() if each}
+
+
+def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:
+    """Return the last node that is on the paths to all of some nodes."""
+    shared = [steps[0] for steps in zip(*(paths[node] for node in nodes), strict=False) if len(set(steps)) == 1]
+    return shared[-1] if shared else None

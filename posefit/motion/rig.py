@@ -1,0 +1,408 @@
+"""A person's motion out of somebody else's skeleton: other names, rest poses, axes and joints than posefit's.
+
+A rig is a tree whose nodes have places and turns in each frame. Each of posefit's bones goes with one node of it, and
+ends at a place that the node carries. Joint angles are counted from the pose of rest of the CMU database, upright, legs
+apart, arms out, palms down: how a node is turned there is read off the rig's own rest where that is a person's, or else
+off the frame that is most like it, each bone turned the shortest way from the one before.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.geometry.rotation import (
+    along_y,
+    geodesic,
+    joint_angles_from_rotation,
+    root_angles_from_rotation,
+    rotation_about,
+    shortest_turn,
+    unwrapped,
+)
+from posefit.geometry.skeleton import ANGLES, BONES, ENDS, INNER, JOINTS, PARENTS, Skeleton, angle_index
+from posefit.motion.built_in import average_skeleton
+from posefit.motion.joint_names import Joints
+
+SAME_PLACE = 1e-4  # share of a leg within which two joints are at one point
+AS_IN_FILE = 20.0  # degrees: a foot, a clavicle or a bone of the spine that is so near to CMU's rest stays as it is
+ALIKE = 0.5  # degrees: of other bones
+UPRIGHT = 60.0  # degrees that legs and trunk may be off in a pose of rest
+SQUARE = 25.0  # degrees: a root's axes that are so near to left, up and ahead are these
+STANDING = 0.7  # the mean cosine between legs, trunk and the axis that is up
+POSES = 2_000  # frames, the most that are searched for one like the pose of rest
+UNUSED = 1e-5  # radians: a turn about an axis that CMU's joints do not have, which is rounding
+_ENDS_OF = {
+    "hipjoint": "thigh",
+    "femur": "shin",
+    "tibia": "foot",
+    "clavicle": "arm",
+    "humerus": "forearm",
+    "radius": "hand",
+}
+# the bone below a hinge, where its ends are, and which way it bends from rest
+_HINGES = {
+    "femur": ("shin", "foot", (0.0, 0.0, -1.0)),
+    "humerus": ("forearm", "hand", (0.0, 0.5, 0.75**0.5)),
+}  # an elbow bends 30 degrees up from forwards
+BENT = 0.35  # the sine of 20 degrees, from which on a knee or an elbow shows about which axis it bends
+_STEADY = ("femur", "tibia", "humerus", "radius", "wrist")
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Which nodes are a person's joints, and where nodes are and how they are turned: at rest, and in the frames."""
+
+    names: Sequence[str]
+    parents: Sequence[int]
+    joints: Joints
+    tips: Sequence[Sequence[Array]] = field(
+        repr=False
+    )  # of each node: where bones that no node follows end, (3,) in it
+    rest: tuple[Array, Array] = field(repr=False)  # turns (nodes, 3, 3) and places (nodes, 3)
+    moving: tuple[Array, Array] = field(repr=False)  # turns (nodes, T, 3, 3) and places (nodes, T, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Retargeted:
+    """A rig's motion of a `Skeleton`, in the rig's unit."""
+
+    skeleton: Skeleton
+    poses: Array = field(repr=False)  # (T, 66)
+    places: Array = field(repr=False)  # (T, 3)
+    filled: Sequence[str]  # bones that the rig does not have
+    off: float  # the farthest that a joint is from its place in the rig
+
+
+@dataclass(frozen=True, eq=False)
+class _Bone:
+    """Which node carries a bone's end, and where that is: in the frames (T, 3) and at rest; None where unknown."""
+
+    node: int
+    at: Array | None = None
+    rest: Array | None = None
+
+
+class _Places:
+    """Places that nodes carry, in the frames and at rest, and others between them."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+
+    def of(self, node: int) -> _Bone:
+        """Return the bone that ends in a node: the one before it carries it."""
+        return _Bone(self.rig.parents[node], self.rig.moving[1][node], self.rig.rest[1][node])
+
+    def carried(self, node: int, tip: Array) -> _Bone:
+        """Return the bone that ends in a point (3,) of a node."""
+        turns, places = self.rig.moving
+        rest_turns, rest_places = self.rig.rest
+        return _Bone(node, places[node] + turns[node] @ tip, rest_places[node] + rest_turns[node] @ tip)
+
+    def between(self, node: int, start: _Bone, end: _Bone, share: float) -> _Bone:
+        """Return the bone that a node carries, and that ends at a share of the way between the ends of two others."""
+        assert start.at is not None
+        assert end.at is not None
+        assert start.rest is not None
+        assert end.rest is not None
+        ends = (start.at, end.at), (start.rest, end.rest)
+        return _Bone(node, *((1.0 - share) * first + share * last for first, last in ends))
+
+    def tip(self, node: int, least: float) -> Array | None:
+        """Return where a node's bone ends, in the node: the farthest of its ends; None where it has none so far off."""
+        ends = [*self.rig.tips[node]]
+        ends = ends or [self._offset(child) for child, parent in enumerate(self.rig.parents) if parent == node]
+        best = max(ends, key=lambda end: float(np.linalg.norm(end)), default=None)
+        return best if best is not None and float(np.linalg.norm(best)) > least else None
+
+    def _offset(self, node: int) -> Array:
+        turns, places = self.rig.rest
+        parent = self.rig.parents[node]
+        return np.asarray(turns[parent].T @ (places[node] - places[parent]))
+
+
+def retargeted(rig: Rig, up: Array) -> Retargeted:
+    """Return a rig's motion of a skeleton with its bones; `up` (3, 3) turns the world so that y is up.
+
+    Raises InputError where the rig's legs have no length.
+    """
+    average = average_skeleton()
+    turns, places = up @ rig.moving[0], rig.moving[1] @ up.T
+    rig = Rig(rig.names, rig.parents, rig.joints, rig.tips, rig.rest, (turns, places))
+    legs = [_length(rig, side) for side in ("left", "right")]
+    mine = average.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum()
+    scale = float(np.mean(legs)) / float(mine)
+    if not scale > 0.0:
+        raise InputError("legs with a length, got some without")
+    bones = _bones(rig, scale)
+    hips = rig.joints.hips
+    own, rest_turns, rest_places, root = _like_rest(rig, bones)
+    frame = rest_turns[hips] @ root  # the root's, where its angles are 0
+    count = places.shape[1]
+    skeleton_offsets = np.zeros((len(BONES), 3))
+    turned = np.tile(np.eye(3), (len(JOINTS), 1, 1))  # of each bone: from CMU's rest to the rig's
+    world = np.empty((len(JOINTS), count, 3, 3))
+    at = np.empty((len(JOINTS), count, 3))
+    rest_at = np.zeros((len(JOINTS), 3))
+    world[0], at[0], rest_at[0] = turns[hips] @ root, places[hips], rest_places[hips]
+    poses = np.zeros((count, ANGLES))
+    poses[:, :3] = root_angles_from_rotation(world[0])
+    for joint in range(1, len(JOINTS)):
+        name, bone, above = BONES[joint - 1], bones[joint - 1], PARENTS[joint]
+        expected = scale * average.offsets[joint - 1]
+        rest_end = _rest_end(rig, bone, rest_turns, rest_places)
+        before = turned[above]
+        vector = expected if rest_end is None else before.T @ frame.T @ (rest_end - rest_at[above])
+        rest_at[joint] = rest_at[above] + frame @ before @ vector if rest_end is None else rest_end
+        length = float(np.linalg.norm(vector))
+        if joint in ENDS:
+            begin, carrying = bones[above - 1].rest, bones[above - 1].node
+            if bone.rest is not None and begin is not None:  # without the end's own turn
+                vector = before.T @ frame.T @ rest_turns[carrying] @ rig.rest[0][carrying].T @ (bone.rest - begin)
+            skeleton_offsets[joint - 1] = vector
+            world[joint] = world[above]
+            at[joint] = at[above] + world[above] @ vector
+            continue
+        off = np.degrees(geodesic(np.eye(3), shortest_turn(expected, vector))) if length > 0.0 else 0.0
+        aligned = off > (ALIKE if name[1:] in _STEADY else AS_IN_FILE)
+        aligned = aligned and not name.endswith("hipjoint")  # which does not turn
+        turned[joint] = before @ shortest_turn(expected, vector) if aligned else before
+        if not own and name[1:] in _HINGES:
+            turned[joint] = turned[joint] @ _twist(rig, name, bone, turned[joint].T @ frame.T @ rest_turns[bone.node])
+        direction = expected if aligned or not length else vector
+        direction = direction / np.linalg.norm(direction)
+        carrier = turns[bone.node] @ (rest_turns[bone.node].T @ frame @ turned[joint])
+        if bone.at is not None and length > 0.0:
+            reach = bone.at - at[above]
+            distances = np.linalg.norm(reach, axis=1)
+            length = length if np.abs(distances - length).max() < 1e-7 * scale else float(distances.mean())
+            pointing = carrier @ direction
+            off_by = np.linalg.norm(reach - pointing * distances[:, None], axis=1)
+            aim = np.flatnonzero(off_by > 1e-7 * scale)
+            carrier[aim] = shortest_turn(pointing[aim], reach[aim]) @ carrier[aim]
+        skeleton_offsets[joint - 1] = direction * length if length else np.zeros(3)
+        world[joint] = carrier
+        at[joint] = at[above] + carrier @ skeleton_offsets[joint - 1]
+        start = angle_index(joint)
+        local = np.swapaxes(world[above], -1, -2) @ carrier
+        axes = average.axes[joint - 1]
+        poses[:, start : start + 3] = joint_angles_from_rotation(axes.T @ local @ axes)
+    skeleton = _skeleton(skeleton_offsets, poses, average)
+    ends = [(bone, joint) for joint, bone in enumerate(bones, 1) if bone.at is not None and joint not in ENDS]
+    missed = max((float(np.linalg.norm(bone.at - at[joint], axis=1).max()) for bone, joint in ends), default=0.0)  # type: ignore[operator]
+    filled = [BONES[k] for k, bone in enumerate(bones) if bone.at is None]
+    return Retargeted(skeleton, unwrapped(np.where(skeleton.free, poses, 0.0)), places[hips], filled, missed)
+
+
+def _twist(rig: Rig, name: str, bone: _Bone, frame: Array) -> Array:
+    """Return by which turn (3, 3) about a thigh or an upper arm its knee or elbow bends the way that people's do.
+
+    `frame` (3, 3) takes what is counted in the bone's node to posefit's rest.
+    """
+    side = "left" if name[0] == "l" else "right"
+    start, end, way = _HINGES[name[1:]]
+    turns, places = rig.moving
+    below = places[rig.joints.limbs[side, end]] - places[rig.joints.limbs[side, start]]
+    along = average_skeleton().offsets[BONES.index(name)]
+    along = along / np.linalg.norm(along)
+    local = np.einsum("tji,tj->ti", turns[bone.node], below) @ frame.T
+    across = local - (local @ along)[:, None] * along
+    bent = np.linalg.norm(across, axis=1) > BENT * np.linalg.norm(below, axis=1)
+    mean = across[bent].sum(axis=0)
+    if not np.linalg.norm(mean) > 0.0:
+        return np.eye(3)
+    wanted = np.array(way) - (along @ way) * along
+    angle = np.arctan2(np.cross(mean, wanted) @ along, mean @ wanted)  # about the bone, from where it bends
+    axes = along_y(along)
+    return np.asarray(axes @ rotation_about(1, -angle) @ axes.T)
+
+
+def _skeleton(offsets: Array, poses: Array, average: Skeleton) -> Skeleton:
+    """Return the skeleton whose joints have the freedom of CMU's; those that turn further have all."""
+    used = {BONES[joint - 1] for joint in INNER if _beyond(joint, poses, average)}
+    if not used:
+        return Skeleton("", offsets, average.axes, average.channels, average.limits)
+    free = dict(average.channels) | dict.fromkeys(used, ("rx", "ry", "rz"))
+    return Skeleton("", offsets, average.axes, tuple((name, free[name]) for name in BONES if name in free))
+
+
+def _beyond(joint: int, poses: Array, average: Skeleton) -> bool:
+    """Return whether a joint turns about an axis about which CMU's does not."""
+    angles = slice(angle_index(joint), angle_index(joint) + 3)
+    return bool((np.abs(poses[:, angles][:, ~average.free[angles]]) > UNUSED).any())
+
+
+def _length(rig: Rig, side: str) -> float:
+    """Return how long a leg is."""
+    places = rig.moving[1]
+    thigh, shin, foot = (places[rig.joints.limbs[side, joint]] for joint in ("thigh", "shin", "foot"))
+    return float((np.linalg.norm(shin - thigh, axis=1) + np.linalg.norm(foot - shin, axis=1)).mean())
+
+
+def _bones(rig: Rig, scale: float) -> list[_Bone]:
+    """Return for each of posefit's bones (26) the node that carries its end."""
+    joints, limbs, places = rig.joints, rig.joints.limbs, _Places(rig)
+    average = dict(zip(BONES, scale * average_skeleton().lengths, strict=True))
+    bones: dict[str, _Bone] = {}
+    if joints.neck:
+        chest = places.of(joints.neck[0])
+    else:  # the middle between the shoulders
+        starts = ("clavicle" if (side, "clavicle") in limbs else "arm" for side in ("left", "right"))
+        shoulders = [places.of(limbs[side, start]) for side, start in zip(("left", "right"), starts, strict=True)]
+        chest = places.between(joints.chest, shoulders[0], shoulders[1], 0.5)
+    bones.update(_spine(rig, chest))
+    necks = [places.of(node) for node in (*joints.neck[1:], joints.head) if node is not None]
+    last = (joints.chest, *joints.neck)[-1] if joints.head is None else joints.head
+    tip = places.tip(last, 0.3 * (average["upperneck"] + average["head"])) if joints.neck or necks else None
+    crown = _Bone(last) if tip is None else places.carried(last, tip)
+    bones["head"] = crown
+    if len(necks) > 1:
+        bones |= {"lowerneck": necks[0], "upperneck": necks[-1]}
+    elif necks:  # the skull is two of posefit's bones, and turns as the head does
+        half = _Bone(last) if tip is None else places.between(last, necks[0], crown, 0.5)
+        bones |= {"lowerneck": necks[0], "upperneck": half}
+    else:
+        ends = [_Bone(last) if tip is None else places.between(last, chest, crown, share) for share in (1 / 3, 2 / 3)]
+        bones |= {"lowerneck": ends[0], "upperneck": ends[1]}
+    for side in ("left", "right"):
+        letter = side[0]
+        foot, hand = limbs[side, "foot"], limbs[side, "hand"]
+        bones |= {f"{letter}{bone}": places.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
+        foot_length, toe_length = average["lfoot"], average["ltoes"]
+        toe = limbs.get((side, "toe"))
+        if toe is not None:
+            tip = places.tip(toe, 0.2 * toe_length)
+            bones[f"{letter}foot"] = places.of(toe)
+            bones[f"{letter}toes"] = _Bone(toe) if tip is None else places.carried(toe, tip)
+        else:
+            tip = places.tip(foot, 0.5 * foot_length)
+            share = foot_length / (foot_length + toe_length)
+            bones[f"{letter}foot"] = _Bone(foot) if tip is None else places.carried(foot, share * tip)
+            bones[f"{letter}toes"] = _Bone(foot) if tip is None else places.carried(foot, tip)
+        palm = limbs.get((side, "palm"))
+        if palm is not None and hand == rig.parents[palm]:
+            tip = places.tip(palm, 0.0)
+            bones[f"{letter}wrist"] = places.of(palm)
+            bones[f"{letter}hand"] = _Bone(palm) if tip is None else places.carried(palm, tip)
+        else:
+            tip = places.tip(hand, 0.3 * average["lwrist"])
+            share = average["lwrist"] / (average["lwrist"] + average["lhand"])
+            bones[f"{letter}wrist"] = _Bone(hand) if tip is None else places.carried(hand, share * tip)
+            bones[f"{letter}hand"] = _Bone(hand) if tip is None else places.carried(hand, tip)
+    return [bones[name] for name in BONES]
+
+
+def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
+    """Return the three bones of the spine, whatever joints it has; of more of them, those of the steadiest lengths."""
+    joints, places, turns = rig.joints, _Places(rig), rig.moving[1]
+    root = _Bone(joints.hips, turns[joints.hips], rig.rest[1][joints.hips])
+    near = SAME_PLACE * _length(rig, "left")
+    chain = [places.of(node) for node in joints.spine]
+    if chain and root.rest is not None and np.linalg.norm(chain[0].rest - root.rest) <= near:  # type: ignore[operator]
+        chain = chain[1:]
+    if not chain:
+        chain = [places.between(chest.node, root, chest, share) for share in (1 / 3, 2 / 3)]
+    elif len(chain) == 1:
+        chain.append(places.between(chest.node, chain[0], chest, 0.5))
+    elif len(chain) > 2:
+
+        def unsteadiness(pair: Iterable[_Bone]) -> tuple[float, float]:
+            ends = np.array([root.at, *(bone.at for bone in pair), chest.at])
+            lengths = np.linalg.norm(np.diff(ends, axis=0), axis=2)
+            mean = lengths.mean(axis=1)
+            return round(float(lengths.std(axis=1).sum() / max(mean.sum(), 1e-300)), 6), float(mean.std())
+
+        chain = list(min(combinations(chain, 2), key=unsteadiness))
+    return dict(zip(("lowerback", "upperback", "thorax"), [*chain, chest], strict=True))
+
+
+def _rest_end(rig: Rig, bone: _Bone, turns: Array, places: Array) -> Array | None:
+    """Return where a bone ends in a pose of rest with these turns and places of nodes."""
+    if bone.rest is None:
+        return None
+    carried = rig.rest[0][bone.node].T @ (bone.rest - rig.rest[1][bone.node])
+    return np.asarray(places[bone.node] + turns[bone.node] @ carried)
+
+
+def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> tuple[bool, Array, Array, Array]:
+    """Return the pose that stands for CMU's rest, turns and places of all nodes, and the axes (3, 3) of the root in it.
+
+    The columns of these are left, up and ahead in the root's node. First comes whether it is the rig's own rest.
+    """
+    chest, hips = bones[BONES.index("thorax")], rig.joints.hips
+    thighs = [rig.joints.limbs[side, "thigh"] for side in ("left", "right")]
+    poses = [rig.rest]
+    count = rig.moving[0].shape[1]
+    step = max(1, count // POSES)
+    poses += [(rig.moving[0][:, k], rig.moving[1][:, k]) for k in range(0, count, step)]
+    average = average_skeleton()
+    legs, arms = (
+        [(side, *part) for side in ("left", "right") for part in parts]
+        for parts in (
+            (("thigh", "shin", "femur"), ("shin", "foot", "tibia")),
+            (("arm", "forearm", "humerus"), ("forearm", "hand", "radius")),
+        )
+    )
+
+    def frame_of(turns: Array, places: Array) -> Array:
+        end = _rest_end(rig, chest, turns, places)
+        local = turns[hips].T
+        above = (places[hips] if end is None else end) - places[thighs].mean(axis=0)
+        return _squared(local @ (places[thighs[0]] - places[thighs[1]]), local @ above)
+
+    def angles(turns: Array, places: Array, root: Array, parts: Sequence[tuple[str, str, str, str]]) -> Array:
+        frame = turns[hips] @ root
+        off = []
+        for side, start, stop, kind in parts:
+            first, last = (places[rig.joints.limbs[side, joint]] for joint in (start, stop))
+            expected = average.offsets[BONES.index(f"{side[0]}{kind}")]
+            off.append(geodesic(np.eye(3), shortest_turn(expected, frame.T @ (last - first))))
+        return np.degrees(np.array(off))
+
+    best, best_off = 0, np.inf
+    root = frame_of(*rig.rest)
+    legs_off = angles(*rig.rest, root, legs)
+    if legs_off.max() <= UPRIGHT:
+        return True, *rig.rest, root
+    for k, pose in enumerate(poses):
+        frame = frame_of(*pose)
+        off = float((angles(*pose, frame, legs) ** 2).sum() + (0.5 * angles(*pose, frame, arms) ** 2).sum())
+        if off < best_off:
+            best, best_off = k, off
+    return best == 0, *poses[best], frame_of(*poses[best])
+
+
+def _squared(left: Array, above: Array) -> Array:
+    """Return axes (3, 3), left, up and ahead, by directions (3,): axes of the coordinates where these are near."""
+    if not np.linalg.norm(left) > 0.0:
+        left = np.array([1.0, 0.0, 0.0])
+    x = left / np.linalg.norm(left)
+    y = above - (above @ x) * x
+    if not np.linalg.norm(y) > 1e-6 * np.linalg.norm(left):
+        y = np.cross(np.eye(3)[int(np.abs(x).argmin())], x)
+    y = y / np.linalg.norm(y)
+    axes = np.column_stack([x, y, np.cross(x, y)])
+    near = np.zeros((3, 3))
+    near[np.abs(axes).argmax(axis=0), range(3)] = np.sign(axes[np.abs(axes).argmax(axis=0), range(3)])
+    square = abs(np.linalg.det(near) - 1.0) < 1e-9
+    return near if square and np.degrees(geodesic(axes, near)) <= SQUARE else axes
+
+
+def upward(rig: Rig) -> tuple[int, float]:
+    """Return which axis of the world, 0 to 2, legs and trunk mostly point up along, and how: -1 is straight down."""
+    places, limbs = rig.moving[1], rig.joints.limbs
+    thighs, shins, feet, arms = (
+        np.mean([places[limbs[side, joint]] for side in ("left", "right")], axis=0)
+        for joint in ("thigh", "shin", "foot", "arm")
+    )
+    along = []
+    for low, high in ((shins, thighs), (feet, shins), (thighs, arms)):
+        vectors = high - low
+        along.append((vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)).mean(axis=0))
+    directions = np.array(along)
+    axis = int(np.abs(directions.mean(axis=0)).argmax())
+    sign = np.sign(directions.mean(axis=0)[axis])
+    return axis, float(sign * (sign * directions[:, axis]).min())

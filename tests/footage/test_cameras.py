@@ -1,0 +1,110 @@
+"""Real cameras: the unit of their calibrations, which one of a file is meant, what is guessed where nothing is said."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posefit.footage.cameras import unit_of_heights
+from posefit.footage.segmentation import Extraction
+from posefit.footage.source import scene_of
+from posefit.geometry.units import METRES, UNIT_NAMES
+from posefit.progress import Progress
+from tests.cases import each
+from tests.commands import error_of
+from tests.footage.conftest import NOBODY, camera, film, truth, walk
+from tests.footage.test_footage import toml
+
+AZIMUTHS = (np.pi / 2, 0.6)
+
+
+def calibration(path: Path, metres: float, azimuths: Any = AZIMUTHS) -> Path:
+    """Write calibrations in a unit of so many metres."""
+    placed = [camera(azimuth) for azimuth in azimuths]
+    text = toml(path, *placed).read_text()
+    for one in placed:
+        text = text.replace(str(one.translation.tolist()), str((one.translation / metres).tolist()))
+    path.write_text(text)
+    return path
+
+
+def views(tmp_path: Path) -> list[Path]:
+    for name, azimuth in zip("ab", AZIMUTHS, strict=True):
+        np.savez(tmp_path / f"{name}.npz", masks=np.stack(truth(azimuth)[8:14]).astype(np.uint8), fps=25.0)
+    return [tmp_path / "a.npz", tmp_path / "b.npz"]
+
+
+@each("unit", ["m", "cm", "mm", "inch"])
+def test_the_unit_of_calibrations_is_recognised_by_the_persons_height(tmp_path: Path, unit: Any) -> None:
+    path = calibration(tmp_path / "two.toml", METRES[unit])
+    for stated in (None, unit):
+        scene = scene_of(views(tmp_path), camera=[path], up="y", unit=stated, height=1.74)
+        assert np.linalg.norm(scene.anchor - walk().translations[8]) < 0.3
+        np.testing.assert_allclose([one.position for one in scene.cameras], [camera(a).position for a in AZIMUTHS], atol=1e-6)  # fmt: skip
+        assert list(scene.guesses) == ([] if stated else [f"the calibration is in {UNIT_NAMES[unit]}"])
+    with pytest.raises(ValueError, match="got .*: the masks show .* or the calibrations are in another order or unit"):
+        scene_of(views(tmp_path), camera=[path], up="y", unit="foot", height=1.74)
+
+
+@each(("unit", "guess"), [("m", "m"), ("mm", "mm"), ("cm", "cm")])
+def test_the_unit_of_one_camera_is_recognised_by_its_distance(tmp_path: Path, unit: Any, guess: Any) -> None:
+    path = calibration(tmp_path / "one.toml", METRES[unit], AZIMUTHS[:1])
+    scene = scene_of(views(tmp_path)[:1], camera=[path], up="y", height=1.74)
+    assert list(scene.guesses) == [f"the calibration is in {UNIT_NAMES[guess]}"]
+    assert np.linalg.norm(scene.anchor - walk().translations[8]) < 1.0
+    drawn = scene_of(["walk"], camera=[path], up="y", frames=(0, 2))
+    assert drawn.observations[0].silhouettes[0].mask.any()
+    assert drawn.guesses == scene.guesses
+
+
+def test_a_height_half_or_twice_the_usual_is_no_other_unit() -> None:
+    assert [unit_of_heights(ratio) for ratio in (0.5, 1.0, 1.9)] == ["m"] * 3
+    assert [unit_of_heights(ratio) for ratio in (1.9e3, 150.0, 45.0)] == ["mm", "cm", "inch"]
+
+
+def test_one_of_several_cameras_is_chosen_by_name(tmp_path: Path) -> None:
+    path, source = calibration(tmp_path / "two.toml", 1.0), views(tmp_path)[0]
+    scene = scene_of([source], camera=[f"{path}:cam0"], up="y")
+    np.testing.assert_allclose(scene.cameras[0].position, camera(AZIMUTHS[0]).position, atol=1e-6)
+    error = error_of("track", source, "--camera", path, "--out", tmp_path / "out")
+    assert "camera must be given for each view, 1, got 2: cam0, cam1; FILE:NAME is one of a file" in error
+    assert "unit must be given for calibrations and files of motions only, got 'mm' for masks" in error_of(
+        "track", source, "--unit", "mm"
+    )
+
+
+def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
+    (source, _), bare = views(tmp_path), tmp_path / "bare.yml"
+    assert list(scene_of([source]).guesses) == [
+        "a level camera, 40 degrees across: distances and sizes are as good as that",
+        "a person of 1.74 m",
+    ]
+    bare.write_text("K: [[200, 0, 79.5], [0, 200, 59.5], [0, 0, 1]]\n")
+    scene = scene_of([source], camera=[bare], height=1.7)
+    assert list(scene.guesses) == [
+        "the camera stands level, which its calibration does not state",
+        "the calibration is for pictures of this size, which it does not state",
+    ]
+    bare.write_text("K: [[200, 0, 79.5], [0, 200, 259.5], [0, 0, 1]]\n")
+    with pytest.raises(ValueError, match="camera 'bare' must have its centre in 160x120, got 79.5x259.5"):
+        scene_of([source], camera=[bare])
+
+
+def test_videos_that_contradict_each_other_are_refused_by_their_first_seconds(tmp_path: Path) -> None:
+    films = []
+    for name, azimuth in zip("ab", AZIMUTHS, strict=True):
+        masks = truth(azimuth)
+        films.append(film(tmp_path / f"{name}.avi", [NOBODY] * 6 + [*masks[6:], *masks[::-1], *masks]))
+    steps: list[int] = []
+
+    def counted(frames: Any, count: int) -> Any:
+        steps.append(count)
+        return frames
+
+    how, right = Extraction("mean", background="0:6"), calibration(tmp_path / "two.toml", 1.0)
+    with pytest.raises(ValueError, match="got .*: the masks show only parts of the person, or another one, or the cal"):
+        scene_of(films, Progress(steps=counted), camera=[right], up="y", unit="foot", extraction=how)
+    assert steps == []  # those of the first two seconds have no bar
+    assert scene_of(films, Progress(steps=counted), camera=[right], up="y", extraction=how).count == 144
+    assert steps == [144 - 50] * 2

@@ -1,0 +1,198 @@
+"""Masks by what their files and values are: pages, gaps in numbers, other pictures beside them, fractions and logits."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from posefit.footage.cleaning import cleaned
+from posefit.footage.readers import numbered, read_masks
+from posefit.footage.source import kind_of, scene_of
+from posefit.progress import Progress
+from tests.cases import each
+from tests.footage.conftest import truth
+
+ALL = (None, None)
+
+
+@pytest.fixture(scope="module")
+def walk() -> list[Any]:
+    """Six masks of a person who walks."""
+    return truth()[10:16]
+
+
+def drawn(walk: list[Any], value: int = 255) -> list[Any]:
+    return [Image.fromarray(np.where(mask, value, 0).astype(np.uint8)) for mask in walk]
+
+
+def read_by_pillow(path: Path) -> Any:
+    with Image.open(path) as image:
+        return np.asarray(image.convert("L")) > 127
+
+
+def check(source: Any, walk: list[Any]) -> list[str]:
+    masks = read_masks(source, ALL)
+    assert len(masks) == len(walk)
+    for k, mask in enumerate(walk):
+        np.testing.assert_array_equal(masks.silhouette(k).mask, mask, err_msg=str(k))
+    return list(masks.guesses)
+
+
+@each("name", ["a.tif", "a.gif", "a.webp"])
+def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) -> None:
+    first, *others = drawn(walk)
+    options = {"lossless": True} if name == "a.webp" else {}
+    first.save(tmp_path / name, save_all=True, append_images=others, **options)
+    with Image.open(tmp_path / name) as image:
+        assert image.n_frames == len(walk)
+    check((tmp_path / name,), walk)
+    check(tmp_path, walk)
+    masks = read_masks((tmp_path / name,), (2, 4))
+    assert [Path(path).name for path in masks.names] == [f"{name}, page 2", f"{name}, page 3"]
+    np.testing.assert_array_equal(masks.silhouette(1).mask, walk[3])
+
+
+@each("suffix", [".gif", ".webp", ".tif"])
+def test_a_folder_of_images_of_any_kind_is_read_as_pillow_reads_it(
+    walk: list[Any], tmp_path: Path, suffix: str
+) -> None:
+    for k, image in enumerate(drawn(walk)):
+        image.save(tmp_path / f"{k:03}{suffix}")
+    wanted = [read_by_pillow(tmp_path / f"{k:03}{suffix}") for k in range(len(walk))]
+    check(tmp_path, wanted)
+    assert kind_of(tmp_path) == "masks"
+
+
+def test_an_animated_png_is_refused(walk: list[Any], tmp_path: Path) -> None:
+    first, *others = drawn(walk)
+    first.save(tmp_path / "a.png", save_all=True, append_images=others)
+    with pytest.raises(ValueError, match="a.png: expected one picture, got an animation"):
+        read_masks(tmp_path, ALL)
+
+
+def test_numbers_that_are_missing_are_frames_in_which_nothing_is_known(walk: list[Any], tmp_path: Path) -> None:
+    for number, image in zip((7, 8, 10, 11, 14, 15), drawn(walk), strict=True):
+        image.save(tmp_path / f"mask_{number}.png")
+    masks = read_masks(tmp_path, ALL)
+    assert masks.usable.tolist() == [True, True, False, True, True, False, False, True, True]
+    assert [bool(masks.silhouette(k).valid.any()) for k in range(9)] == masks.usable.tolist()
+    np.testing.assert_array_equal(masks.silhouette(7).mask, walk[4])
+    assert masks.guesses == [f"{tmp_path}: 3 of the frames 7 to 15 are missing, and are held"]
+    assert len(read_masks(tmp_path, (3, 7))) == 4
+    clean, warnings = cleaned(masks, tmp_path)
+    assert (clean.usable.tolist(), warnings) == (masks.usable.tolist(), [])
+    messages: list[str] = []
+    scene = scene_of([tmp_path], Progress(messages.append))
+    assert (scene.count, scene.observations[2].usable) == (9, False)
+    assert f"guessed: {'; '.join(scene.guesses)}" in messages
+    assert list(scene.guesses[:2]) == [*masks.guesses, "30 frames a second"]
+
+
+@each(
+    ("names", "count", "guess"),
+    [
+        (["f0.png", "f5.png", "f10.png"], 3, "every 5th number is a frame"),
+        (["f0.png", "f5.png", "f15.png"], 4, "1 of the frames 0 to 15 are missing, and are held"),
+        (["f3.png", "f1.png", "f2.png"], 3, "the frames come as listed, not as numbered"),
+        (["f1.png", "f900001.png", "f900002.png"], 3, "the numbers from 1 to 900002 do not count frames"),
+        (["a-1-1.png", "a-1-2.png", "a-2-1.png"], 3, "the frames come as listed, not as numbered"),
+        (["a.png", "b.png"], 2, None),
+        (["1.png", "2.png", "3.png"], 3, None),
+        (["only9.png"], 1, None),
+    ],
+)
+def test_what_numbers_in_names_mean_is_reported(names: list[str], count: int, guess: str | None) -> None:
+    frames, guesses = numbered([Path(name) for name in names], "masks")
+    assert len(frames) == count
+    assert sum(frame is not None for frame in frames) == len(names)
+    assert bool(guesses) == (guess is not None)
+    assert guess is None or guess in guesses[-1] or guess in guesses[0]
+
+
+@each(
+    ("names", "message"),
+    [
+        (["0.png", "0_rgb.jpg", "1.png", "1_rgb.jpg"], "expected images of one kind, got 2 .png and 2 .jpg"),
+        (["m7.png", "m8.png", "m8.jpg"], "expected images of one kind, got 2 .png and 1 .jpg"),
+        (["0.png", "0_grey.png", "1.png", "1_grey.png"], "expected one image a frame, got 0.png and 0_grey.png"),
+        (["img_3.png", "img_4.png", "mask_3.png"], "expected one image a frame, got img_3.png and mask_3.png"),
+    ],
+)
+def test_other_pictures_beside_masks_are_refused(
+    walk: list[Any], tmp_path: Path, names: list[str], message: str
+) -> None:
+    for name in names:
+        drawn(walk)[0].save(tmp_path / name)
+    with pytest.raises(ValueError, match=message):
+        read_masks(tmp_path, ALL)
+
+
+def test_a_photo_among_jpegs_is_refused_by_name(walk: list[Any], tmp_path: Path) -> None:
+    for k, image in enumerate(drawn(walk)):
+        image.convert("RGB").save(tmp_path / f"{k}.jpg")
+    check(tmp_path, [read_by_pillow(tmp_path / f"{k}.jpg") for k in range(len(walk))])
+    colours = np.random.default_rng(0).integers(0, 255, (*walk[0].shape, 3), dtype=np.uint8)
+    Image.fromarray(colours).save(tmp_path / "3.jpg")
+    with pytest.raises(ValueError, match="3.jpg: expected masks, got pictures in many colours"):
+        read_masks(tmp_path, ALL)
+
+
+@each("values", [(0.0, 0.3), (0.0, 2.0), (-3.0, 3.0), (0.0, 1.0), (-1.0, 0.0)])
+def test_two_fractions_are_a_mask_whichever_they_are(
+    walk: list[Any], tmp_path: Path, values: tuple[float, float]
+) -> None:
+    np.save(tmp_path / "a.npy", np.where(np.stack(walk), values[1], values[0]).astype(np.float32))
+    guesses = check(tmp_path / "a.npy", walk)
+    usual = values == (0.0, 1.0)
+    assert guesses == ([] if usual else [f"{tmp_path / 'a.npy'}: masks of values from {min(values):g} to {max(values):g}: the person is the higher of two"])  # fmt: skip
+
+
+def degrees_of(soft: Any, scale: float) -> Any:
+    """Return degrees a little below 0, as bicubic scaling makes them."""
+    return soft * scale - 0.02 * scale
+
+
+def test_labels_may_be_whole_numbers_held_as_fractions(walk: list[Any], tmp_path: Path) -> None:
+    labels = np.stack(walk).astype(np.float32)
+    labels[:, :30, :30] = 2.0
+    np.save(tmp_path / "a.npy", labels)
+    with pytest.raises(ValueError, match="got the labels 1, 2; --label N chooses one"):
+        read_masks(tmp_path / "a.npy", ALL)
+    np.testing.assert_array_equal(read_masks(tmp_path / "a.npy", ALL, 1).silhouette(0).mask, walk[0])
+
+
+def test_logits_are_cut_at_zero_and_degrees_half_way(walk: list[Any], tmp_path: Path) -> None:
+    soft = np.stack([cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.5) for mask in walk])
+    logits = 30.0 * soft - 20.0  # as SAM gives them
+    np.save(tmp_path / "a.npy", logits)
+    (guess,) = check(tmp_path / "a.npy", list(logits > 0.0))
+    assert guess.endswith("masks of values from -20 to 10 are logits: the person is above 0")
+    for scale, threshold in ((1.0, 0.5), (1.1, 0.5), (255.0, 127.0), (10.0, 0.5 * float(degrees_of(soft, 10.0).max()))):
+        degrees = degrees_of(soft, scale)
+        np.save(tmp_path / "a.npy", degrees)
+        (guess,) = check(tmp_path / "a.npy", list(degrees > threshold))
+        assert guess.endswith(f"are degrees: the person is above {threshold:g}")
+
+
+def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", np.stack(walk))
+    np.savez(tmp_path / "b.npz", silhouettes=np.stack(walk))
+    for name in ("a.npz", "b.npz"):
+        check(tmp_path / name, walk)
+    np.savez(tmp_path / "c.npz", np.stack(walk), np.stack(walk))
+    with pytest.raises(ValueError, match="c.npz: expected an .npz file with the key masks, got none"):
+        read_masks(tmp_path / "c.npz", ALL)
+
+
+def test_a_person_who_touches_the_border_in_all_masks_is_followed(walk: list[Any], tmp_path: Path) -> None:
+    for k, mask in enumerate(walk):  # cut to the person, as silhouettes of gait are
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        Image.fromarray(255 * cv2.resize(cut.astype(np.uint8), (88, 128), interpolation=cv2.INTER_NEAREST)).save(
+            tmp_path / f"{k:03}.gif"
+        )
+    scene = scene_of([tmp_path])
+    assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(walk)
