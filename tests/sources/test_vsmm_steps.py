@@ -203,6 +203,9 @@ def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM
     # the feet's line falls by a fifth from left to right in the picture, and so does the parallel through (50, 150)
     np.testing.assert_allclose(knees["left knee"], [20.0, 156.0], atol=1.1)
     np.testing.assert_allclose(knees["right knee"], [80.0, 144.0], atol=1.1)
+    together = np.array([[50.0, y] for y in range(100, 201)])  # both legs are one line, with one crossing
+    wide = np.full(len(POINTS), 90.0)
+    assert _knees(Lines(together, together, together, legs[:0]), expected, np.ones(len(POINTS)), expected, wide) == {}
 
 
 def test_an_elbow_is_as_far_from_the_hand_as_from_the_shoulder() -> None:  # VSMM 2.6
