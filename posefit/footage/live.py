@@ -3,11 +3,11 @@
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
@@ -150,26 +150,6 @@ def _captured(capture: Any) -> Iterator[Image]:
         yield image
 
 
-@dataclass(frozen=True, eq=False)
-class _FirstFrames:
-    """The first frames of a stream, as a video from which a segmenter learns."""
-
-    path: Path
-    fps: float
-    images: Sequence[Image] = field(repr=False)
-    claimed: int = 0
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self.images[0].shape[1], self.images[0].shape[0]
-
-    def count(self) -> int:
-        return len(self.images)
-
-    def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
-        return (scaled(image, size) for image in self.images[start:stop:step])
-
-
 def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None]) -> Iterator[LiveMask]:
     """Yield the person in the frames of a stream: grey frames are masks; others are segmented.
 
@@ -189,8 +169,7 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    video = cast(Video, _FirstFrames(Path(stream.name), stream.fps, learned))
-    segmentation = Segmentation(video, how, (None, None))
+    segmentation = Segmentation(Video.of_images(learned, Path(stream.name), stream.fps), how, (None, None))
     segmenter = segmentation.learned()
     quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))
     for live in images:
