@@ -49,7 +49,6 @@ from posefit.suites.problem import suite as suite
 from posefit.suites.running import run_of as run_of
 from posefit.suites.running import suite_scores as suite_scores
 from posefit.sweep.ledger import Ledger as Ledger
-from posefit.tracking.evaluation import unseen as unseen
 from posefit.tracking.front import fit as fit
 from posefit.tracking.front import track as track
 from posefit.tracking.live import track_live as track_live

@@ -168,13 +168,15 @@ class Unfinished:
         self.close()
 
     def finish(self, names: Iterable[str], replace: bool) -> None:
-        """Give the folder its target's name; with `replace` it may be an earlier one's, with entries of these names.
+        """Give the folder its target's name; with `replace` it may be an earlier one's, with files of these names.
 
         Raises OSError where that one holds anything else, or a folder of that name has appeared meanwhile.
         """
         names = [*names, MARK]
         aside = None
         if replace and os.path.lexists(self._target):
+            if self._target.is_symlink():
+                raise OSError(errno.ENOTDIR, "a link")
             if others := other_entries(self._target, names):
                 raise OSError(errno.ENOTEMPTY, f"a folder with {cut(others[0])}")
             aside = _beside(self._target)
@@ -192,22 +194,19 @@ class Unfinished:
 
 
 def other_entries(folder: Path, names: Iterable[str]) -> list[str]:
-    """Return the entries of a folder that have none of these names, sorted."""
+    """Return the entries of a folder that are no plain files of these names, sorted."""
     known = {*names, MARK}
-    return sorted(entry.name for entry in folder.iterdir() if entry.name not in known)
+    return sorted(
+        entry.name for entry in folder.iterdir() if entry.name not in known or entry.is_symlink() or not entry.is_file()
+    )
 
 
 def emptied(folder: Path, names: Iterable[str]) -> None:
-    """Remove the entries of these names from a folder, and the folder once it is empty; a link is only unlinked."""
+    """Remove the plain files of these names from a folder, and the folder once it is empty."""
     with suppress(OSError):
-        if folder.is_symlink():
-            folder.unlink()
-            return
         for path in (folder / name for name in names):
-            if path.is_dir() and not path.is_symlink():
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink(missing_ok=True)
+            if path.is_file() and not path.is_symlink():
+                path.unlink()
         folder.rmdir()
 
 

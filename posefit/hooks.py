@@ -40,15 +40,26 @@ class RegisterOptimiser(Protocol):
         """Register an optimiser."""
 
 
+class RegisterTracker(Protocol):
+    """Registers a tracker: its name, its factory, whether it looks ahead, and what it needs.
+
+    One that looks ahead takes several observations before it yields the frame of the first.
+    """
+
+    def __call__(
+        self, name: str, factory: "TrackerFactory", *, looks_ahead: bool = False, needs: Needs | None = None
+    ) -> None:
+        """Register a tracker."""
+
+
 class Register(Protocol[Factory]):
     """Registers anything else that has a factory: its name, its factory and what it needs."""
 
     def __call__(self, name: str, factory: Factory, *, needs: Needs | None = None) -> None:
-        """Register a prior, a tracker or a segmenter."""
+        """Register a prior or a segmenter."""
 
 
 RegisterPrior: TypeAlias = Register["PriorFactory"]
-RegisterTracker: TypeAlias = Register["TrackerFactory"]
 RegisterSegmenter: TypeAlias = Register["SegmenterFactory"]
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
 

@@ -7,7 +7,7 @@ from posefit.fitting.box import Start as Start
 from posefit.fitting.box import converted as converted
 from posefit.fitting.box import displacement as displacement
 from posefit.fitting.box import draw_population as draw_population
-from posefit.fitting.box import extent as extent
+from posefit.fitting.box import first_that_works as first_that_works
 from posefit.fitting.box import fold as fold
 from posefit.fitting.box import repair as repair
 from posefit.fitting.box import sample_normal as sample_normal
@@ -21,12 +21,15 @@ from posefit.fitting.check import whole as whole
 from posefit.fitting.optimiser import Adapter as Adapter
 from posefit.fitting.optimiser import Filter as Filter
 from posefit.fitting.optimiser import Optimiser as Optimiser
+from posefit.fitting.optimiser import check_tell as check_tell
 from posefit.fitting.optimiser import finite_costs as finite_costs
 from posefit.fitting.prior import Prior as Prior
 from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Observation as Observation
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
+from posefit.fitting.weights import effective_sample_size as effective_sample_size
+from posefit.fitting.weights import weigh as weigh
 from posefit.hooks import RegisterCommand as RegisterCommand
 from posefit.hooks import RegisterOptimiser as RegisterOptimiser
 from posefit.hooks import RegisterPrior as RegisterPrior

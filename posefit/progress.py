@@ -38,10 +38,14 @@ class Progress:
 QUIET = Progress()
 
 
+def bars_shown() -> bool:
+    """Return whether anybody watches: stderr is a terminal, or this is a notebook."""
+    return (sys.stderr is not None and sys.stderr.isatty()) or "ipykernel" in sys.modules
+
+
 def interactive() -> Progress:
     """Return messages and bars on stderr where that is a terminal, bars in a notebook; elsewhere warnings alone."""
-    terminal = sys.stderr is not None and sys.stderr.isatty()
-    if not terminal and "ipykernel" not in sys.modules:
+    if not bars_shown():
 
         def show_warning(message: str) -> None:
             if message.startswith(WARNING) and sys.stderr is not None:

@@ -14,6 +14,12 @@ from typing import Any
 
 from posefit.errors import InputError, printable
 
+# names that other libraries have for what is known here
+OTHER_WORDS = {
+    "optimizer": ("optimiser", "method"),
+    "optimizers": ("optimisers", "methods"),
+    "optimisers": ("methods",),
+}
 SHOWN = 80  # characters of a name or value in a message
 DOTS = 1_000  # in a line of TOML, those of decimal numbers aside
 # The sum of their squares over all lines: reading a key of n parts takes memory as n squared. A plan that names 300
@@ -46,7 +52,9 @@ def counted(count: int, word: str) -> str:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return the end of a message about a wrong name, which asks for the nearest known one; "" where none is near."""
-    near = get_close_matches(name[:SHOWN], list(known), 1)
+    names = list(known)
+    others = [other for other in OTHER_WORDS.get(name, ()) if other in names]
+    near = others or get_close_matches(name[:SHOWN], names, 1)
     return f"; did you mean {near[0]!r}?" if near else ""
 
 

@@ -54,6 +54,7 @@ class Offer:
     distribution: str
     version: str
     next_frame: "NextFrame" = "start"  # of an optimiser
+    looks_ahead: bool = False  # of a tracker
     needs: hooks.Needs | None = None
 
     @property
@@ -142,7 +143,7 @@ class Registry:
         family, colon, variant = name.partition(":")
         if family not in known:
             listed = ", ".join(sorted(known)) or "none"
-            raise InputError(f"{kind} must be one of {listed}, got {quoted(name)}{self._hint(family, known)}")
+            raise InputError(f"{kind} must be one of {listed}, got {quoted(name)}{self.hint(family, known)}")
         offer = known[family]
         if offer.needs is not None and offer.missing:
             needed, requirement = offer.needs
@@ -157,12 +158,17 @@ class Registry:
         factory.__doc__ = offer.factory.__doc__
         return replace(offer, name=name, factory=factory)
 
-    def _hint(self, name: str, known: Iterable[str]) -> str:
+    def hint(self, name: str, known: Iterable[str]) -> str:
         """Return the end of a message about a name that is not known: its kind, the nearest name, or where to ask."""
         kinds = [kind for kind, offers in self.offers.items() if name in offers]
         if kinds:
             return f"; its kind is {kinds[0]}"
-        return suggestion(name, known) or "; posefit plugins doctor says whether a plugin failed to load"
+        broken = [plugin.name for plugin in self.plugins if plugin.state == "broken"]
+        doctor = f"posefit plugins doctor says why {', '.join(broken)} failed to load" if broken else ""
+        near = suggestion(name, known)
+        if near and doctor:
+            return f"{near} {doctor}"
+        return near or f"; {doctor or 'posefit plugins doctor lists what is installed, and what failed to load'}"
 
 
 @lru_cache(maxsize=1)
@@ -192,9 +198,9 @@ def register(factories: Mapping[str, tuple[Callable[..., Any], str]]) -> None:
 def plugins_of(kinds: tuple[Registrable, ...], taken: tuple[str, ...] = ()) -> tuple[Plugin, ...]:
     """Return all installed plugins with what they offer of some kinds; see `load`.
 
-    One whose group only begins with posefit's name is among them, and broken.
+    One whose group only begins with posefit's name, however that is written, is among them, and broken.
     """
-    groups = [group for group in entry_points().groups if group.startswith(PROJECT)]
+    groups = [group for group in entry_points().groups if re.sub("[-_. ]", "", group.lower()).startswith(PROJECT)]
     return load([point for group in groups for point in entry_points(group=group)], kinds, taken=taken)
 
 

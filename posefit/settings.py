@@ -60,27 +60,33 @@ def without_settings(text: str) -> str:
     return _LIST.sub("", text).strip()
 
 
-def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Return nothing. Raises ValueError where a setting is unknown, listing the known, or its type is wrong."""
+def names(factory: Callable[..., Any]) -> list[str]:
+    """Return the names of a factory's settings."""
+    return [setting.name for setting in settings_of(factory)]
+
+
+def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings, numbers of NumPy as Python's own.
+
+    Raises ValueError where one is unknown, listing the known, or its type is wrong.
+    """
     known = {setting.name: setting for setting in settings_of(factory)}
+    values = {}
     for name, value in given.items():
-        setting = _known(plugin, name, known)
-        if not accepts(setting.annotation, value):
+        setting, plain = _known(plugin, name, known), _plain(value)
+        if not accepts(setting.annotation, plain):
             raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(value)}")
+        values[name] = plain
+    return values
 
 
-def planned(
-    factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int, population_size: int | None = None
-) -> dict[str, Any]:
+def planned(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> dict[str, Any]:
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
-    These are `evaluations` itself, `population_size` where one was chosen, and `iterations`, the populations after the
-    first. What is given stays as it is.
+    These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
     filled = dict(given)
-    if population_size is not None and "population_size" in known:
-        filled.setdefault("population_size", population_size)
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:
@@ -129,6 +135,20 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
     return parse(plugin, factory, given)
 
 
+def settings_text(settings: Mapping[str, Any]) -> list[str]:
+    """Return settings as `--set` takes them."""
+    return [f"{name}={setting_text(value)}" for name, value in settings.items()]
+
+
+def setting_text(value: Any) -> str:
+    """Return a setting's value as `--set` takes it."""
+    if isinstance(value, bool) or value is None:
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return ",".join(setting_text(one) for one in value)
+    return str(value)
+
+
 def accepts(annotation: Any, value: Any) -> bool:
     """Return whether a value fits an annotation; one that is not understood accepts everything."""
     origin = get_origin(annotation)
@@ -150,6 +170,13 @@ def accepts(annotation: Any, value: Any) -> bool:
     if annotation is int:
         return isinstance(value, int) and not isinstance(value, bool)
     return not (annotation in (bool, str) and not isinstance(value, annotation))
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of NumPy as Python's own, in a tuple too; anything else as it is."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return value.item() if type(value).__module__ == "numpy" and not getattr(value, "shape", (0,)) else value
 
 
 def _known(plugin: str, name: str, known: Mapping[str, Setting]) -> Setting:

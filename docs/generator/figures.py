@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable, Mapping
 
+from posefit.evaluation.errors import FRAME
+from posefit.evaluation.measures import BASELINES, MEASURES, Measure
 from posefit.measuring.centres import PLACES
-from posefit.tracking.measures import BASELINES, FRAME, MEASURES, Measure
 
 # How a value stands in a file whose table shows it times a factor.
 RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
@@ -17,31 +18,18 @@ REQUEST = {
     "seed": ("", "the seed that everything random follows from"),
     "frames": ("frames", "how many frames were followed"),
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
-    "hypotheses": (
-        "",
-        "of each of several [hypotheses](../howto/hypotheses.md): its `beginning`, silhouette `cost`, `motion` term, "
-        "and whether it was `kept`; empty where there was one",
-    ),
     "version": ("", "the version of posefit"),
     "train": ("", "names of the motions that the prior learned from"),
     "view_degrees": ("degrees", "the given directions of the cameras; null where unknown"),
     "translation": ("", "the root's position: known, searched or aligned"),
     "first_pose": ("", "the first pose: searched, or given"),
-    "kept_pass": ("", "the reported pass, the first being 1"),
-    "passes": ("", "how often all frames were followed: [so](../howto/smoothing.md)"),
     "smooth": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/smoothing.md)"),
     "views": ("", "number of cameras"),
     "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
-    "size": ("pixels", "width and height of the first camera's masks"),
+    "size_pixels": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
     "dimensions": ("", "coordinates of a proposal, the root's and the prior's; `null` of a tracker of its own"),
     "settings": ("", "what was set, or follows from the budget, of optimiser, prior and tracker"),
-    "body": (
-        "m",
-        "the build that was fitted: `stature` in metres, `factors` on the average and their `spread`; or null",
-    ),
-    "warnings": ("", "what to look at before the result is trusted"),
-    "history": ("", "of a single frame only: best cost after each population"),
 }
 
 # What a sweep's row says beside the figures.
@@ -59,6 +47,17 @@ ROW = {
 }
 SPENT = ("evaluations_used", "dimensions", "seconds", "warnings", "joint_errors_mm.JOINT")
 RESULT = {
+    "hypotheses": (
+        "",
+        "of each of several [hypotheses](../howto/hypotheses.md): its `beginning`, silhouette `cost`, `motion` term, "
+        "and whether it was `kept`; empty where there was one",
+    ),
+    "build": (
+        "m",
+        "the build that was fitted: `stature_m`, `factors` on the average and their `spread`; or null",
+    ),
+    "trace": ("", "of a single frame only: evaluations so far and best cost, after each population"),
+    "warnings": ("", "what to look at before the result is trusted"),
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
     "none_of_modes": (
         "",

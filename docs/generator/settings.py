@@ -7,8 +7,7 @@ from typing import Any
 from posefit.fitting.tracker import Prediction
 from posefit.hooks import PROJECT
 from posefit.registry import KINDS, Offer, registry
-from posefit.settings import settings_in, settings_of, without_settings
-from posefit.sweep.cell import setting_text
+from posefit.settings import setting_text, settings_in, settings_of, without_settings
 
 
 def page() -> str:

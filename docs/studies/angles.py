@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from clips import FOUR, GROUPS, PAIRS, SIDES, WALKS, Clip, Views, cell_fields, track_of
 from posefit import clinical_angles
 from posefit.arrays import Array
-from posefit.fitting import metrics
 from posefit.footage.video import Video
 from posefit.motion.motion import Motion
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_reproduce.jobs import each
 from table import WORKERS, Row, bar, markdown
 
@@ -48,7 +48,7 @@ def walk_row(cell: TrackCell, clip: Clip, views: Views) -> dict[str, Any]:
     assert true is not None
     errors = angle_errors(true, clinical_angles(estimate.skeleton, estimate.poses), np.ones(len(true), dtype=bool))
     places = [motion.skeleton.joints(motion.poses, motion.translations) for motion in (true, estimate)]
-    return {"clip": clip.name, "views": list(views), "swapped": float(metrics.swapped(*places).mean()), **errors}
+    return {"clip": clip.name, "views": list(views), "swapped": float(nearer_mirrored(*places).mean()), **errors}
 
 
 def landmark_angles(video: Path, first: int, size: tuple[int, int]) -> dict[str, Array]:

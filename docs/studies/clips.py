@@ -4,7 +4,8 @@ from typing import Any, NamedTuple
 
 from posefit.footage.scene import Scene
 from posefit.motion.clips import training_clips, training_motions
-from posefit.sweep.cell import TrackCell, settings_text
+from posefit.settings import settings_text
+from posefit.sweep.cell import TrackCell
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track

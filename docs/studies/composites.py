@@ -30,6 +30,7 @@ from posefit import clinical_angles
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
+from posefit.evaluation.errors import LOST
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
 from posefit.fitting.metrics import LOST_MM
@@ -44,9 +45,9 @@ from posefit.registry import registry
 from posefit.settings import parse_texts
 from posefit.silhouette.cost import project
 from posefit.sweep.engine import Limits
-from posefit.tracking.evaluation import LOST
 from posefit.tracking.front import track
 from posefit.tracking.result import Track
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_reproduce.jobs import each
 from table import WORKERS, earlier, kept, markdown
 
@@ -83,8 +84,8 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
     mpjpe = metrics.mpjpe_mm(true_joints, joints)
     away = 1e3 * np.linalg.norm(joints[:, 0] - true_joints[:, 0], axis=1)
     facing = np.cos(estimate.poses[:, 0] - actor.motion.poses[:, 0]) > 0.0
-    said = {name: np.array([row.get(name, np.nan) for row in track.frames]) for name in ("lost", "unknown_sides")}
-    swapped = metrics.swapped(true_joints, joints)
+    said = {name: track.table[name] for name in ("lost", "unknown_sides")}
+    swapped = nearer_mirrored(true_joints, joints)
     known = seen & (said["unknown_sides"] == 0.0)
     lengths = [np.linalg.norm(motion.skeleton.offsets, axis=1) for motion in (actor.motion, estimate)]
     off = np.abs(lengths[1] / lengths[0] - 1.0)
@@ -102,7 +103,7 @@ def track_figures(track: Track, radii: Array, situation: Situation, truth: Masks
         "swapped": float(swapped[seen].mean()),
         "said_lost": _share(said["lost"][seen] >= LOST, said["lost"][seen]),
         "said_unknown": _share(said["unknown_sides"][seen] == 1.0, said["unknown_sides"][seen]),
-        "held": float(1.0 - np.array([row["usable"] for row in track.frames])[seen].mean()),
+        "held": float(1.0 - track.table["usable"][seen].mean()),
         "known_wrong": float(swapped[known].mean()) if known.any() else None,
         "upright": float(np.median(tall)) / actor.body.stature,
         "stature_cm": 100.0 * (body.stature - actor.body.stature),
@@ -285,7 +286,7 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         if importlib.util.find_spec("mediapipe"):
             angles = landmark_angles(made.videos[0], made.first, SIZE)
             row["landmarks"] = angle_errors(scene.actors[0].motion, angles, uncut(made.masks)[0])
-        row["trust"] = result.trust
+        row["trust"] = str(result.trust)
         row["warnings"] = [one.replace(f"{folder}/", "") for one in said if one.startswith("warning")]
         return row
 

@@ -18,7 +18,7 @@ from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
-from posefit_exemplars.contours import precisions
+from posefit_exemplars.contours import fitted, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 
@@ -78,7 +78,7 @@ def _step_poses(task: Task, scene: Scene) -> float:
     frame_costs = FrameCosts(task, scene.observations[0])
     contours, weights = frame_costs.contours(places[0]), precisions(START_TURN, KNOWN_SHIFT)
     jobs = (
-        lambda: contours.fitted(task, poses, places, poses, weights, CONTINUED_REACHES),
+        lambda: fitted(task.body, contours, (poses, places), poses, weights, CONTINUED_REACHES),
         lambda: frame_costs.full(poses, places),
     )
     fit, cost = (min(repeat(job, number=1, repeat=20)) for job in jobs)

@@ -36,10 +36,10 @@ from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.calibration import Calibration
 from posefit.motion.motion import Motion
+from posefit.output.drawing import draw_body, write
 from posefit.reading import existing, read_text
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.drawing import draw_body, write
 from posefit.tracking.options import ITERATIONS, TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands import CLIPS
@@ -142,9 +142,9 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     """
     estimates: dict[str, Estimates] = {}
     for name in PAPER:
-        how = TrackOptions(method=name, iterations=iterations, seed=seed, smooth=False, body_frames=0)
+        how = TrackOptions(method=name, evaluations=40 * (iterations + 1), seed=seed, smooth=False, body_frames=0)
         track = track_scene(replace(scene, yaw=None), training, how.changed(settings=settings_of(name)))
-        estimates[name] = dict(enumerate(track.estimates))
+        estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
     images = {k: replace(scene.observations[k], yaw=None) for k in chosen}

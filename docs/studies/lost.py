@@ -21,6 +21,7 @@ from people import CHANGES
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
+from posefit.evaluation.errors import LOST
 from posefit.files import new_file
 from posefit.fitting.metrics import LOST_MM
 from posefit.fitting.tracker import Observation
@@ -29,7 +30,6 @@ from posefit.silhouette.corruption import shadow, wandering
 from posefit.silhouette.mask import Mask, Silhouette
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
-from posefit.tracking.evaluation import LOST
 from posefit.uncertainty.modes import mirrored_gain
 from posefit_exemplars.lost_model import NAMES, EvidenceMeans, FailureClassifier, LogisticModel
 from posefit_reproduce.jobs import Progress, each
@@ -328,11 +328,11 @@ def _row(cell: TrackCell, track: Case) -> dict[str, Any]:
         "views_degrees": list(track.views),
         "condition": track.condition,
         "fps": scene.fps,
-        "mpjpe_mm": [round(frame["mpjpe_mm"], 2) for frame in result.frames],
+        "mpjpe_mm": result.table["mpjpe_mm"].round(2).tolist(),
         "mirrored_gain_mm": [round(gain, 1) for gain in gains.tolist()],
-        "cost": [round(frame["cost"], DIGITS) for frame in result.frames],
+        "cost": result.table["cost"].round(DIGITS).tolist(),
     }
-    evidence = [frame.details.get("evidence", {}) for frame in result.estimates]
+    evidence = [frame.details.get("evidence", {}) for frame in result.frames]
     if all(evidence):
         row["evidence"] = [{name: round(value, DIGITS) for name, value in values.items()} for values in evidence]
     return row

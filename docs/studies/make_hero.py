@@ -11,7 +11,7 @@ from PIL import Image
 
 import posefit
 from posefit.arrays import Array
-from posefit.tracking.drawing import BACKGROUND, LINES, TEXT, draw_body, write
+from posefit.output.drawing import BACKGROUND, LINES, TEXT, draw_body, write
 
 VIEWS = (20.0, 110.0)  # degrees
 SILHOUETTE, GROUND = (232, 232, 232), (16, 14, 13)

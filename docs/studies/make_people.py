@@ -10,9 +10,9 @@ import numpy as np
 
 from clips import GROUPS, METHOD, SIDES, Clip, cell_fields, track_of
 from posefit.arrays import Array
+from posefit.output.drawing import BACKGROUND, TEXT, draw_body, write
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.check import cell_of
-from posefit.tracking.drawing import BACKGROUND, TEXT, draw_body, write
 
 STILLS = 4  # of the film, between the best and the worst frame
 SIDE = 208  # pixels of a still
@@ -25,7 +25,7 @@ def strip(clip: Clip) -> Array:
     cell = cell_of(cell_fields(clip, SIDES[1], clip.frames, method=METHOD))
     scene = cell_scene(cell)
     track = track_of(cell, scene)
-    errors = np.array([row["mpjpe_mm"] for row in track.frames])
+    errors = track.table["mpjpe_mm"]
     film = np.linspace(0, len(errors) - 1, STILLS + 2).astype(int)[1:-1]
     named = [("best", errors.argmin()), *((f"{k / scene.fps:.1f} s", k) for k in film), ("worst", errors.argmax())]
     stills = []

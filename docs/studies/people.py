@@ -200,7 +200,7 @@ def _trial(cell: TrackCell, clip: Clip, views: Views, kind: str, translation: Tr
     scene, gone, back = returned(scene, views) if kind == RETURN else with_gap(scene, GAPS[kind])
     track = track_of(cell, scene, translation=translation)
     case = {"clip": clip.name, "views_degrees": list(views), "kind": kind, "translation": translation}
-    mpjpe = np.array([row["mpjpe_mm"] for row in track.frames])
+    mpjpe = track.table["mpjpe_mm"]
     assert track.truth is not None
     return {**case, **recovery(mpjpe, track.truth.poses[:, 0], track.motion.poses[:, 0], gone, back)}
 

@@ -134,14 +134,14 @@ def sampled(case: Case) -> dict[str, Array]:
     cell = cell_of(case.spec)
     track = track_of(cell, cell_scene(cell))
     assert track.truth is not None
-    posteriors = [frame.posterior for frame in track.estimates]
+    posteriors = [frame.posterior for frame in track.frames]
     most = max(len(frame) for frame in posteriors if frame is not None)
     drawn = np.zeros((len(posteriors), most, track.truth.poses.shape[1]))
     weights = np.zeros((len(posteriors), most))
     for k, frame in enumerate(posteriors):
         assert frame is not None
         drawn[k, : len(frame)], weights[k, : len(frame)] = frame.poses, frame.weights
-    costs = np.array([frame.cost for frame in track.estimates])
+    costs = np.array([frame.cost for frame in track.frames])
     return dict(zip(ARRAYS, (track.truth.poses, track.motion.poses, drawn, weights, costs), strict=True))
 
 

@@ -20,13 +20,13 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.cli.output import Command, progress, say
+from posefit.evaluation.measures import BASELINES, MEASURES
 from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.engine import Limits
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool, cores
-from posefit.tracking.measures import BASELINES, MEASURES
 
 Row = Mapping[str, Any]
 K = TypeVar("K", bound=Hashable)

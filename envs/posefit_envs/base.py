@@ -1,11 +1,13 @@
 """Base classes: searches side by side, a single environment as a vector of one, checked actions, scales."""
 
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
-from gymnasium import Space, error, logger
+from gymnasium import Env, Space, error, logger
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -14,13 +16,13 @@ from numpy.typing import NDArray
 
 from posefit import SearchSpace
 from posefit.arrays import Array
-from posefit.fitting.check import whole
+from posefit.fitting.check import one_of, whole
 from posefit.fitting.exchange import exchanged
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES
-from posefit.reading import quoted
+from posefit.reading import quoted, suggestion
 from posefit_envs.instance import ArgumentError, Episode, Instance, World, checked, instance_number, world_of
-from posefit_envs.rendering import MODES, Picture, RenderedEnv, check_mode
+from posefit_envs.rendering import MODES, Picture, check_mode
 from posefit_envs.stage import Rows, Stage
 
 Flags = NDArray[np.bool_]  # (n,)
@@ -43,6 +45,10 @@ class Outcome(NamedTuple):
     reset_infos: Infos  # those that a reset gives too
     truncated: Flags = _NONE  # (n,) or (1,), by a budget of the environment's own
     row_infos: Mapping[int, Infos] = {}  # further ones of some rows
+
+    def infos_of(self, i: int) -> Infos:
+        """Return the infos of environment i, as a single one has them."""
+        return _infos_of(self.infos, i) | self.row_infos.get(i, {})
 
 
 class ActionValidator:
@@ -79,8 +85,9 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     """`num_envs` environments side by side: a proposal in each is one compiled call, whatever their instances.
 
     The arguments are those of the single environment, and `threads`, the number that draw, which changes nothing but
-    the time. Seeded with s, environment i does what a single one does that is seeded with s + i. The step after an
-    episode's last one resets, as `AutoresetMode.NEXT_STEP` has it.
+    the time. Seeded with s, environment i does what a single one does that is seeded with s + i. `autoreset_mode` is
+    Gymnasium's `AutoresetMode`: by NEXT_STEP the step after an episode's last one resets, by SAME_STEP the last one
+    does, whose own observation and infos are then the infos `final_obs` and `final_info`.
     """
 
     metadata = {  # noqa: RUF012, as Gymnasium has it
@@ -95,16 +102,20 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         spaces: Callable[[World], tuple[Box, Space[Any]]],
         *,
         threads: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         **arguments: Any,
     ) -> None:
         checked(whole, "num_envs", num_envs, 1)
-        self.world = world_of(**arguments)
+        own = inspect.signature(type(self)).parameters.values()
+        self.world = world_of([one.name for one in own if one.kind is one.KEYWORD_ONLY], **arguments)
         checked(lambda: self.world.learned)  # names motions and priors that are unknown
         check_mode(render_mode)
-        if render_mode == "human":
-            raise error.UnsupportedMode("render_mode must be rgb_array for a vector environment, got human")
+        mode = getattr(autoreset_mode, "value", autoreset_mode)
+        checked(one_of, "autoreset_mode", mode, [AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value])
+        self._same_step = mode == AutoresetMode.SAME_STEP.value
+        self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(mode)}
         self.num_envs, self.render_mode = num_envs, render_mode
         self._stage = Stage(self.world, num_envs, checked(whole, "threads", threads, 1))
         self.single_action_space, self.single_observation_space = spaces(self.world)
@@ -113,12 +124,23 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._shape = self.action_space.shape or ()
         self._validator = ActionValidator(self._shape[1])
         self._longest = np.inf if max_episode_steps is None else max_episode_steps
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._generators: dict[int, tuple[np.random.Generator, int]] = {}  # with their seeds
         self._ended = np.zeros(num_envs, dtype=bool)
         self._numbers = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._episodes: dict[int, Episode] = {}
         self._truths = np.empty((num_envs, ANGLES))
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The random generator of each environment."""
+        return tuple(self._generator(i) for i in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of each environment's generator."""
+        assert self.np_random
+        return tuple(self._generators[i][1] for i in range(self.num_envs))
 
     @property
     def episodes(self) -> list[Episode]:
@@ -145,18 +167,19 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
         The option "reset_mask" selects the environments that begin; the others go on.
         """
+        check_options(options, ("instance", "reset_mask"))
         begun = len(self._episodes) == self.num_envs
         seeds, mask = _seeds(seed, self.num_envs), _reset_mask(options, self.num_envs, begun)
         numbers = _chosen_instances(options, self.num_envs)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
-                self._generators[i] = seeding.np_random(seeds[i])[0]
+                self._generators[i] = seeding.np_random(seeds[i])
             self._begin(i, numbers[i])
         observations, infos = self._opened(mask)
         return observations, _masked_infos(mask, infos, {})
 
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
-        """Step each environment; one whose episode has ended resets instead."""
+        """Step each environment; one whose episode has ended resets instead, or at once by SAME_STEP."""
         actions = self._validator.check(actions, self._shape)
         assert self.episodes
         stepping = ~self._ended
@@ -166,12 +189,25 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         outcome = self._advance(actions, stepping, np.flatnonzero(stepping))
         # the time limit of Gymnasium cuts an episode that ends by itself, too
         truncated = stepping & (outcome.truncated | (self._steps >= self._longest))
-        self._ended = outcome.terminated | truncated
-        infos = _masked_infos(stepping, outcome.infos, outcome.reset_infos)
+        ended = outcome.terminated | truncated
+        observations, going, begun_infos = outcome.observations, stepping, outcome.reset_infos
+        final: Infos = {}
+        if self._same_step and ended.any():
+            going = ~ended
+            for i in np.flatnonzero(ended).tolist():
+                last = {"final_obs": deepcopy(row_of(observations, i)), "final_info": outcome.infos_of(i)}
+                final = self._add_info(final, last, i)
+                self._begin(i, None)
+            fresh, begun_infos = self._opened(ended)
+            observations = mixed(ended, fresh, observations)
+        else:
+            self._ended = ended
+        infos = _masked_infos(going, outcome.infos, begun_infos) | final
         for i, row in outcome.row_infos.items():
-            infos = self._add_info(infos, row, i)
+            if going[i]:
+                infos = self._add_info(infos, row, i)
         rewards = np.where(stepping, outcome.rewards, 0.0)
-        return outcome.observations, rewards, outcome.terminated, truncated, infos
+        return observations, rewards, outcome.terminated, truncated, infos
 
     def _begin(self, i: int, chosen: int | None) -> None:
         """Begin the next episode of environment i, with a chosen instance or another."""
@@ -180,10 +216,9 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._begin_search(i, number)
 
     def _generator(self, i: int) -> np.random.Generator:
-        generator = self._generators[i]
-        if generator is None:
-            generator = self._generators[i] = seeding.np_random(None)[0]
-        return generator
+        if i not in self._generators:
+            self._generators[i] = seeding.np_random(None)
+        return self._generators[i][0]
 
     def _enter(self, i: int, episode: Episode) -> None:
         self._episodes[i] = episode
@@ -217,13 +252,15 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """Return the picture of environment i."""
 
 
-class SearchEnv(RenderedEnv):
+class SearchEnv(Env[Any, Any]):
     """A single environment: a vector of one, whose rows are taken out, and which does not reset by itself."""
 
     vector: ClassVar[type[SearchVectorEnv]]
+    metadata = {"render_modes": list(MODES), "render_fps": 10}  # noqa: RUF012, as Gymnasium has it
 
     def __init__(self, *, render_mode: str | None = None, **arguments: Any) -> None:
-        super().__init__(render_mode)
+        check_mode(render_mode)
+        self.render_mode = render_mode
         self._vector = self.vector(1, **arguments)  # type: ignore[call-arg, arg-type]
         self.world = self._vector.world
         self.action_space = self._vector.single_action_space
@@ -242,13 +279,13 @@ class SearchEnv(RenderedEnv):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Infos]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
+        check_options(options, ("instance",))
         super().reset(seed=seed)
-        self._vector._generators[0] = self.np_random
+        self._vector._generators[0] = self.np_random, self.np_random_seed
         chosen = options.get("instance") if options else None
         self._vector._begin(0, None if chosen is None else instance_number(chosen))
         observations, infos = self._vector._opened(_ONE)
-        self._update_window()
-        return row_of(observations, 0), _single_infos(infos)
+        return row_of(observations, 0), _infos_of(infos, 0)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
         """Make one step. Raises gymnasium.error.ResetNeeded where the episode has ended."""
@@ -262,12 +299,12 @@ class SearchEnv(RenderedEnv):
         outcome = vector._advance(action[None], _ONE, _FIRST)
         terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
         vector._ended[0] = terminated or truncated
-        self._update_window()
-        infos = _single_infos(outcome.infos) | outcome.row_infos.get(0, {})
-        return row_of(outcome.observations, 0), float(outcome.rewards[0]), terminated, truncated, infos
+        reward, infos = float(outcome.rewards[0]), outcome.infos_of(0)
+        return row_of(outcome.observations, 0), reward, terminated, truncated, infos
 
-    def _render_frame(self) -> Picture:
-        return self._vector._render_row(0, self._vector.episodes[0])
+    def render(self) -> Any:
+        """Return the picture (height, width, 3) where `render_mode` is "rgb_array"."""
+        return None if self.render_mode is None else self._vector._render_row(0, self._vector.episodes[0])
 
 
 def row_of(observations: Any, i: int) -> Any:
@@ -284,8 +321,24 @@ def image_spaces(world: World) -> tuple[Box, Box]:
     )
 
 
-def _single_infos(infos: Infos) -> Infos:
-    return {name: values[0].item() if values.ndim == 1 else values[0] for name, values in infos.items()}
+def mixed(mask: Flags, chosen: Any, others: Any) -> Any:
+    """Return observations (n, ...) or a dict of them: those chosen where the mask (n,) is true, others elsewhere."""
+    if isinstance(chosen, dict):
+        return {name: mixed(mask, value, others[name]) for name, value in chosen.items()}
+    return np.where(mask.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, others)
+
+
+def _infos_of(infos: Infos, i: int) -> Infos:
+    """Return the infos of environment i, of infos (n, ...) by name."""
+    return {name: values[i].item() if values.ndim == 1 else values[i].copy() for name, values in infos.items()}
+
+
+def check_options(options: Mapping[str, Any] | None, known: Sequence[str]) -> None:
+    """Return nothing. Raises ArgumentError where a reset has an option that is not known."""
+    for name in options or {}:
+        if name not in known:
+            came = f"{quoted(name)}{suggestion(str(name), known)}"
+            raise ArgumentError(f"an option of reset must be one of {', '.join(known)}, got {came}")
 
 
 def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:

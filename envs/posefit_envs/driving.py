@@ -148,7 +148,7 @@ def track_reference(
     task = replace(instance.task, training=motions)
     tracker_settings = {f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()}
     method = prepare(TrackOptions(method=tracker, settings=tracker_settings), task)
-    frames = method.tracker(task).track(instance.observations, np.random.default_rng(seed))
+    frames = method.follow(task, instance.observations, np.random.default_rng(seed))
     return [
         committed_infos(instance, k, frame.pose, frame.translation, frame.cost, errors=True)
         for k, frame in enumerate(frames)
@@ -176,7 +176,6 @@ def _stepwise(optimiser: Optimiser, evaluations: int) -> Generator[Array, float,
 
 def _optimiser(space: SearchSpace, name: str, seed: int, evaluations: int, settings: dict[str, Any]) -> Optimiser:
     offer = registry().offer("optimiser", name)
-    all_settings = planned(offer.factory, settings, evaluations)
-    check(offer.name, offer.factory, all_settings)
+    all_settings = planned(offer.factory, check(offer.name, offer.factory, settings), evaluations)
     optimiser: Optimiser = offer.factory(space, np.random.default_rng(seed), **all_settings)
     return optimiser

@@ -20,7 +20,7 @@ from posefit_envs.base import (
     log_improvement,
     scaled,
 )
-from posefit_envs.instance import ArgumentError, Episode, Image, World, checked, first_episode
+from posefit_envs.instance import Episode, Image, World, checked, first_episode, flag
 from posefit_envs.rendering import Picture, render_frame
 from posefit_envs.stage import Evaluation, Rows
 
@@ -205,8 +205,7 @@ class FitStateVectorEnv(SearchVectorEnv):
         **arguments: Any,
     ) -> None:
         checked(whole, "max_evaluations", max_evaluations, 2)
-        if not isinstance(image, bool):
-            raise ArgumentError(f"image must be true or false, got {image!r}")
+        image = flag("image", image)
 
         def search_spaces(world: World) -> tuple[spaces.Box, Space[Any]]:
             d = world.dimensions

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from posefit import Body, Camera, Motion, Observation, PoseProblem, SearchSpace, Silhouette, Task
 from posefit.arrays import Array
-from posefit.fitting.check import between, finite_number, one_of
+from posefit.fitting.check import between, finite_number, one_of, pair
 from posefit.fitting.prior import Prior
 from posefit.fitting.space import ROOT_RANGE_DEGREES, TRANSLATIONS, Translation
 from posefit.geometry.body import varied
@@ -78,16 +78,17 @@ class World:
         return int(generator.integers(*SPLITS[self.split])) if self.instance is None else self.instance
 
 
-def world_of(**arguments: Any) -> World:
-    """Return the world that an environment's arguments describe.
+def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
+    """Return the world that an environment's arguments describe; it has some of its `own` besides.
 
     Raises ArgumentError where a value is wrong, and TypeError where there is no argument of that name.
     """
     known = tuple(World.__dataclass_fields__)
     for name in arguments:
         if name not in known:
+            every = *known, *own
             raise TypeError(
-                f"an argument must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}"
+                f"an argument must be one of {', '.join(every)}, got {quoted(name)}{suggestion(name, every)}"
             )
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)
@@ -95,15 +96,14 @@ def world_of(**arguments: Any) -> World:
     for name in ("motion", "prior"):
         if not isinstance(value := getattr(world, name), str):
             raise ArgumentError(f"{name} must be a name, got {quoted(value)}")
-    sides = list(world.size) if isinstance(world.size, Sequence) and not isinstance(world.size, str) else []
-    if len(sides) != 2 or not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
-        raise ArgumentError(f"size must be (width, height) of 36 to 4096 pixels, got {quoted(world.size)}")
+    what = "(width, height) of 36 to 4096 pixels"
+    sides = checked(pair, "size", world.size, what)
+    if not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
+        raise ArgumentError(f"size must be {what}, got {quoted(world.size)}")
     mismatch = checked(finite_number, "mismatch_percent", world.mismatch_percent)
     checked(between, "mismatch_percent", mismatch, 0.0, 50.0)
     if isinstance(world.train, str) or not all(isinstance(name, str) for name in world.train or ()):
         raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(world.train)}")
-    if not isinstance(world.errors, bool):
-        raise ArgumentError(f"errors must be true or false, got {quoted(world.errors)}")
     return replace(
         world,
         instance=None if world.instance is None else instance_number(world.instance),
@@ -112,6 +112,7 @@ def world_of(**arguments: Any) -> World:
         size=(int(sides[0]), int(sides[1])),
         noise=_strengths(world.noise),
         mismatch_percent=mismatch,
+        errors=flag("errors", world.errors),
     )
 
 
@@ -123,8 +124,15 @@ def checked(check: Callable[..., Any], *values: Any) -> Any:
         raise ArgumentError(str(mistake)) from None
 
 
+def flag(name: str, value: object) -> bool:
+    """Return a truth value as a bool. Raises ArgumentError where it is none."""
+    if not isinstance(value, bool | np.bool_):
+        raise ArgumentError(f"{name} must be true or false, got {quoted(value)}")
+    return bool(value)
+
+
 def _views(view_degrees: Any) -> tuple[float, ...]:
-    several = isinstance(view_degrees, Sequence) and not isinstance(view_degrees, str)
+    several = isinstance(view_degrees, Sequence | np.ndarray) and not isinstance(view_degrees, str)
     try:
         views = tuple(finite_number("view_degrees", view) for view in (view_degrees if several else [view_degrees]))
     except ValueError:

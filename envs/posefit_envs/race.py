@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from posefit import Optimiser
 from posefit.arrays import Array
-from posefit.fitting.check import whole
+from posefit.fitting.check import pair, whole
 from posefit.reading import quoted
 from posefit.registry import registry
-from posefit.settings import planned
+from posefit.settings import planned, settings_of
 from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, log_cost, log_improvement
 from posefit_envs.instance import ArgumentError, Episode, World, checked, first_episode
 from posefit_envs.rendering import Picture, render_frame
@@ -44,7 +44,9 @@ class RaceVectorEnv(SearchVectorEnv):
         self.population_size = int(checked(whole, "population_size", population_size, 2))
         self._least, self._most = _bounds(generations)
         self._optimiser, self._factory = optimiser, checked(registry().optimiser, optimiser)
-        self._settings = planned(self._factory, {}, self.population_size * (self._most + 1), self.population_size)
+        size = {"population_size": self.population_size}
+        sized = any(setting.name in size for setting in settings_of(self._factory))
+        self._settings = planned(self._factory, size if sized else {}, self.population_size * (self._most + 1))
 
         def race_spaces(_: World) -> tuple[spaces.Box, spaces.Box]:
             features = SEARCH_FEATURES * k + COMMON_FEATURES
@@ -212,10 +214,8 @@ class RaceEnv(SearchEnv):
 
 def _bounds(generations: Any) -> tuple[int, int]:
     """Return the least and the largest budget. Raises ArgumentError where they are not two numbers in this order."""
-    several = isinstance(generations, Sequence) and not isinstance(generations, str) and len(generations) == 2
-    if not several:
-        raise ArgumentError(f"generations must be two whole numbers such as (100, 220), got {quoted(generations)}")
-    least, most = (int(checked(whole, "generations", number, 1)) for number in generations)
+    ends = checked(pair, "generations", generations, "two whole numbers such as (100, 220)")
+    least, most = (checked(whole, "generations", number, 1) for number in ends)
     if least > most:
         raise ArgumentError(f"generations must be the least and the largest, got {least} and {most}")
     return least, most

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from posefit_envs.base import row_of
+from posefit_envs.base import mixed, row_of
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -59,7 +59,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
                     rows[i]["terminal_observation"] = deepcopy(row_of(observations, int(i)))
                     rows[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
                 fresh, fresh_infos = vector.reset(options={"reset_mask": done})
-                observations = _mixed(done, fresh, observations)
+                observations = mixed(done, fresh, observations)
                 for i in np.flatnonzero(done):
                     self.reset_infos[i] = _row(fresh_infos, int(i))
             return observations, rewards.astype(np.float32), done, rows
@@ -94,13 +94,6 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
                 raise error.Error(f"indices must be all of the {self.num_envs} environments, got {chosen}")
 
     return Adapted()
-
-
-def _mixed(mask: Any, chosen: Any, others: Any) -> Any:
-    """Return observations (n, ...) or a dict of them: those chosen where the mask (n,) is true, others elsewhere."""
-    if isinstance(chosen, dict):
-        return {name: _mixed(mask, value, others[name]) for name, value in chosen.items()}
-    return np.where(mask.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, others)
 
 
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:

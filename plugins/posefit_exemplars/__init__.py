@@ -3,7 +3,7 @@
 One silhouette does not distinguish a stride from its mirrored half-cycle; a sequence of them nearly always does. So
 states are poses of recorded clips, each with a yaw. They continue as their clips do, at about their speed, or change to
 a similar clip, turn, or jump, and the likeliest path through the frames is followed. After Toyama and Blake,
-Probabilistic tracking in a metric space, 2001. From there every joint gives way, until contours are those of the masks:
+Probabilistic tracking in a metric space, 2001. From there every joint may move, until contours are those of the masks:
 several hypotheses of each frame are fitted, and the likeliest sequence of them is reported some frames later.
 
 - `exemplars` has the poses, what came after each, and codes to compare them.
@@ -32,4 +32,4 @@ def posefit_register_trackers(register: RegisterTracker) -> None:
     """Offer `exemplars`."""
     from posefit_exemplars.tracker import ExemplarTracker
 
-    register("exemplars", ExemplarTracker)
+    register("exemplars", ExemplarTracker, looks_ahead=True)

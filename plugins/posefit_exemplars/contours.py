@@ -1,72 +1,41 @@
 """Poses of one frame moved until their contours are those of the masks: some steps of Gauss and Newton."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
-from posefit.fitting.tracker import Observation, Task
-from posefit.geometry.camera import Camera
+from posefit.arrays import Array
+from posefit.geometry.body import Body
 from posefit.geometry.skeleton import ANGLES
-from posefit.tracking.smoothing.contours import Distances, MaskContours
-from posefit_exemplars.kernels import RIGID, Pull, step_poses
+from posefit.tracking.smoothing.contours import MAX_ANGLE_STEP, MaskContours, contour_squares
 
 POINT_SPACING = 0.04  # metres, about, between two points of a mask's border
 STEP_EVALUATIONS = 27.0  # effort of a step, in costs of poses, which docs/studies/follow.py measures
 
 
-class FrameContours(NamedTuple):
-    """The borders of a frame's masks, view by view; see `MaskContours`."""
+def fitted(
+    body: Body,
+    views: Sequence[MaskContours],
+    start: tuple[Array, Array],
+    means: Array,
+    precisions: Array,
+    scales: Sequence[float],
+) -> tuple[Array, Array]:
+    """Return poses (n, 66) and places (n, 3) after a step to the contours of one frame for each of `scales`.
 
-    rotations: Array  # (V, 3, 3) of the cameras, as the three that follow
-    translations: Array
-    focals: Array
-    centres: Array
-    fields: Distances  # (V, h, w)
-    corners: NDArray[np.int64]  # (V, 2)
-    sizes: NDArray[np.int64]  # (V, 2)
-    points: Array  # (n, 2)
-    starts: NDArray[np.int64]  # (V + 1,) of each view's points
-    steps: Array  # (V,) pixels that a point stands for
-
-    @classmethod
-    def of(cls, cameras: Sequence[Camera], observation: Observation, place: Array) -> Self:
-        """Return the borders in one frame, of a person whose root is about at `place` (3,)."""
-        views = [MaskContours.of(camera, number, [observation], place[None]) for number, camera in enumerate(cameras)]
-        strides = [max(round(POINT_SPACING * view.metres[0] / view.step), 1) for view in views]
-        points = [view.points[::stride] for view, stride in zip(views, strides, strict=True)]
-        fields = np.zeros((len(views), *np.max([view.fields.shape[1:] for view in views], axis=0)), dtype=np.float32)
-        for padded, view in zip(fields, views, strict=True):
-            padded[: view.fields.shape[1], : view.fields.shape[2]] = view.fields[0]
-        return cls(
-            np.array([view.camera.rotation for view in views]),
-            np.array([view.camera.translation for view in views]),
-            np.array([view.camera.focal for view in views], dtype=np.float64),
-            np.array([view.camera.centre for view in views], dtype=np.float64),
-            fields,
-            np.concatenate([view.corners for view in views]).astype(np.int64),
-            np.concatenate([view.sizes for view in views]).astype(np.int64),
-            writeable(np.concatenate(points)),
-            np.cumsum([0, *map(len, points)]),
-            np.array([view.step * stride for view, stride in zip(views, strides, strict=True)]),
-        )
-
-    def fitted(
-        self, task: Task, poses: Array, places: Array, means: Array, precisions: Array, reaches: Sequence[float]
-    ) -> tuple[Array, Array]:
-        """Return poses (n, 66) and places (n, 3) after a step for each of `reaches`; see `step_poses`.
-
-        Angles are pulled to `means` (n, 66), places to where they were, with `precisions` (69,) of places and angles.
-        """
-        free = task.body.skeleton.free
-        precisions = np.where(np.append([True] * 3, free), precisions, RIGID)
-        pull = Pull(writeable(means), places.copy(), precisions)
-        moved, places = poses.copy(), places.copy()
-        for reach in reaches:
-            step_poses(task.body.skeleton.chain, task.body.radii, self, pull, reach, moved, places)
-        return np.where(free, moved, poses), places
+    Angles are pulled to `means` (n, 66), places to where they `start`, with `precisions` (69,) of places and angles.
+    Contours farther off than a scale, metres, count less.
+    """
+    angles = np.flatnonzero(body.skeleton.free)
+    poses, places, weights = start[0].copy(), start[1].copy(), precisions[np.append([0, 1, 2], 3 + angles)]
+    for scale in scales:
+        curves, slopes, *_ = contour_squares(body, views, poses, places, scale)
+        off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
+        np.einsum("nii->ni", curves)[:] += weights  # on the diagonals
+        steps = np.linalg.solve(curves, (slopes + weights * off)[..., None])[..., 0]
+        places -= steps[:, :3]
+        poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
+    return poses, places
 
 
 def precisions(turn: float, shift: float) -> Array:

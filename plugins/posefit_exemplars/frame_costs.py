@@ -9,7 +9,8 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, known_views, pose_costs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit_exemplars.contours import FrameContours
+from posefit.tracking.smoothing.contours import MaskContours
+from posefit_exemplars.contours import POINT_SPACING
 
 MIN_SMALL_SIDE = 40  # pixels: no side of a small picture is shorter
 SMALL_FACTORS = (4, 2, 1)
@@ -65,9 +66,10 @@ class FrameCosts:
         known = self._observation.landmarks[..., 2].any()
         return side_odds(self.landmarks(pose[None], place[None])[0]) if known else None
 
-    def contours(self, place: Array) -> FrameContours:
-        """Return the contours of the masks, of a person whose root is about at `place` (3,)."""
-        return FrameContours.of(self._task.cameras, self._observation, place)
+    def contours(self, place: Array) -> list[MaskContours]:
+        """Return the contours of the masks in each view, of a person whose root is about at `place` (3,)."""
+        cameras, frame = enumerate(self._task.cameras), [self._observation]
+        return [MaskContours.of(camera, view, frame, place[None], POINT_SPACING) for view, camera in cameras]
 
     def cost_and_areas(self, pose: Array, place: Array) -> tuple[float, Areas]:
         """Return the cost of one pose, and its areas (views, 3)."""

@@ -5,7 +5,7 @@ person leans or faces. So each frame has several hypotheses. Some are fresh: the
 beam, and reflections of these. The others continue those of the frame before at their speed. Each is fitted to the
 contours by a few steps of Gauss and Newton, which may turn every joint. A hypothesis costs what its silhouette does,
 and its distance from the poses of clips; a step costs the distance of the trunk and of each limb from where their
-motion leads. The likeliest sequence is Viterbi's: a wrong pose may fit one frame, but hardly ever twenty.
+motion leads. The likeliest sequence is Viterbi's: a wrong pose may fit one frame, but hardly twenty.
 
 Masks of a camera and a fitted body are less precise than clean ones. Where even the best frames cost more, the contours
 of a single view count for less against the poses that a fit starts with and those of clips: nothing else keeps a body
@@ -28,10 +28,10 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
-from posefit_exemplars.contours import STEP_EVALUATIONS, precisions
+from posefit_exemplars.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.smoothing import Estimate, clocks
+from posefit_exemplars.smoothing import Estimate
 
 # metres, of the steps of a fit: contours that are farther off count less
 FRESH_REACHES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, 0.033, 0.033)
@@ -156,7 +156,7 @@ class HypothesisFilter:
         """Yield each estimate with the pose of the likeliest sequence, up to `delay` frames later."""
         rows = paths = None
         for window in markov.windows(self._frames(estimates), self.delay):
-            start, states = clocks(), [frame.states for frame in window]
+            states = [frame.states for frame in window]
             estimate, hypotheses, *_ = window[0]
             row, weights, poses = markov.viterbi_state(states), markov.state_weights(states), hypotheses.poses
             squares = ((hypotheses.joints - hypotheses.joints[row]) ** 2).sum(axis=2).mean(axis=1) / SAME_DISTANCE**2
@@ -165,16 +165,15 @@ class HypothesisFilter:
                 rows = markov.sample_states(states, rows, self._sampling, rng)
                 skeleton = self._task.body.skeleton
                 paths = markov.SampledPaths.of(skeleton, poses[rows], hypotheses.places[rows], pose)
-            yield replace(estimate, pose=pose, place=place, effort=estimate.effort + clocks() - start, paths=paths)
+            yield replace(estimate, pose=pose, place=place, paths=paths)
 
     def _frames(self, estimates: Iterable[Estimate]) -> Iterator[_FittedFrame]:
-        """Yield each estimate with the effort of its hypotheses, and these."""
+        """Yield each estimate with the evaluations of its hypotheses, and these."""
         latest: _FittedFrame | None = None
         for estimate in estimates:
-            start = clocks()
             hypotheses, noise, evaluations = self._fitted(estimate, latest)
             joined = self._joined(estimate.frame_costs, hypotheses, latest, noise)
-            estimate = replace(estimate, effort=estimate.effort + clocks(evaluations) - start)
+            estimate = replace(estimate, evaluations=estimate.evaluations + evaluations)
             latest = _FittedFrame(estimate, hypotheses, *joined)
             yield latest
 
@@ -187,7 +186,7 @@ class HypothesisFilter:
         noise = self._noise(frame_costs, poses, places)
         weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
         if contours is not None:
-            poses, places = contours.fitted(task, poses, places, poses, weights, FRESH_REACHES)
+            poses, places = fitted(task.body, contours, (poses, places), poses, weights, FRESH_REACHES)
             evaluations += len(poses) * FRESH_EVALUATIONS
         parents = np.full(len(poses), -1)
         if before is not None and rows is not None:
@@ -196,7 +195,7 @@ class HypothesisFilter:
                 moved, shifted = before.hypotheses.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)
                 means, pulls = self._pulled(moved, weights, noise)
-                moved, shifted = contours.fitted(task, moved, shifted, means, pulls, CONTINUED_REACHES)
+                moved, shifted = fitted(task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
                 evaluations += len(rows) * CONTINUED_EVALUATIONS
             poses, places = np.concatenate([poses, moved]), np.concatenate([places, shifted])
             parents = np.concatenate([parents, rows])
@@ -253,10 +252,9 @@ class HypothesisFilter:
         if not frame_costs.usable or count <= 0:
             return poses, places
         likeliest = (poses, places) if before is None or rows is None else before.hypotheses.continued(rows)
-        reflectable, beside = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
+        reflectable, place = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
         reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
-        beside = np.resize(beside, (len(reflected), 3))
-        return np.concatenate([poses, reflected]), np.concatenate([places, beside])
+        return np.concatenate([poses, reflected]), np.concatenate([places, np.resize(place, (len(reflected), 3))])
 
     def _pulled(self, poses: Array, weights: Array, noise: float) -> tuple[Array, Array]:
         """Return what poses (n, 66) are pulled to, between themselves and similar poses of clips, and how (69,)."""

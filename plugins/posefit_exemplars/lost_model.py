@@ -5,7 +5,7 @@ they give a frame's expected error, in metres; standard deviations of joints and
 
 The probabilities are those of two logistic models of the same evidence: what the pose costs, the cost ratios of its
 mirrored and reflected poses, the spread of the sampled tracks, how many of them have the other side, whether the person
-moves where they face, the angle of view and the number of cameras. Each value stands beside its means over a moment and
+moves where they face, the angle of view and the number of cameras. Each value is used with its means over a moment and
 over a second: a lost track stays lost for a while, and masks that never fit mean less than one that fits worse now.
 """
 
@@ -22,6 +22,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting.tracker import Frame, Task
+from posefit.fitting.weights import logistic
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, joint_distances
 from posefit.geometry.symmetry import facing
@@ -30,7 +31,6 @@ from posefit.uncertainty.modes import Posterior, second_side
 from posefit_exemplars.frame_costs import FrameCosts
 
 MIN_COST, MIN_SPREAD = 0.1, 0.002  # per cent, and metres
-MAX_LOG_ODDS = 30.0  # logarithm
 LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
 MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known
 
@@ -45,11 +45,6 @@ def evidence(skeleton: Skeleton, posterior: Posterior, pose: Array, cost: float,
 def none_features(log: float) -> Array:
     """Return the predictors (3,) of no mode being right: 1, the logarithm of the expected error, and its square."""
     return np.array([1.0, log, log * log])
-
-
-def probability_of(odds: float) -> float:
-    """Return the probability for a logarithm of odds, which is clipped to `MAX_LOG_ODDS`."""
-    return 1.0 / (1.0 + math.exp(-min(max(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,7 +67,7 @@ class Calibration:
     def recalibration(self, log: float) -> Recalibration:
         """Return the recalibration of a frame, from the logarithm of its expected error."""
         spreads = math.exp(log) * self.joint_spreads, math.exp(log) * self.angle_spreads
-        none = probability_of(float(self.none @ none_features(log)))
+        none = float(logistic(self.none @ none_features(log)))
         return Recalibration(*spreads, self.joint_factors, self.angle_factors, sharpness=self.sharpness, none=none)
 
 
@@ -103,8 +98,8 @@ EVIDENCE: Mapping[str, Callable[[float], float]] = {
     "mirrored": math.log,  # the cost of the mirror image, over the cost
     "farthest": lambda value: math.log(max(value, 0.0) + 0.01),  # metres to the farthest sampled track
     "second": float,  # weight of the tracks that have left and right exchanged
-    "ahead": float,  # metres a second by which the root goes where it faces
-    "speed": float,  # metres a second by which it goes anywhere
+    "ahead": float,  # metres a second that the root moves in the direction it faces
+    "speed": float,  # metres a second that it moves in any direction
     "across": float,  # 0 to 1: facing across the only camera's line of sight; 0 with several cameras
     "views": math.log2,  # cameras that show something of the person, at most `MAX_VIEWS`
 }
@@ -137,9 +132,9 @@ def root_motion(places: Sequence[Array], yaw: float, fps: float, *, backwards: b
     """Return the speeds of the root `ahead`, where the person faces, and in any direction, from its latest places."""
     if len(places) < 2:
         return {}
-    way = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
-    ahead = float(way @ [math.sin(yaw), math.cos(yaw)])
-    return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(float(np.linalg.norm(way)), MAX_SPEED)}
+    velocity = (places[-1] - places[0])[[0, 2]] * fps / (len(places) - 1) * (-1.0 if backwards else 1.0)
+    ahead, speed = float(velocity @ [math.sin(yaw), math.cos(yaw)]), float(np.linalg.norm(velocity))
+    return {"ahead": min(max(ahead, -MAX_SPEED), MAX_SPEED), "speed": min(speed, MAX_SPEED)}
 
 
 def across(cameras: Sequence[Camera], yaw: float, place: Array) -> float:
@@ -175,7 +170,7 @@ class LogisticModel(NamedTuple):
 
     def probability(self, features: Array) -> float:
         """Return the probability for a frame with these features (3 E,)."""
-        return probability_of(float(features[self.rows] @ self.weights) + self.bias)
+        return float(logistic(features[self.rows] @ self.weights + self.bias))
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
@@ -220,7 +215,7 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
         known = exchanged < classifier.unknown
-        if (odds := frame.details.get("sides")) is not None:  # landmarks know better
+        if (odds := frame.details.get("sides")) is not None:  # landmarks are better evidence
             side_sums = decay * side_sums + [odds, 1.0]
             known = bool(side_sums[0] >= MIN_SIDE_ODDS * side_sums[1])
         recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))

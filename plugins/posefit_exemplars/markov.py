@@ -40,16 +40,16 @@ def frame_states(costs: Array, before: FrameStates | None = None, steps: Array |
     if before is None or steps is None:
         forward = likelihoods / likelihoods.sum()
         return FrameStates(costs - costs.min(), np.full(len(costs), -1), likelihoods, None, forward)
-    ways = before.totals[:, None] + steps
-    parents = ways.argmin(axis=0)
-    totals = ways[parents, np.arange(len(costs))] + costs  # RABINER1989 (Viterbi)
+    paths = before.totals[:, None] + steps
+    parents = paths.argmin(axis=0)
+    totals = paths[parents, np.arange(len(costs))] + costs  # RABINER1989 (Viterbi)
     kernel = np.exp(-np.minimum(steps, MAX_KERNEL_COST)).astype(np.float32)
     forward = (before.forward @ kernel) * likelihoods  # RABINER1989 (forward)
     return FrameStates(totals - totals.min(), parents, likelihoods, kernel, forward / forward.sum())
 
 
 def windows(frames: Iterable[T], delay: int) -> Iterator[Sequence[T]]:
-    """Yield each frame with up to `delay` later ones, as soon as these are there; the sequence is only for now."""
+    """Yield each frame with up to `delay` later ones, as soon as these have come; the sequence changes later."""
     waiting: deque[T] = deque()
     for frame in frames:
         waiting.append(frame)

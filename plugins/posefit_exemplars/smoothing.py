@@ -1,9 +1,8 @@
 """A zero-phase filter of poses over time: a Gaussian that reaches as far ahead as back."""
 
-import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,11 +17,6 @@ from posefit_exemplars.markov import SampledPaths, windows
 FILTER_REACH = 3.0  # standard deviations, to either side
 
 
-def clocks(evaluations: float = 0.0) -> Array:
-    """Return evaluations, and what the clocks show now (3,): the effort between two calls is their difference."""
-    return np.array([evaluations, time.perf_counter(), time.process_time()])
-
-
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """The pose estimated in a frame, before it is smoothed."""
@@ -30,7 +24,7 @@ class Estimate:
     pose: Array  # (66,)
     place: Array  # (3,)
     frame_costs: FrameCosts = field(repr=False)
-    effort: Array  # (3,) evaluations, seconds, and CPU seconds
+    evaluations: float
     paths: SampledPaths | None = None
     alternatives: tuple[Array, Array] | None = field(default=None, repr=False)  # poses (n, 66) and places: other states
 
@@ -64,13 +58,12 @@ def _frame(estimates: Sequence[Estimate], k: int, spread: float) -> Frame:
     if frame_costs.root is not None:
         place = estimate.place
     cost, areas = frame_costs.cost_and_areas(pose, place)
-    start, posterior, evaluations = clocks(), None, int(np.ceil(estimate.effort[0])) + 1
+    posterior, evaluations = None, int(np.ceil(estimate.evaluations)) + 1
     details: dict[str, Any] = {"usable": frame_costs.usable}
     if estimate.paths is not None:
         details["sides"] = frame_costs.side_odds(pose, place)
         details["mirror_costs"] = frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
         evaluations += len(details["mirror_costs"])
         posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, frame_costs)
-    _, seconds, cpu_seconds = (estimate.effort + clocks() - start).tolist()
-    frame = Frame(pose, place, cost, areas, evaluations, seconds, np.array([cost]), details=details)
-    return replace(frame, cpu_seconds=cpu_seconds, posterior=posterior)
+    trace = np.array([[evaluations, cost]])
+    return Frame(pose, place, cost, areas, evaluations, trace, posterior, details=details)

@@ -19,7 +19,7 @@ from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
-from posefit_exemplars.smoothing import FILTER_REACH, Estimate, clocks, smoothed
+from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 BEAM_STATES = 400
@@ -38,12 +38,12 @@ SIMILAR_YAW = np.radians(20.0)
 
 
 class _BeamFrame(NamedTuple):
-    """The beam of a frame, the weights of its states, and the effort (3,), as of an `Estimate`."""
+    """The beam of a frame, the weights of its states, and its evaluations."""
 
     beam: Beam
     states: markov.FrameStates
     frame_costs: FrameCosts
-    effort: Array
+    evaluations: float
 
 
 class ExemplarTracker:
@@ -109,21 +109,21 @@ class ExemplarTracker:
         """Yield the estimate of each frame on the likeliest path of the beam."""
         rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else None
         for window in markov.windows(self._beams(observations, rng), self.delay):
-            start, frame, states = clocks(), window[0], [frame.states for frame in window]
+            frame, states = window[0], [frame.states for frame in window]
             estimate = self._estimated(frame, markov.viterbi_state(states), markov.state_weights(states))
             if sampler is not None and self.sampling.paths:
                 rows = markov.sample_states(states, rows, self.sampling, sampler)
                 poses, places = self._poses(frame.beam)[rows], frame.beam.places[rows]
                 paths = markov.SampledPaths.of(self.task.body.skeleton, poses, places, estimate.pose)
                 estimate = replace(estimate, paths=paths)
-            yield replace(estimate, effort=frame.effort + clocks() - start)
+            yield estimate
 
     def _beams(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[_BeamFrame]:
         """Yield the beam of each frame."""
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
         latest: _BeamFrame | None = None
         for number, observation in enumerate(observations):
-            start, frame_costs = clocks(), FrameCosts(self.task, observation)
+            frame_costs = FrameCosts(self.task, observation)
             before = None if latest is None else latest.beam
             beam, costs, evaluations = self._candidates(frame_costs, before, number % interval == 0, rng)
             states = markov.frame_states(costs)
@@ -132,7 +132,7 @@ class ExemplarTracker:
                 steps = beams.transition_costs(self.exemplars, latest.beam, beam, self.step, *known)
                 states = markov.frame_states(costs, latest.states, steps)
             beam = replace(beam, totals=states.totals)
-            latest = _BeamFrame(beam, states, frame_costs, clocks(evaluations) - start)
+            latest = _BeamFrame(beam, states, frame_costs, evaluations)
             yield latest
 
     def _candidates(
@@ -232,7 +232,7 @@ class ExemplarTracker:
         pose, place = markov.mean_near(row, weights, squares, self._poses(beam), beam.places)
         if frame_costs.usable:
             place = frame_costs.aligned(pose[None], place[None])[0]
-        return Estimate(pose, place, frame_costs, frame.effort, alternatives=alternatives)
+        return Estimate(pose, place, frame_costs, frame.evaluations, alternatives=alternatives)
 
 
 def state_distances(codes: Codes, code: Codes, turns: Array) -> Array:

@@ -7,10 +7,20 @@ J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, Int
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
-from posefit.fitting.box import Space, converted, displacement, draw_population, sample_normal
-from posefit.fitting.check import at_least, between, positive
-from posefit_filters.weighting import sharpness, systematic_rows, weigh
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    converted,
+    displacement,
+    draw_population,
+    positive,
+    sample_normal,
+    weigh,
+)
+from posefit_filters.weighting import sharpness, systematic_rows
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10
@@ -57,16 +67,18 @@ class Annealed:
         self._diffusion, self._noise = diffusion, noise
         self._particles = draw_population(space, rng, evaluations // self._layers)
         self._costs = np.zeros(len(self._particles))
-        self._layer = 0
+        self._layer = self._waiting = 0
 
     def ask(self) -> Array:
         """Return the particles (n, d) of the next layer; none after the last one of a frame."""
-        return self._particles.copy() if self._layer < self._layers else self._particles[:0].copy()
+        self._waiting = len(self._particles) if self._layer < self._layers else 0
+        return self._particles[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Weigh the particles, and unless this was the last layer, go on with the survivors."""
+        check_tell(self._waiting, proposals, costs)
         self._particles, self._costs = np.array(proposals), np.array(costs, dtype=np.float64)
-        self._layer += 1
+        self._layer, self._waiting = self._layer + 1, 0
         if self._layer < self._layers:
             self._descend()
 

@@ -6,10 +6,19 @@ N. Gordon, D. Salmond, A. Smith, Novel approach to nonlinear/non-Gaussian Bayesi
 
 import numpy as np
 
-from posefit.arrays import Array
-from posefit.fitting.box import Space, converted, draw_population, repair, sample_normal
-from posefit.fitting.check import at_least, positive
-from posefit_filters.weighting import systematic_rows, weigh
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    check_tell,
+    converted,
+    draw_population,
+    positive,
+    repair,
+    sample_normal,
+    weigh,
+)
+from posefit_filters.weighting import systematic_rows
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost
@@ -48,17 +57,19 @@ class Particle:
         self._sharpness, self._noise, self._drift = sharpness, noise, drift
         self._particles = draw_population(space, rng, evaluations)
         self._weights = np.full(evaluations, 1.0 / evaluations)
-        self._due = True
+        self._due, self._waiting = True, 0
 
     def ask(self) -> Array:
         """Return the particles (n, d) of this frame, once; then none."""
-        return self._particles.copy() if self._due else self._particles[:0].copy()
+        self._waiting = len(self._particles) if self._due else 0
+        return self._particles[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Weigh the particles."""
+        check_tell(self._waiting, proposals, costs)
         self._particles = np.array(proposals)
         self._weights = weigh(np.array(costs, dtype=np.float64), self._sharpness)
-        self._due = False
+        self._due, self._waiting = False, 0
 
     def advance(self, space: Space) -> None:
         """Let the particles survive by their weights, and move into the next frame."""

@@ -1,5 +1,7 @@
 """Optuna's samplers by ask and tell."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Literal, final
 
 import numpy as np
@@ -35,8 +37,9 @@ class Optuna(Adapter):
         choices(Optuna.__init__, locals())
         super().__init__(space, draw_population(space, rng, 1)[0])
         rng = np.random.default_rng(int(rng.integers(2**63)))
-        optuna.logging.set_verbosity(optuna.logging.ERROR)
-        self._study: Any = optuna.create_study(sampler=getattr(optuna.samplers, variant)(seed=int(rng.integers(2**31))))
+        sampler = getattr(optuna.samplers, variant)(seed=int(rng.integers(2**31)))
+        with _silence():
+            self._study: Any = optuna.create_study(sampler=sampler)
         self._names = [f"x{k:03}" for k in range(space.dimensions)]
         self._box = {name: optuna.distributions.FloatDistribution(-1.0, 1.0) for name in self._names}
         for proposal in draw_population(space, rng, population_size).tolist():
@@ -46,10 +49,25 @@ class Optuna(Adapter):
 
     def propose(self) -> Array:
         """Return the study's next population (n, d)."""
-        self._trials = [self._study.ask(self._box) for _ in range(self._population_size)]
+        with _silence():
+            self._trials = [self._study.ask(self._box) for _ in range(self._population_size)]
         return np.array([[trial.params[name] for name in self._names] for trial in self._trials])
 
     def learn(self, proposals: Array, costs: Array) -> None:
         """Let the study learn the costs (n,)."""
-        for trial, cost in zip(self._trials, costs.tolist(), strict=True):
-            self._study.tell(trial, cost)
+        with _silence():
+            for trial, cost in zip(self._trials, costs.tolist(), strict=True):
+                self._study.tell(trial, cost)
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Let Optuna log errors alone in the body, and afterwards what its user wants."""
+    from optuna import logging
+
+    before = logging.get_verbosity()
+    logging.set_verbosity(logging.ERROR)
+    try:
+        yield
+    finally:
+        logging.set_verbosity(before)

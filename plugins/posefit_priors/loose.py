@@ -104,11 +104,6 @@ class Loose(Stored):
         angles[:, self.loose] += latents[:, m:]
         return angles
 
-    @property
-    def affine(self) -> tuple[Array, Array]:
-        """The weights (d, 63) of the latents, 1 for a loose angle's own, and the angles (63,) where all are 0."""
-        return np.vstack([self._pca.components, np.eye(len(self._pca.mean))[self.loose]]), self._pca.mean
-
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, d) the components allow and the joint limits too (n,)."""
         m = len(self._pca.low)

@@ -78,11 +78,6 @@ class PCA(Stored):
         add_components(writeable(latents), self.components, angles)  # SAPSO 2.1.3 recovery
         return angles
 
-    @property
-    def affine(self) -> tuple[Array, Array]:
-        """The weights (m, 63) of the latents and the angles (63,) where all of them are 0. SAPSO 2.1."""
-        return self.components, self.mean
-
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
         return np.asarray(distances(writeable(latents), self.centres) < self.reach)  # SAPSO 2.2 constraint 2

@@ -45,9 +45,15 @@ class Pymoo(Adapter):
         from pymoo.config import Config
         from pymoo.core.problem import Problem
         from pymoo.core.termination import NoTermination
+        from pymoo.functions import FunctionLoader
 
         rng, size = np.random.default_rng(self._seed), self._population_size
-        Config.warnings["not_compiled"] = False
+        hinted = Config.warnings["not_compiled"]
+        Config.warnings["not_compiled"] = False  # a hint that is printed when functions are loaded, once
+        try:
+            FunctionLoader.get_instance()
+        finally:
+            Config.warnings["not_compiled"] = hinted
         kind = getattr(import_module(f"pymoo.algorithms.soo.nonconvex.{self._variant.lower()}"), self._variant)
         self._algorithm: Any = kind(pop_size=size, sampling=draw_population(self._space, rng, size))
         self._problem: Any = Problem(n_var=self._space.dimensions, n_obj=1, xl=-1.0, xu=1.0)

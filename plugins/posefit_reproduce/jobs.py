@@ -29,7 +29,7 @@ def each(
     Jobs and results travel between processes. Raises ValueError where a job fails, and ends the others.
     """
     wanted = cores() if workers is None else workers
-    engine: Pool[tuple[K, Callable[[], T]], T] = Pool(min(wanted, len(jobs)), limits or Limits(), _called)
+    engine = Pool(min(wanted, len(jobs)), limits or Limits(), _called)
 
     def ended() -> Iterator[tuple[K, T]]:
         waiting, running = deque(jobs.items()), 0

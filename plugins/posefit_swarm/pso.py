@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from posefit.plugin import Array, Space, at_least, between, displacement, draw_population, positive
+from posefit.plugin import Array, Space, at_least, between, check_tell, displacement, draw_population, positive
 from posefit_swarm.sapso import REDRAWS, Rows, first_velocities, fly, limited, redrawn
 
 
@@ -35,17 +35,21 @@ class PSO:
         at_least("population_size", population_size, 1)
         between("phi", phi, 4.0, math.inf, ends=False)
         positive("alpha", alpha)
-        self.space, self.rng, self.phi, self.chi, self.alpha = space, rng, phi, constriction(phi), alpha
+        self.space, self.rng, self.waiting = space, rng, 0
+        self.phi, self.chi, self.alpha = phi, constriction(phi), alpha
         self.x = draw_population(space, rng, population_size)
         self.v = first_velocities(space, rng, population_size, alpha)
         self.pbest, self.pbest_cost = self.x.copy(), np.full(population_size, np.inf)
 
     def ask(self) -> Array:
         """Return the particles (n, d)."""
+        self.waiting = len(self.x)
         return self.x.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Remember the bests and move on."""
+        check_tell(self.waiting, proposals, costs)
+        self.waiting = 0
         better = costs < self.pbest_cost  # KENNEDY1995 (pbest, gbest)
         self.pbest[better], self.pbest_cost[better] = self.x[better], costs[better]
         self.v, self.x = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from posefit.plugin import Array, Space, at_least, draw_population
+from posefit.plugin import Array, Space, at_least, check_tell, draw_population
 
 
 class Random:
@@ -16,11 +16,14 @@ class Random:
 
     def __init__(self, space: Space, rng: np.random.Generator, *, population_size: int = 40) -> None:
         at_least("population_size", population_size, 1)
-        self._space, self._rng, self._population_size = space, rng, population_size
+        self._space, self._rng, self._population_size, self._waiting = space, rng, population_size, 0
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
+        self._waiting = self._population_size
         return draw_population(self._space, self._rng, self._population_size)
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Learn nothing."""
+        check_tell(self._waiting, proposals, costs)
+        self._waiting = 0

@@ -10,7 +10,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.plugin import Array, Space, at_least, between, displacement, draw_population, positive, wrap
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    displacement,
+    draw_population,
+    first_that_works,
+    positive,
+    wrap,
+)
 
 REDRAWS = 10  # ours: of rand() for a particle that is no pose to the prior; then it stays. Interpretation S7
 
@@ -53,7 +64,7 @@ class SAPSO:
         between("inertia", inertia, 0.1, math.inf, ends=False)
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
-        self.space, self.rng, self.c, self.C = space, rng, 0, iterations
+        self.space, self.rng, self.c, self.C, self.waiting = space, rng, 0, iterations, 0
         self.T, self.gamma, self.T0 = temperature, cooling, stop_temperature
         self.A, self.acceleration, self.alpha = inertia, acceleration, alpha
         # the positions to be evaluated next; c counts iterations, and the paper's own c is c ln(10 A) / C
@@ -65,10 +76,12 @@ class SAPSO:
     def ask(self) -> Array:
         """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
         goes_on = self.c <= self.C and self.T > self.T0  # SAPSO A1.2
-        return self.moved.copy() if goes_on else self.moved[:0]
+        self.waiting = len(self.moved) if goes_on else 0
+        return self.moved[: self.waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the moves by their costs (N,), remember the bests, cool, and move on."""
+        check_tell(self.waiting, proposals, costs)
         with np.errstate(invalid="ignore"):  # infinity less infinity; nan is never accepted
             chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))  # Metropolis' criterion
         accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))  # SAPSO A1.2d
@@ -79,7 +92,7 @@ class SAPSO:
             self.T *= self.gamma  # SAPSO A1.2e
         if self.c < self.C:
             self.v, self.moved = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)
-        self.c += 1
+        self.c, self.waiting = self.c + 1, 0
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move."""
@@ -132,8 +145,7 @@ def redrawn(
     broken = np.flatnonzero(~allowed(v, moved))  # SAPSO A1.2c
     if len(broken):
         again = step(np.repeat(broken, redraws))
-        works = allowed(*again).reshape(len(broken), redraws)
-        first, any_works = redraws * np.arange(len(broken)) + works.argmax(axis=1), works.any(axis=1, keepdims=True)
-        v[broken] = np.where(any_works, again[0][first], 0.0)
-        moved[broken] = np.where(any_works, again[1][first], x[broken])
+        works, shape = allowed(*again).reshape(len(broken), redraws), (len(broken), redraws, -1)
+        v[broken] = first_that_works(again[0].reshape(shape), works, 0.0)
+        moved[broken] = first_that_works(again[1].reshape(shape), works, x[broken])
     return v, moved

@@ -61,7 +61,7 @@ class TrackFilter:
 
     def frame(self, observation: Observation) -> Frame:
         """Return the next frame."""
-        self._seconds, self._cpu_seconds = time.perf_counter(), time.process_time()
+        start = time.perf_counter()
         switching, usable = self.switching, observation.usable
         views = [lines_of(silhouette.mask) if usable else None for silhouette in observation.silhouettes]
         blind = all(lines is None for lines in views)
@@ -88,7 +88,7 @@ class TrackFilter:
         ]
         joints = np.array([view.points for view in measured_or_predicted])
         details: dict[str, Any] = {"joints": joints, "confidence": np.array([view.confidence for view in measured])}
-        details["detection_seconds"] = time.perf_counter() - self._seconds
+        details["detection_seconds"] = time.perf_counter() - start
         if self._patent:  # Interpretation V9
             measured = measured_or_predicted
 
@@ -181,9 +181,9 @@ class TrackFilter:
         if belief is not None:
             models |= {"probabilities": belief.probabilities}
             activity = most_probable(switching.topology.activities, switching.active, belief.probabilities)
-        seconds, cpu_seconds = time.perf_counter() - self._seconds, time.process_time() - self._cpu_seconds
-        figures = pose, place, float(costs[0]), counts[:, 0], evaluations, seconds, costs
-        self._latest = Frame(*figures, details={**details, **models}, cpu_seconds=cpu_seconds, activity=activity)
+        cost = float(costs[0])
+        figures = pose, place, cost, counts[:, 0], evaluations, np.array([[evaluations, cost]])
+        self._latest = Frame(*figures, details={**details, **models}, activity=activity)
         return self._latest
 
 

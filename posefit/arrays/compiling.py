@@ -1,28 +1,68 @@
-"""Where numba keeps what it compiled: a folder for each state of posefit's source, so that nothing there is stale.
+"""Where numba keeps what it compiled: a folder for each state of a module, so that nothing there is stale.
 
 numba's own cache looks at the one file that a function stands in, and what is compiled holds copies of functions and
-constants of others. So the folder's name is a digest of posefit's source, of the function's own package and of numba's
-version. It is in NUMBA_CACHE_DIR where that is set, else in the user's cache.
+constants of others. So the folder's name is a digest of all of these and of numba's version. It is in NUMBA_CACHE_DIR
+where that is set, else in the user's cache.
 """
 
 import hashlib
+import logging
+import multiprocessing
 import os
+import pickle
 import shutil
+import sys
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-from posefit.version import NOT_IN_RESULTS, source_digest
-
 config: Any = numba.config
-MAX_FOLDERS = 32  # of a user's cache: those of older sources are removed
+MAX_FOLDERS = 256  # of a user's cache: those of older sources are removed
+
+
+class _Announcement(event.Listener):  # type: ignore[misc]
+    """Logs once that a function of posefit's is compiled, but not in a process that another one started."""
+
+    announced = multiprocessing.parent_process() is not None
+
+    def on_start(self, event: Any) -> None:
+        """Log a warning, which is printed on stderr unless logging is configured otherwise."""
+        if not self.announced and event.data["dispatcher"].py_func.__module__.startswith("posefit"):
+            self.announced = True
+            message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
+            logging.getLogger("posefit").warning(message)
+
+    def on_end(self, event: Any) -> None:
+        """Say nothing."""
+
+
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
+
+
+class CheckedFile(IndexDataCacheFile):
+    """A file of numba's cache that begins with a digest of the rest: what is damaged is never run."""
+
+    def _save_data(self, name: str, data: Any) -> None:
+        dumped = self._dump(data)  # type: ignore[no-untyped-call]
+        with self._open_for_write(self._data_path(name)) as file:  # type: ignore[no-untyped-call]
+            file.write(hashlib.sha256(dumped).digest() + dumped)
+
+    def _load_data(self, name: str) -> Any:
+        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
+        digest, dumped = content[:32], content[32:]
+        if hashlib.sha256(dumped).digest() != digest:
+            raise ValueError(f"{name} is damaged")
+        return pickle.loads(dumped)
 
 
 class TolerantCache(FunctionCache):
-    """numba's cache, for which a file that is empty, cut off or cannot be written is a miss.
+    """numba's cache, for which a file that is damaged, or cannot be read or written, is a miss.
 
     Each signature has an index of its own: of one index two processes may write, one loses what the other compiled.
     """
@@ -31,7 +71,7 @@ class TolerantCache(FunctionCache):
         """Use the index of a signature."""
         base = f"{self._impl.filename_base}-{hashlib.sha256(str(sig).encode()).hexdigest()[:12]}"
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = IndexDataCacheFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
+        self._cache_file = CheckedFile(self.cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled for a signature; None where it is not there."""
@@ -50,12 +90,31 @@ class TolerantCache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
+@lru_cache
+def _folder(module: str) -> str:
+    """Return the name of the folder of a module's functions: a digest of all that what is compiled has copies of.
+
+    That is the module's source, the constants that it imports, and the same of the modules whose functions it imports.
+    """
+    digest, modules, own = hashlib.sha256(numba.__version__.encode()), [module], ("posefit", module.partition(".")[0])
+    for name in modules:
+        loaded = sys.modules[name]
+        digest.update(Path(str(loaded.__file__)).read_bytes())
+        for key, value in sorted(vars(loaded).items()):
+            if isinstance(value, np.ndarray):
+                digest.update(key.encode() + value.tobytes())
+            elif isinstance(value, int | float | str | tuple | np.generic) and not key.startswith("__"):
+                digest.update(f"{key} {value!r}".encode())
+            elif (owner := getattr(value, "__module__", None)) and owner.startswith(own) and owner not in modules:
+                modules.append(owner)
+    return f"{module}-{digest.hexdigest()[:16]}"
+
+
 def cached(dispatcher: Any) -> Any:
     """Return a function of numba's, which finds in its folder what any process compiled before."""
-    module = dispatcher.py_func.__module__
-    parts = source_digest("posefit", NOT_IN_RESULTS), source_digest(module), numba.__version__
-    name, before = hashlib.sha256("".join(parts).encode()).hexdigest()[:16], config.CACHE_DIR
+    before = config.CACHE_DIR
     try:
+        name = _folder(dispatcher.py_func.__module__)
         base = Path(before) if before else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "posefit"
         if not (base / name).is_dir():
             (base / name).mkdir(parents=True)

@@ -14,7 +14,8 @@ import click
 from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.group import Group
 from posefit.cli.motions import motions
-from posefit.cli.output import Command, say
+from posefit.cli.output import MISTAKE, Command, open_streams, say
+from posefit.errors import InputError
 from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
@@ -72,8 +73,12 @@ for _command in chain.from_iterable(GROUPS.values()):
 
 def run() -> None:
     """Run the command that was asked for, and end the process even where a plugin left a thread running."""
+    open_streams()
     try:
         main()
+    except InputError as error:  # outside of any command, such as --help to a full disk
+        say(f"posefit: {error}")
+        raise SystemExit(MISTAKE) from None
     except SystemExit as end:
         others = (one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread())
         left = [one for one in others if not one.name.startswith(f"{POOL}_")]

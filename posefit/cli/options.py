@@ -87,6 +87,7 @@ FRAMES = click.option(
     help="Only these frames: of footage as filmed, of a motion after resampling.",
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+QUIET = click.option("--quiet", is_flag=True, help="No messages and no bars, only the result.")
 EXTRACTION = (
     click.option(
         "--extraction",
@@ -111,7 +112,7 @@ TRACK: tuple[Any, ...] = (
     click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
     click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
     click.option("--verbose", is_flag=True, help="Print all figures, not three lines."),
-    click.option("--quiet", is_flag=True, help="No messages and no bars, only the result."),
+    QUIET,
     JSON,
 )
 ENGINE = (
@@ -125,12 +126,10 @@ ENGINE = (
 )
 
 
-HEADINGS = {  # the options of a track in its help, by their names in Python
-    "What is seen": "live asf camera up unit rate view_degrees size fps frames frame height label holes",
+HEADINGS = {  # of the flags that are no options of a track, by their names in Python
+    "What is seen": "live frame frames",
+    "Method and budget": "without_subject",
     "How the person is taken out of video": "extraction background roi ignore width",
-    "Method and budget": "method settings train without_subject evaluations population_size iterations ask_seconds "
-    "seed threads device",
-    "How it is followed": "translation first_pose restarts body_frames hypotheses smooth passes",
     "Results": "out force resume verbose quiet as_json",
 }
 
@@ -142,8 +141,16 @@ class TrackCommand(click.Command):
         """Write the options: those of no heading last."""
         flags = [one for one in self.get_params(context) if isinstance(one, click.Option)]
         records = {one.name: record for one in flags if (record := one.get_help_record(context))}
-        for heading, names in HEADINGS.items():
-            if rows := [records.pop(name) for name in names.split() if name in records]:
+        sections: dict[str, list[str]] = {}
+        heading = ""
+        for field in fields(TrackOptions):
+            heading = declared(field).heading or heading
+            if declared(field).flag != "":
+                sections.setdefault(heading, []).append(field.name)
+        for heading, listed in HEADINGS.items():
+            sections.setdefault(heading, []).extend(listed.split())
+        for heading, names in sections.items():
+            if rows := [records.pop(name) for name in names if name in records]:
                 with formatter.section(heading):
                     formatter.write_dl(rows)
         with formatter.section("Others"):

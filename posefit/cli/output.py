@@ -1,16 +1,73 @@
 """Where commands say what they do: messages and progress go to stderr, results alone to stdout."""
 
+import io
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any
 
 import click
 
 from posefit.errors import InputError, printable
+from posefit.limits import allowed_bytes
 
 MISTAKE = 2  # the exit status of a mistake, which is shown in one line
+
+
+class _Messages(io.TextIOWrapper):
+    """Standard error: what cannot be written to it is lost, and the work goes on."""
+
+    def write(self, text: str) -> int:
+        """Write a text, or lose it."""
+        with suppress(OSError):
+            super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what is buffered, or lose it."""
+        with suppress(OSError):
+            super().flush()
+
+
+class _Results(io.TextIOWrapper):
+    """Standard output: that a result cannot be written to it is a mistake. Whoever closes a pipe wants no more."""
+
+    def write(self, text: str) -> int:
+        """Write a text. Raises InputError where there is no room."""
+        with _room():
+            return super().write(text)
+
+    def flush(self) -> None:
+        """Write what is buffered. Raises InputError where there is no room."""
+        with _room():
+            super().flush()
+
+
+@contextmanager
+def _room() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115, as long as the process lives
+        reason = error.strerror or error
+        raise InputError(f"standard output: expected room to write results to, got {reason}") from None
+
+
+def open_streams() -> None:
+    """Open the standard streams that are closed, on nothing, and let no full one end the work."""
+    for number, (name, kind) in enumerate((("stdin", None), ("stdout", _Results), ("stderr", _Messages))):
+        stream = getattr(sys, name)
+        if stream is None and os.open(os.devnull, os.O_RDWR) == number:  # the lowest one that is free
+            stream = open(number, "w" if kind else "r", encoding="utf-8")  # noqa: SIM115, as long as the process lives
+        if kind is not None and isinstance(stream, io.TextIOWrapper):
+            lines, unbuffered = stream.line_buffering or kind is _Messages, stream.write_through
+            encoding, errors = stream.encoding, stream.errors
+            stream = kind(stream.detach(), encoding, errors, line_buffering=lines, write_through=unbuffered)
+        setattr(sys, name, stream)
+        setattr(sys, f"__{name}__", stream)
 
 
 def say(message: str) -> None:
@@ -25,20 +82,30 @@ class Command(click.Command):
         """Run a command."""
         try:
             return super().invoke(context)
-        except (click.UsageError, InputError, OSError, ImportError) as error:
+        except (click.UsageError, InputError, OSError, ImportError, MemoryError) as error:
             unnamed = isinstance(error, OSError) and error.filename is None  # a fault, no file that a user named
             if unnamed or context.params.get("debug"):
                 raise
-            message = error.format_message() if isinstance(error, click.UsageError) else str(error)
-            say(f"posefit: {' '.join(message.split())}")
+            say(f"posefit: {' '.join(_mistake(error).split())}")
             context.exit(MISTAKE)
 
 
+def _mistake(error: BaseException) -> str:
+    """Return what a user reads of an error."""
+    if isinstance(error, click.UsageError):
+        return error.format_message()
+    if isinstance(error, OSError) and isinstance(error.filename, str):
+        return f"{error.filename}: expected a file or folder that can be used, got {error.strerror}"
+    if isinstance(error, MemoryError):
+        return f"expected work that fits {allowed_bytes() / 1e9:.3g} GB of memory, got {error or 'more'}"
+    return str(error)
+
+
 def progress(steps: Iterator[Any], count: int, unit: str = "frame") -> Iterator[Any]:
-    """Yield steps, of which there are `count`, with a bar on stderr."""
+    """Yield steps, of which there are `count`, with a bar on stderr where that is a terminal."""
     from tqdm import tqdm
 
-    return iter(tqdm(steps, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True))
+    return iter(tqdm(steps, total=count, unit=unit, file=sys.stderr, dynamic_ncols=True, disable=None))
 
 
 @contextmanager

@@ -74,7 +74,7 @@ def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> Non
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["optimiser", "prior", "tracker", "segmenter"]))
+@click.argument("kind", metavar="KIND")
 @click.argument("name")
 @click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Check it with this setting.")
 @click.option("--only", multiple=True, metavar="RULE", help="Check this rule alone; repeatable.")
@@ -85,9 +85,14 @@ def check(
 ) -> None:
     """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one.
 
+    KIND is optimiser, prior, tracker or segmenter.
     The rules are checked in a process of their own; what the plugin prints goes to stderr. Once two rules fail for the
     same cause, the others are not checked.
     """
+    from posefit.fitting.check import one_of
+    from posefit.registry import KINDS
+
+    one_of("kind", kind, KINDS)
     with results_alone():
         from posefit.testing.process import check_in_process
 

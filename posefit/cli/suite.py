@@ -10,7 +10,7 @@ import click
 from posefit.cli.group import Group
 from posefit.cli.options import parsed_by
 from posefit.cli.output import progress, results_alone, say
-from posefit.errors import InputError
+from posefit.errors import InputError, printable
 from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
@@ -140,5 +140,5 @@ def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     if out is not None:
         write_iohprofiler(suite_runs(runs), out)
         say(f"written to {out}: IOHprofiler's files")
-    for line in [json.dumps([asdict(one) for one in scores])] if as_json else score_lines(scores):
+    for line in [json.dumps([asdict(one) for one in scores])] if as_json else map(printable, score_lines(scores)):
         click.echo(line)

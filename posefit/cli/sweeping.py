@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
-from posefit.cli.options import ENGINE, options
+from posefit.cli.options import ENGINE, JSON, QUIET, options
 from posefit.cli.output import results_alone, say
+from posefit.errors import printable
 
 LINES = 1000  # that are printed at a time
 
@@ -25,7 +26,8 @@ LINES = 1000  # that are printed at a time
 )
 @click.option("--keep-old", is_flag=True, help="Rows of another version of posefit or a plugin count, too.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@QUIET
+@JSON
 @click.pass_context
 def sweep(
     context: click.Context,
@@ -36,6 +38,7 @@ def sweep(
     dry_run: bool,
     retry_quarantined: bool,
     keep_old: bool,
+    quiet: bool,
     as_json: bool,
     **places: Any,
 ) -> None:
@@ -46,27 +49,30 @@ def sweep(
     Exit status 1 where cells were quarantined after three attempts, 130 where it was stopped.
     """
     from posefit.sweep import command
-    from posefit.sweep.engine import TRIAL_SECONDS, Limits
+    from posefit.sweep.engine import Limits
     from posefit.sweep.plan import Plan
 
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
-    start = command.engine(Limits(min(seconds, TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
+    start = command.engine(Limits(min(seconds, command.TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
     if dry_run:
         lines, some = command.preview(plan, out, shard, start, as_json), ""
         while True:
             with results_alone() if as_json else nullcontext():  # a plugin may print, too
-                some = "\n".join(islice(lines, LINES))
+                some = "\n".join(line if as_json else printable(line) for line in islice(lines, LINES))
             if not some:
                 return
             click.echo(some)
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        how: dict[str, Any] = {"shard": shard, "retry_quarantined": retry_quarantined, "keep_old": keep_old}
+        how = {"retry_quarantined": retry_quarantined, "keep_old": keep_old, "quiet": quiet}
         command.file_of(shard)
-        cells = Plan.read(plan)
-        tally = command.swept(cells, out, start(), say, **how)  # without an engine there is no folder either
-    click.echo(json.dumps({"out": out, **vars(tally)}) if as_json else command.tally_text(tally, out))
+        cells, tell = Plan.read(plan), (lambda _: None) if quiet else say
+        tally = command.swept(cells, out, start(), tell, shard=shard, **how)  # without an engine there is no folder
+    for line in (
+        [json.dumps({"out": out, **vars(tally)})] if as_json else map(printable, command.tally_lines(tally, out))
+    ):
+        click.echo(line)
     context.exit(130 if tally.stopped else 1 if tally.quarantined else 0)
 
 
@@ -76,7 +82,7 @@ def sweep(
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@JSON
 def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:
     """Write the results of sweeps to DIR as one page that any browser opens, offline.
 
@@ -89,5 +95,5 @@ def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: An
     from posefit.report.write import leaderboard_lines, write_report
 
     summary = write_report(ledger, out, warn=say, **others)
-    for line in [json.dumps(summary)] if as_json else leaderboard_lines(summary):
+    for line in [json.dumps(summary)] if as_json else map(printable, leaderboard_lines(summary)):
         click.echo(line)

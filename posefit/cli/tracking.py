@@ -1,6 +1,7 @@
 """`posefit track`, `fit` and `extract`."""
 
 import json
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -35,6 +36,7 @@ def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options
     """  # noqa: D301
     from posefit.tracking.front import track as run
 
+    logging.getLogger("posefit").disabled = quiet
     shown = Progress() if quiet else Progress(say, progress)
     if live is not None:
         return _track_live(live, as_json, options, shown)
@@ -58,6 +60,7 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """  # noqa: D301
     from posefit.tracking.front import fit as run
 
+    logging.getLogger("posefit").disabled = quiet
     with results_alone() if as_json else nullcontext():
         result = run(progress=Progress() if quiet else Progress(say), **_arguments(options))
     degrees = [round(math.degrees(angle), 6) for angle in result.pose]
@@ -84,7 +87,7 @@ def _print(
     summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
 ) -> None:
     """Print a track's summary: as JSON with something more, in three lines, or whole."""
-    from posefit.tracking.table import brief, table
+    from posefit.output.text import brief, table
 
     if as_json:
         click.echo(json.dumps({**summary, **more}))
@@ -104,7 +107,7 @@ def _print(
 @click.argument("video")
 @click.option("--out", required=True, metavar="DIR", help="New folder for masks.npz, preview.mp4 and quality.csv.")
 @options(EXTRACTION)
-@click.option("--set", "settings", multiple=True, metavar="SETTING=VALUE", help="Of the segmenter; repeatable.")
+@click.option("--set", "settings", multiple=True, metavar="[NAME.]SETTING=VALUE", help="Of the segmenter; repeatable.")
 @FRAMES
 @JSON
 def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:

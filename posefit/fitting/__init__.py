@@ -8,8 +8,12 @@
 | where a body stands; the cost of proposals for one observation, and at smaller sizes. SAPSO (5) | problem.py |
 | what an optimiser is, the base of adapters of other libraries, and the loop that drives them | optimiser.py |
 | what a tracker is; the search a frame around a prediction. SAPSO section 4 | tracker.py |
+| weights of costs, how many samples they are worth | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
-| what plugins return is checked and their frames are audited | validation.py |
+| how likely a detector's landmarks are | landmarks.py |
+| checks of what plugins return; the audit of their frames | validation.py |
 | the build of one person, fitted with the poses | shape.py |
+| CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |
+| checks of settings; arrays of other libraries | check.py, exchange.py |
 """

@@ -1,5 +1,6 @@
-"""The box that an optimiser searches, as far as it knows it, and functions on it; those that draw always end."""
+"""The box that an optimiser searches, and functions on it; those that draw always end."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,9 +9,10 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.fitting.check import whole
 
 REDRAWS = 100  # Interpretation S7
-BATCH = 8  # ours: after the first, so many redraws are made at once
+BATCH = 8  # ours: redraws that `sample_normal` makes at once
 REPAIR_STEPS = 32  # ours: points that `repair` tries along its line
 
 
@@ -24,7 +26,7 @@ class Start:
 
 
 class Space(Protocol):
-    """The box [-1, 1]^d, part of which is feasible: all that an optimiser knows of it. `SearchSpace` is one."""
+    """The box [-1, 1]^d, part of which is feasible, as an optimiser knows it. `SearchSpace` is one."""
 
     @property
     def dimensions(self) -> int:
@@ -58,17 +60,6 @@ def displacement(space: Space, origin: Array, target: Array) -> Array:
     return wrap(space, target - origin)
 
 
-def extent(space: Space) -> tuple[Array, Array]:
-    """Return the middle of the box and half its sides (d,), in radians, metres and latents.
-
-    They are 0 and 1 for a space that has no such units.
-    """
-    centre, half = getattr(space, "centre", None), getattr(space, "half", None)
-    if centre is None or half is None:
-        return np.zeros(space.dimensions), np.ones(space.dimensions)
-    return centre, half
-
-
 def converted(space: Space, proposals: Array, origin: Space) -> Array:
     """Return the proposals (n, d) in `space` that stand for the poses of these in `origin`, the space before.
 
@@ -85,8 +76,10 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
     itself: the coordinates of (6) are independent and the box is a product, so that this has the distribution of
     redrawing the whole proposal. One still out of the box is then folded back into it. An infeasible proposal is
     redrawn as a whole, and then becomes the start's mean, or the copy of a feasible one. Where nothing around the
-    start is feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is.
+    start is feasible, the population is drawn from anywhere. Raises ValueError where nothing at all is, and where the
+    count is no whole number above 0.
     """
+    count = whole("count", count, 1)
     drawn = _drawn(space, space.start, rng, count)
     if drawn is None and space.start is not None:
         drawn = _drawn(space, None, rng, count)
@@ -96,25 +89,39 @@ def draw_population(space: Space, rng: np.random.Generator, count: int) -> Array
 
 
 def _drawn(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array | None:
-    drawn = np.empty((count, space.dimensions))
-    wanted = np.arange(count)
-    for _ in range(REDRAWS):
-        drawn[wanted] = _sample(space, start, rng, len(wanted))
-        wanted = wanted[~space.feasible(drawn[wanted])]
-        if not len(wanted):
-            return drawn
+    drawn, broken = _redrawn(space, lambda rows: _sample(space, start, rng, len(rows)), count)
     if start is not None and space.feasible(start.mean[None])[0]:
-        drawn[wanted] = start.mean
-        return drawn
-    feasible = np.setdiff1d(np.arange(count), wanted)
-    if not len(feasible):
+        drawn[broken] = start.mean
+    elif len(broken) == count > 0:
         return None
-    drawn[wanted] = drawn[rng.choice(feasible, len(wanted))]
+    elif len(broken):
+        drawn[broken] = drawn[rng.choice(np.setdiff1d(np.arange(count), broken), len(broken))]
     return drawn
 
 
+def _redrawn(
+    space: Space, draw: Callable[[NDArray[np.int64]], Array], count: int, batch: int = 1
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return what `draw` draws for rows (count,), each redrawn until it is feasible, and the rows that never are."""
+    drawn = draw(np.arange(count))
+    broken, remaining = np.flatnonzero(~space.feasible(drawn)), REDRAWS - 1
+    while remaining and len(broken):
+        shape = len(broken), min(remaining, batch)
+        again = draw(np.repeat(broken, shape[1]))
+        works = space.feasible(again).reshape(shape)
+        drawn[broken] = first_that_works(again.reshape(*shape, -1), works, drawn[broken])
+        broken, remaining = broken[~works.any(axis=1)], remaining - shape[1]
+    return drawn, broken
+
+
+def first_that_works(attempts: Array, works: NDArray[np.bool_], otherwise: Array | float) -> Array:
+    """Return the first of each row's attempts (n, k, d) that works (n, k), and where none does `otherwise` (n, d)."""
+    first = attempts[np.arange(len(works)), works.argmax(axis=1)]
+    return np.where(np.asarray(works.any(axis=1))[:, None], first, otherwise)
+
+
 def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: int) -> Array:
-    """Return proposals (count, d) from the start or uniform, in the box, whatever the prior says of them."""
+    """Return proposals (count, d) from the start or uniform, in the box, feasible or not."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
     drawn = wrap(space, rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
@@ -130,22 +137,15 @@ def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: 
 def sample_normal(space: Space, rng: np.random.Generator, means: Array, spread: Array) -> Array:
     """Return a normal draw (n, d) around each of n feasible means, standard deviations `spread` (d,) or (n, d).
 
-    A coordinate that leaves the box is folded back into it, as at a mirror; what the prior refuses is redrawn
+    A coordinate that leaves the box is folded back into it, as at a mirror; what is infeasible is redrawn
     at most 100 times and then stays at its mean.
     """
     spread = np.broadcast_to(spread, means.shape)
-    drawn = fold(space, means + spread * rng.standard_normal(means.shape))
-    broken = np.flatnonzero(~space.feasible(drawn))
-    left = REDRAWS - 1
-    while left > 0 and len(broken):
-        many = min(left, BATCH)
-        rows = np.repeat(broken, many)
-        again = fold(space, means[rows] + spread[rows] * rng.standard_normal((len(rows), means.shape[1])))
-        works = space.feasible(again).reshape(-1, many)
-        repaired = works.any(axis=1)
-        first = many * np.flatnonzero(repaired) + works[repaired].argmax(axis=1)
-        drawn[broken[repaired]] = again[first]
-        broken, left = broken[~repaired], left - many
+
+    def draw(rows: NDArray[np.int64]) -> Array:
+        return fold(space, means[rows] + spread[rows] * rng.standard_normal((len(rows), means.shape[1])))
+
+    drawn, broken = _redrawn(space, draw, len(means), BATCH)
     drawn[broken] = means[broken]
     return drawn
 
@@ -167,10 +167,9 @@ def repair(space: Space, proposals: Array, home: Array) -> Array:
     broken = np.flatnonzero(~space.feasible(repaired))
     if len(broken):
         home = np.broadcast_to(home, repaired.shape)[broken]
-        way = displacement(space, home, repaired[broken])
-        shares = np.arange(REPAIR_STEPS - 1, 0, -1) / REPAIR_STEPS
-        line = np.clip(wrap(space, home + shares[:, None, None] * way), -1.0, 1.0)
+        shares = np.arange(REPAIR_STEPS - 1, 0, -1)[:, None] / REPAIR_STEPS
+        line = home[:, None] + shares * displacement(space, home, repaired[broken])[:, None]
+        line = np.clip(wrap(space, line), -1.0, 1.0)
         works = space.feasible(line.reshape(-1, space.dimensions)).reshape(line.shape[:2])
-        farthest = line[works.argmax(axis=0), np.arange(len(broken))]
-        repaired[broken] = np.where(np.asarray(works.any(axis=0))[:, None], farthest, home)
+        repaired[broken] = first_that_works(line, works, home)
     return repaired

@@ -6,7 +6,7 @@ from numbers import Integral, Real
 from typing import Any, Literal, get_args, get_origin
 
 from posefit.errors import InputError
-from posefit.reading import cut, quoted
+from posefit.reading import cut, quoted, suggestion
 
 MAX_BITS = 1_024  # of a whole number, so that it can be written down
 
@@ -53,16 +53,18 @@ def finite_number(name: str, value: object) -> float:
 
 def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
     """Return two values. Raises ValueError where it is anything else; `what` says what was expected."""
-    if not isinstance(value, tuple | list) or len(value) != 2:
+    values = value.tolist() if hasattr(value, "tolist") else value  # an array
+    if not isinstance(values, tuple | list) or len(values) != 2:
         raise InputError(f"{name} must be {what}, got {quoted(value)}")
-    return value[0], value[1]
+    return values[0], values[1]
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:
     """Return nothing. Raises ValueError listing the choices where a value is none of them."""
     known = tuple(known)
     if value not in known:
-        raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}")
+        hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
+        raise InputError(f"{name} must be one of {', '.join(map(str, known))}, got {quoted(value)}{hint}")
 
 
 def choices(settings: object, values: Mapping[str, object]) -> None:

@@ -14,7 +14,9 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, displacement, draw_population, repair, wrap
 from posefit.fitting.check import at_least, positive
-from posefit.fitting.optimiser import finite_costs
+from posefit.fitting.optimiser import check_tell, finite_costs
+from posefit.fitting.weights import effective_sample_size
+from posefit.reading import cut
 
 ALPHA_COV = 2.0
 LAG = 0.1  # of the decomposition, appendix B.2
@@ -47,7 +49,7 @@ def constants(dimensions: int, population: int) -> tuple[Array, Rates]:
     """Return the weights (lambda,) of a population of 4 or more, best first, and the rates that follow from them."""
     n, mu = dimensions, population // 2
     raw = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))  # HANSEN2016 (49)
-    mu_eff, mu_eff_minus = (float(half.sum() ** 2 / (half**2).sum()) for half in (raw[:mu], raw[mu:]))  # HANSEN2016 (8)
+    mu_eff, mu_eff_minus = effective_sample_size(raw[:mu]), effective_sample_size(raw[mu:])  # HANSEN2016 (8)
     c_sigma = (mu_eff + 2.0) / (n + mu_eff + 5.0)  # HANSEN2016 (55)
     d_sigma = 1.0 + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (n + 1.0)) - 1.0) + c_sigma
     c_c = (4.0 + mu_eff / n) / (n + 4.0 + 2.0 * mu_eff / n)  # HANSEN2016 (56)
@@ -156,13 +158,15 @@ class CMAES:
         if population_size != 0:
             at_least("population_size", population_size, 5)
         positive("spread", spread)
-        self.space, self.rng = space, rng
+        self.space, self.rng, self.waiting = space, rng, 0
         self.population_size = population_size or max(default_population_size(space.dimensions), 5)
         self.anywhere = np.full(space.dimensions, spread)
         self._start(self.anywhere if space.start is None else space.start.spread)
 
     def _start(self, spread: Array) -> None:
         """Start around a feasible prediction, or else around a fresh draw."""
+        if not (np.isfinite(spread).all() and (spread >= 0.0).all() and spread.any()):
+            raise InputError(f"spread must be above 0 in some coordinate and negative in none, got {cut(str(spread))}")
         start, self.home = self.space.start, draw_population(self.space, self.rng, 1)[0]
         if start is not None and self.space.feasible(start.mean[None])[0]:
             self.home = start.mean
@@ -181,12 +185,13 @@ class CMAES:
 
     def ask(self) -> Array:
         """Return the next population (n, d)."""
+        self.waiting = len(self.asked)
         return self.asked.copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Adapt mean, step size and covariance, and start again where the search has come to an end."""
-        if len(proposals) != self.population_size:
-            raise InputError(f"tell must get a population of {self.population_size}, got {len(proposals)}")
+        check_tell(self.waiting, proposals, costs)
+        self.waiting = 0
         known, mean = finite_costs(costs), self.strategy.mean
         self.home = self.asked[known.argmin()]
         if self.space.periodic.any():  # the mean goes on past the end of a circle, and so must what it learns from

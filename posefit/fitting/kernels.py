@@ -13,13 +13,13 @@ NEAREST = 1e-3  # metres; a joint that is nearer, or behind the camera, counts a
 def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders, translations):
     """Move translations (n, 3) to where joints (n, 27, 3) fill the borders (views, 4): left, top, right, bottom."""
     views, count = borders.shape[0], joints.shape[1]
-    own = np.empty((views, count, 3))  # in the camera's frame, as if the root were at the world's origin
+    relative = np.empty((views, count, 3))  # in the camera's frame, as if the root were at the world's origin
     reach, outermost = np.empty(4), np.empty(4, np.int64)
     for i in range(joints.shape[0]):
         for v in range(views):
             for j in range(count):
                 for a in range(3):
-                    own[v, j, a] = (
+                    relative[v, j, a] = (
                         rotations[v, a, 0] * joints[i, j, 0]
                         + rotations[v, a, 1] * joints[i, j, 1]
                         + rotations[v, a, 2] * joints[i, j, 2]
@@ -38,9 +38,9 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
                 reach[:] = -np.inf
                 outermost[:] = 0
                 for j in range(count):
-                    depth = 1.0 / max(own[v, j, 2] + z, NEAREST)
-                    across = focals[v, 0] * (own[v, j, 0] + x) * depth
-                    down = focals[v, 1] * (own[v, j, 1] + y) * depth
+                    depth = 1.0 / max(relative[v, j, 2] + z, NEAREST)
+                    across = focals[v, 0] * (relative[v, j, 0] + x) * depth
+                    down = focals[v, 1] * (relative[v, j, 1] + y) * depth
                     wide = scale * radii[j] * depth
                     for side, value in enumerate((wide - across, wide - down, wide + across, wide + down)):
                         if value > reach[side]:
@@ -54,7 +54,9 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
                     rx = (f * R[axis, 0] - b * R[2, 0]) / scale
                     ry = (f * R[axis, 1] - b * R[2, 1]) / scale
                     rz = (f * R[axis, 2] - b * R[2, 2]) / scale
-                    gap = b * (own[v, j, 2] + o[2]) - f * (own[v, j, axis] + o[axis]) - sign * scale * radii[j]
+                    gap = (
+                        b * (relative[v, j, 2] + o[2]) - f * (relative[v, j, axis] + o[axis]) - sign * scale * radii[j]
+                    )
                     gap /= scale
                     xx += rx * rx
                     xy += rx * ry
@@ -76,7 +78,7 @@ def move_to_borders(joints, radii, rotations, offsets, focals, centres, borders,
 
 @jit
 def add_components(latents, components, angles):
-    """Add components (m, k) times latents (n, m) to angles (n, k), one after the other: a row's bits are its own."""
+    """Add components (m, k) times latents (n, m) to angles (n, k), in one order: a row always has the same bits."""
     for i in range(latents.shape[0]):
         for m in range(latents.shape[1]):
             latent = latents[i, m]
@@ -85,22 +87,11 @@ def add_components(latents, components, angles):
 
 
 @jit
-def spreads_away(latents, spread, away):
-    """Write the distance of latents (n, m) from the middle (n,), in spreads (m,)."""
-    for i in range(latents.shape[0]):
-        total = 0.0
-        for m in range(latents.shape[1]):
-            scaled = latents[i, m] / spread[m]
-            total += scaled * scaled
-        away[i] = np.sqrt(total)
-
-
-@jit
 def unpack_proposals(proposals, centre, half, anchor, mean, poses, translations, latents):
     """Write root angles, translations and latents of proposals (n, d); return whether all of them are finite.
 
-    Pitch and roll are added to the tilt that goes with the latents, the last coordinates, which `mean` (3 + m, 2) says
-    as `Tilt` does. The translation is searched where there are coordinates for it, else it is the anchor.
+    Pitch and roll are added to the tilt that belongs to the latents, the last coordinates, by `mean` (3 + m, 2) of a
+    `Tilt`. The translation is searched where there are coordinates for it, else it is the anchor.
     """
     first, total = proposals.shape[1] - latents.shape[1], 0.0
     for i in range(proposals.shape[0]):
@@ -117,21 +108,3 @@ def unpack_proposals(proposals, centre, half, anchor, mean, poses, translations,
         poses[i, 1] += min(max(pitch, mean[0, 0]), mean[1, 0])
         poses[i, 2] += min(max(roll, mean[0, 1]), mean[1, 1])
     return np.isfinite(total)
-
-
-@jit
-def within(proposals, centre, half, inside, latents):
-    """Write which proposals (n, d) lie in the box (n,), and the latents (n, m), their last coordinates, of all.
-
-    Returns whether all lie in it.
-    """
-    d = centre.size
-    first, everyone = d - latents.shape[1], True
-    for i in range(inside.size):
-        inside[i] = True
-        for j in range(d):
-            inside[i] &= abs(proposals[i, j]) <= 1.0
-        for j in range(first, d):
-            latents[i, j - first] = centre[j] + half[j] * proposals[i, j]
-        everyone &= inside[i]
-    return everyone

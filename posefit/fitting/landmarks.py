@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.weights import logistic
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, MIRROR, Skeleton
 from posefit.silhouette.rasteriser import NEAR
@@ -16,7 +17,7 @@ GROUPS = [np.array([JOINTS.index(side + bone) for side in "lr" for bone in bones
 MIRRORED = np.array(MIRROR)  # (27,) the joint that each is exchanged with
 DEVIATION = 0.05  # metres between a joint and its landmark; much longer distances count little more
 EXCHANGED = np.array([0.3, 0.13, 0.35])  # share of the frames in which left and right of each group are exchanged
-PERSISTENCE = 0.5  # correlation of that a thirtieth of a second later
+PERSISTENCE = 0.5  # correlation of exchanges a thirtieth of a second apart
 
 
 def landmark_likelihoods(
@@ -32,11 +33,10 @@ def landmark_likelihoods(
         pixels, depths = camera.project(joints)
         metres = np.maximum(depths, NEAR) / np.sqrt(camera.focal.prod())  # of a pixel
         for group in GROUPS:
-            both = [
-                np.log1p(0.5 * (_distances(pixels[:, group], view[same]) * metres[:, group] / DEVIATION) ** 2)
-                @ view[same, 2]
-                for same in (group, MIRRORED[group])
-            ]
+            both = []
+            for same in (group, MIRRORED[group]):
+                off = np.linalg.norm(pixels[:, group] - view[same, :2], axis=-1) * metres[:, group]
+                both.append(np.log1p(0.5 * (off / DEVIATION) ** 2) @ view[same, 2])
             groups.append(-np.stack(both, axis=-1))
     return np.stack(groups, axis=1)
 
@@ -58,27 +58,21 @@ def landmark_costs(likelihoods: Array, exchanged: Array | None = None) -> Array:
 
 
 def exchanged_next(exchanged: Array, seconds: float) -> Array:
-    """Return how likely groups (..., K) are exchanged `seconds` later, where they are now with a probability."""
+    """Return how likely groups (..., K) are exchanged `seconds` later, by how likely they are now."""
     usual = np.tile(EXCHANGED, exchanged.shape[-1] // len(GROUPS))
     return np.asarray(usual + PERSISTENCE ** (30.0 * seconds) * (exchanged - usual))
 
 
 def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
     """Return how likely groups (..., K) are exchanged, by `landmark_likelihoods` and how likely they were before."""
-    odds = np.log1p(-exchanged) - np.log(exchanged) + likelihoods[..., 0] - likelihoods[..., 1]
-    return np.asarray(1.0 / (1.0 + np.exp(np.clip(odds, -30.0, 30.0))))
+    return logistic(np.log(exchanged) - np.log1p(-exchanged) + likelihoods[..., 1] - likelihoods[..., 0])
 
 
 def side_odds(likelihoods: Array) -> float:
-    """Return the logarithm of the odds that legs and arms are on the sides of a pose, not on the other ones.
+    """Return the logarithm of the odds that legs and arms are on the sides of a pose, by its likelihoods (K, 2).
 
-    Of its `landmark_likelihoods` (K, 2). What says nothing adds 0, and each limb of each view at most the odds of its
-    usual share of exchanges.
+    Unknown landmarks add 0, and each limb of each view at most the odds of its usual share of exchanges.
     """
     limbs = np.arange(len(likelihoods)) % len(GROUPS) <= ARMS
-    usual, own = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
-    return float(landmark_costs(own[:, ::-1], usual) - landmark_costs(own, usual))
-
-
-def _distances(pixels: Array, landmarks: Array) -> Array:
-    return np.asarray(np.linalg.norm(pixels - landmarks[:, :2], axis=-1))
+    usual, limb_likelihoods = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
+    return float(landmark_costs(limb_likelihoods[:, ::-1], usual) - landmark_costs(limb_likelihoods, usual))

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.geometry.rotation import geodesic, rotation_from_joint_angles, rotation_from_root_angles, wrapped
 from posefit.geometry.skeleton import joint_distances
-from posefit.uncertainty.modes import nearer_mirrored
 
 LOST_MM = 150.0  # MPJPE above which a frame counts as lost
 
@@ -53,13 +52,13 @@ def pa_mpjpe_mm(truth: Array, joints: Array) -> Array:
     """
     target = truth - truth.mean(axis=1, keepdims=True)
     source = joints - joints.mean(axis=1, keepdims=True)
-    left, spread, right = np.linalg.svd(np.swapaxes(source, 1, 2) @ target)
-    sign = np.sign(np.linalg.det(left @ right))
-    left[:, :, -1] *= sign[:, None]  # a rotation, never a reflection
+    u, spread, vh = np.linalg.svd(np.swapaxes(source, 1, 2) @ target)
+    sign = np.sign(np.linalg.det(u @ vh))
+    u[:, :, -1] *= sign[:, None]  # a rotation, never a reflection
     spread[:, -1] *= sign
     size = (source**2).sum(axis=(1, 2))
     scale = spread.sum(axis=1) / np.where(size > 0.0, size, 1.0)
-    moved = scale[:, None, None] * (source @ left @ right)
+    moved = scale[:, None, None] * (source @ u @ vh)
     return np.asarray(1e3 * np.linalg.norm(target - moved, axis=-1).mean(axis=1))
 
 
@@ -67,15 +66,6 @@ def iou(areas: NDArray[np.int64]) -> Array:
     """Return the intersection over union (n,) of areas R, B, Y (n, 3); 1 where both are empty."""
     total = areas.sum(axis=1)
     return np.asarray(np.where(total > 0, areas[:, 2] / np.maximum(total, 1), 1.0))
-
-
-def swapped(truth: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether each frame (T,) comes nearer to the truth when the estimate is mirrored. Interpretation S15.
-
-    The mirror is the plane through the root that the hips face each other across; left and right trade names. In a
-    side view a pose and its mirror image have nearly one silhouette. Only joints that have a counterpart count.
-    """
-    return nearer_mirrored(truth, joints)
 
 
 def lost_rate(mpjpe: Array) -> float:

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, repair
 
-WORST = 1e15  # few libraries bear nan, infinity or the square of 1e300
+WORST = 1e15  # few libraries work with nan, infinity or the square of 1e300
 
 
 class Optimiser(Protocol):
@@ -55,6 +54,19 @@ def finite_costs(costs: Array) -> Array:
     return finite
 
 
+def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
+    """Return nothing. Raises InputError where `tell` gets anything else than a cost for each proposal of `ask`.
+
+    So many proposals wait for their costs; 0 before `ask`, and once they are told.
+    """
+    if not waiting:
+        raise InputError("tell must follow ask, got costs before proposals")
+    for name, values in (("costs", costs), ("proposals", proposals)):
+        if np.shape(values)[:1] != (waiting,):
+            came = len(values) if np.ndim(values) else "one number"
+            raise InputError(f"tell must get {waiting} {name}, got {came}")
+
+
 class Adapter(ABC):
     """Asks a library for proposals and tells it costs: infeasible proposals are repaired, and costs are finite.
 
@@ -81,10 +93,7 @@ class Adapter(ABC):
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Let the library learn the costs (n,). Raises ValueError where they are not those of what was asked for."""
-        if self._asked is None:
-            raise InputError("tell must follow ask, got costs before proposals")
-        if len(costs) != len(self._asked):
-            raise InputError(f"tell must get {len(self._asked)} costs, got {len(costs)}")
+        check_tell(0 if self._asked is None else len(self._asked), proposals, costs)
         self.learn(np.asarray(proposals), finite_costs(costs))
         self._asked = None
 
@@ -96,8 +105,7 @@ class Minimum:
     proposal: Array  # (d,) the best one
     cost: float
     evaluations: int
-    history: Array = field(repr=False)  # (populations,) best cost so far after each population
-    spent: NDArray[np.int64] = field(repr=False)  # (populations,) evaluations so far after each population
+    trace: Array = field(repr=False)  # (populations, 2) evaluations so far and best cost, after each population
 
 
 class BudgetError(InputError):
@@ -110,7 +118,7 @@ def populations(
     """Yield each population (n, d) that an optimiser proposes, with its costs (n,): the loop that every search is.
 
     The optimiser learns the costs before its next population is asked for. The search ends when it proposes none, or
-    one that would go over the budget, which is not evaluated. Raises BudgetError where the first one does, and
+    one beyond the budget, which is not evaluated. Raises BudgetError where the first one does, and
     TypeError where `evaluate` returns anything else than an array of costs (n,).
     """
     used = 0
@@ -131,7 +139,7 @@ def minimise(
 ) -> Minimum:
     """Return the best proposal of a search within a budget of whole populations.
 
-    `evaluate` gives the costs (n,) of proposals (n, d). A population that would go over `evaluations` is not
+    `evaluate` returns the costs (n,) of proposals (n, d). A population beyond `evaluations` is not
     evaluated. A cost that is nan never counts as best. A warning is given where an optimiser ends its search before
     half of the budget is used, unless it was built with the budget, `budget_known`: the schedules of some follow it.
     Raises BudgetError where the budget does not hold one population, and ValueError where every cost is nan.
@@ -147,11 +155,11 @@ def minimise(
 
 
 def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
-    """Return the best of the proposals (n, d) of populations, one or more, that come in turn with their costs (n,).
+    """Return the best of the proposals (n, d) of one population or more, each with its costs (n,).
 
     A cost that is nan never counts as best. Raises ValueError where every cost is nan.
     """
-    best, cost, used, history, spent = None, np.inf, 0, [], []
+    best, cost, used, trace = None, np.inf, 0, list[tuple[int, float]]()
     for proposals, costs in searched:
         used += len(proposals)
         lowest = costs.argmin()
@@ -160,8 +168,7 @@ def minimum_of(searched: Iterable[tuple[Array, Array]]) -> Minimum:
             least = float(costs[lowest])
         if best is None or math.isnan(cost) or least < cost:
             best, cost = proposals[lowest].copy(), least  # SAPSO (5)
-        history.append(cost)
-        spent.append(used)
+        trace.append((used, cost))
     if best is None or math.isnan(cost):
         raise InputError(f"costs must be numbers, got nan for all {used} proposals")
-    return Minimum(best, cost, used, np.array(history), np.array(spent))  # SAPSO A1.3
+    return Minimum(best, cost, used, np.array(trace))  # SAPSO A1.3

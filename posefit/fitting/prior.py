@@ -1,6 +1,7 @@
 """What a prior is: a space of joint angles with few coordinates, in the manner of scikit-learn.
 
-And how far the body tilts with them: the root is no part of a prior, but its pitch and roll go with the pose.
+And the tilt of the body that belongs to them: the root is no part of a prior, but its pitch and roll depend on the
+pose.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,13 +19,13 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.motion.motion import Motion
 
 RIDGE = 0.05  # ours: of the regression, where a latent's range is 2
-OVER = 0.75 * np.pi  # ours: radians to either side; who tilts so far turns over
+TURNS_OVER = 0.75 * np.pi  # ours: radians to either side, from which on any tilt is allowed
 
 
 class Latents(Protocol):
     """Maps joint angles (n, 63) to latents (n, m) and back: a `Prior` once it is fitted, or one that needs no fit.
 
-    `inverse_transform` and `feasible` must give the same bits for a row whatever rows stand beside it.
+    `inverse_transform` and `feasible` must return the same bits for a row whatever the other rows are.
     """
 
     low: Array  # (m,) the range of the latents, constraint 1
@@ -48,9 +49,6 @@ class Prior(Latents, Protocol):
 
     It is built as `factory(**settings)`, settings keyword-only. `low`, `high` and the methods beside `fit` may be used
     only after `fit`.
-
-    A prior whose joint angles are affine in the latents may say so: by an attribute `affine`, the weights (m, 63) that
-    latents are multiplied with and the angles (63,) where all of them are 0. Then a GPU decodes, where one draws.
     """
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
@@ -93,9 +91,9 @@ PriorFactory = Callable[..., Prior]
 
 @dataclass(frozen=True, eq=False)
 class Tilt:
-    """The pitch and roll that go with latents: their mean by ridge regression, and how far off they are.
+    """The pitch and roll that belong to latents: their mean by ridge regression, and how far off they are.
 
-    The mean is affine in the latents, and kept within what it is for the training poses.
+    The mean is affine in the latents, and never beyond its range for the training poses.
     """
 
     mean: Array  # (3 + m, 2) radians: the least and most of the mean, where all latents are 0, and a unit of each
@@ -106,7 +104,7 @@ class Tilt:
     def of(cls, prior: Prior, motions: Sequence[Motion], share: float, margin: float) -> Self:
         """Learn from the poses of one motion or more.
 
-        The range holds a `share` of what is left of each of the two angles, and `margin` radians more to either side.
+        The range holds a `share` of the residuals of each of the two angles, and `margin` radians more to either side.
         """
         tilts = np.concatenate([motion.poses[:, 1:3] for motion in motions])
         latents = np.asarray(prior.transform(np.concatenate([motion.poses[:, 3:] for motion in motions])))
@@ -120,24 +118,18 @@ class Tilt:
         slopes = np.linalg.solve(gram, scaled.T @ (around - offset))
         mean = offset + scaled @ slopes
         base = middle + offset - centre @ slopes
-        left = wrapped(around - mean)
-        low, high = np.quantile(left, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
+        residuals = wrapped(around - mean)
+        low, high = np.quantile(residuals, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=0)
         low, high = low - margin, high + margin
-        whole = high - low > 2.0 * OVER
+        whole = high - low > 2.0 * TURNS_OVER
         slopes /= np.where(scales > 0.0, scales, 1.0)[:, None]
         rows = middle + mean.min(axis=0), middle + mean.max(axis=0), base, slopes
         return cls(np.vstack(rows), np.where(whole, -np.pi, low), np.where(whole, np.pi, high))
 
-    def at(self, latents: Array) -> Array:
-        """Return the mean pitch and roll (n, 2) that go with latents (n, m)."""
-        low, high, base = self.mean[:3]
-        tilt: Array = np.clip(base + latents @ self.mean[3:], low, high)
-        return tilt
-
     def around(self, added: Array, reach: Array) -> tuple[Array, Array]:
         """Return the middle and the half sides (2,) of the box around what was added last (2,).
 
-        It goes as far as `reach` (2,) to either side, and stays in the range: near its end it is off the middle.
+        It extends as far as `reach` (2,) to either side, and stays in the range, near whose end it is off the middle.
         """
         half = np.minimum(reach, 0.5 * (self.high - self.low))
         whole = self.high - self.low >= 2.0 * np.pi - 1e-12

@@ -21,7 +21,6 @@ from posefit.silhouette.cost import (
     costs_in,
     drawing_of,
     known_views,
-    mean_cost,
     mean_over_views,
     pose_costs,
 )
@@ -36,7 +35,7 @@ def align(
 
     Each border of a box says where the outermost disc of the body must touch, and that is linear in the translation:
     `focal (x + t_x) +- focal radius = (border - centre) (z + t_z)`. All borders of all views are solved for together,
-    by least squares, starting from anchors (n, 3). A border at the image's edge says nothing and is left out.
+    by least squares, starting from anchors (n, 3). A border at the image's edge is unknown and does not count.
     """
     translations = writeable(anchors.copy())
     move_to_borders(
@@ -56,7 +55,7 @@ def align(
 class PoseProblem:
     """One observation, from one camera or several, and the space in which its pose is searched. SAPSO (5).
 
-    `evaluate` is pure: a proposal's cost has the same bits whatever stands beside it and however many threads work.
+    `evaluate` is pure: a proposal's cost has the same bits whatever the others are and however many threads work.
     """
 
     body: Body = field(repr=False)
@@ -92,7 +91,7 @@ class PoseProblem:
         if proposals.shape[1:] != (self.space.dimensions,):
             self.space.decode(proposals)  # raises
         if self.on_device:
-            return self._cost_on_device(proposals)
+            return self.cost_and_areas(*self.decode(proposals))[0]
         parts = parts_of(len(proposals), self.threads)
         if len(parts) == 1:
             return self._cost(*self.decode(proposals))
@@ -114,26 +113,14 @@ class PoseProblem:
                 self,
                 cameras=[coarser_camera(camera, factor) for camera in self.cameras],
                 silhouettes=[coarser_silhouette(silhouette, factor) for silhouette in self.silhouettes],
-                blank=True,  # nothing of a small silhouette may be left
+                blank=True,  # a small silhouette may be empty
             )
         return self._coarser[factor]
 
     def decode(self, proposals: Array) -> tuple[Array, Array]:
-        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space asks it."""
+        """Return the poses (n, 66) and translations (n, 3) of proposals (n, d), aligned where the space says so."""
         poses, translations = self.space.decode(proposals)
         return poses, self._aligned(poses, translations)
-
-    def placed(self, poses: Array) -> Array:
-        """Return the translations (n, 3) of poses (n, 66): the space's anchor, or aligned from there."""
-        return self._aligned(poses, np.repeat(self.space.anchor[None], len(poses), axis=0))
-
-    def cost(self, poses: Array, translations: Array) -> Array:
-        """Return the cost (n,) of poses (n, 66) with their root at translations (n, 3)."""
-        return self.cost_and_areas(poses, translations)[0]
-
-    def areas(self, poses: Array, translations: Array) -> Areas:
-        """Return R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
-        return self.cost_and_areas(poses, translations)[1]
 
     def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
         """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
@@ -157,15 +144,6 @@ class PoseProblem:
     def _cost(self, poses: Array, translations: Array) -> Array:
         """Return the cost (n,) of decoded poses (n, 66) at translations (n, 3), on one thread."""
         return mean_over_views([costs_in(*view, poses, translations, self.beta) for view in self._drawings])
-
-    def _cost_on_device(self, proposals: Array) -> Array:
-        """Return the cost (n,) of proposals (n, d), which a GPU decodes where it can."""
-        from posefit.fitting.cuda import areas_of_proposals, decodes
-
-        if decodes(self.space):
-            counts = areas_of_proposals(self.body, self.cameras, self.silhouettes, self.space, proposals)
-            return mean_cost(counts, self.silhouettes, self.beta)
-        return self.cost(*self.decode(proposals))
 
     def _aligned(self, poses: Array, translations: Array) -> Array:
         """Return the translations (n, 3) of decoded poses (n, 66): other ones where the space has them aligned."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,9 +45,9 @@ NAMES = ("scale", *(f"{name} length" for name in LENGTHS), *(f"{name} girth" for
 SPREAD = np.array([0.10] + [0.06] * len(LENGTHS) + [0.30] * len(GIRTHS))
 REACH = 3.0  # spreads to either side that are searched
 PULL = 0.15  # cost of a factor that is one spread away from 1
-ROUNDS = 2  # poses with the body, then the body with the poses
-GENERATIONS, AGAIN = 60, 20  # of CMA-ES: in the first round, and where it begins near the end
-WIDTH, NEAR = 0.5, 0.2  # spreads that its first draws lie apart, in the same order
+# Of poses with the body, then of the body with the poses: the spread of CMA-ES's first draws, in spreads of the
+# factors, and its generations. The second round begins near the end of the first.
+ROUNDS = ((0.5, 60), (0.2, 20))
 
 
 def _members(groups: dict[str, tuple[str, ...]]) -> Array:
@@ -60,23 +61,28 @@ _LENGTHS, _GIRTHS = _members(LENGTHS), _members(GIRTHS)
 def shaped(body: Body, factors: Array, height: float | None = None) -> Body:
     """Return a body with its lengths and radii multiplied by factors (17,), in the order of `NAMES`.
 
-    With a `height` in metres the result is scaled to stand so tall.
+    With a `height` in metres the result is scaled to it.
     """
     lengths = factors[0] * np.exp(_LENGTHS @ np.log(factors[1 : 1 + len(LENGTHS)]))
     girths = factors[0] * np.exp(_GIRTHS @ np.log(factors[1 + len(LENGTHS) :]))
-    made = body.scaled(lengths, girths)
-    return made if height is None else made.scaled(height / made.stature, height / made.stature)
+    scaled = body.scaled(lengths, girths)
+    return scaled if height is None else scaled.scaled(height / scaled.stature, height / scaled.stature)
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A fitted body, and how sure its factors are."""
+    """A fitted body, and how uncertain its factors are."""
 
     body: Body
     factors: Array = field(repr=False)  # (17,) in the order of `NAMES`
     spread: Array = field(repr=False)  # (17,) standard deviation of each factor's logarithm
     cost: float  # mean over the frames
-    height: float | None = None  # metres that it was made to stand; None where it was fitted
+    height: float | None = None  # metres, to which it was scaled; None where it was fitted
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the build as summary.json holds it."""
+        factors, spread = (dict(zip(NAMES, values.tolist(), strict=True)) for values in (self.factors, self.spread))
+        return {"stature_m": self.body.stature, "cost": self.cost, "factors": factors, "spread": spread}
 
 
 def fit_shape(
@@ -91,9 +97,9 @@ def fit_shape(
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with their poses.
 
-    `follow` tracks the observations with a body. With a `height` in metres the person stands so tall; one camera alone
-    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. How sure the
-    factors are is not known yet: their `spread` is people's.
+    `follow` tracks the observations with a body. With a `height` in metres the person is so tall; one camera alone
+    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. How
+    uncertain the factors are is not known yet: their `spread` is that of all people.
     """
 
     def cost(factors: Array) -> float:
@@ -108,9 +114,9 @@ def fit_shape(
         return total / (len(observations) * len(cameras))
 
     factors = np.ones(len(NAMES))
-    for k in range(ROUNDS):
+    for width, generations in ROUNDS:
         frames = follow(shaped(body, factors, height))
-        factors = _search(cost, factors, rng, first=k == 0)
+        factors = _search(cost, factors, rng, width, generations)
     return Shape(shaped(body, factors, height), factors, SPREAD, cost(factors), height)
 
 
@@ -127,16 +133,18 @@ class FactorBox:
         return np.asarray((np.abs(proposals) <= 1.0).all(axis=1))
 
 
-def _search(cost: Callable[[Array], float], start: Array, rng: np.random.Generator, *, first: bool = False) -> Array:
+def _search(
+    cost: Callable[[Array], float], start: Array, rng: np.random.Generator, width: float, generations: int
+) -> Array:
     """Return the factors (17,) of least cost, by CMA-ES from the factors `start` (17,)."""
 
     def evaluate(proposals: Array) -> Array:
         points = REACH * proposals  # in spreads of the logarithms
         return np.array([cost(np.exp(SPREAD * point)) + PULL * float(point @ point) for point in points])
 
-    mean, width = np.clip(np.log(start) / (REACH * SPREAD), -1.0, 1.0), (WIDTH if first else NEAR) / REACH
-    box = FactorBox(Start(mean, np.full(len(NAMES), width), np.zeros(len(NAMES))))
+    mean = np.clip(np.log(start) / (REACH * SPREAD), -1.0, 1.0)
+    box = FactorBox(Start(mean, np.full(len(NAMES), width / REACH), np.zeros(len(NAMES))))
     population = default_population_size(len(NAMES))
-    evaluations = population * (GENERATIONS if first else AGAIN)
-    best = minimise(evaluate, CMAES(box, rng, population_size=population), evaluations, budget_known=True)
+    optimiser = CMAES(box, rng, population_size=population)
+    best = minimise(evaluate, optimiser, population * generations, budget_known=True)
     return np.asarray(np.exp(REACH * SPREAD * best.proposal))

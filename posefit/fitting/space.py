@@ -10,7 +10,7 @@ from posefit.arrays import Array, writeable
 from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.fitting.check import one_of
-from posefit.fitting.kernels import unpack_proposals, within
+from posefit.fitting.kernels import unpack_proposals
 from posefit.fitting.prior import Latents, Tilt
 from posefit.geometry.rotation import wrapped, yaw_first
 from posefit.geometry.skeleton import ANGLES
@@ -29,8 +29,8 @@ class SearchSpace:
     """Maps proposals (n, d) in [-1, 1]^d to poses (n, 66) and translations (n, 3).
 
     A proposal's coordinates, in this order: root yaw, pitch, roll in radians; the translation in metres, where it is
-    searched; the latents of the prior. Where there is a `tilt`, pitch and roll are what is added to the mean that goes
-    with the latents, and the box of both moves with the last pose.
+    searched; the latents of the prior. Where there is a `tilt`, pitch and roll are what is added to the mean of the
+    latents, and the box of both moves with the last pose.
     """
 
     prior: Latents = field(repr=False)
@@ -41,7 +41,7 @@ class SearchSpace:
     translation_range: Array = field(default_factory=lambda: np.array(TRANSLATION_RANGE))  # (3,) metres
     start: Start | None = None  # None: the first population is drawn uniformly from the box
     tilt: Tilt | None = field(default=None, repr=False)  # None: pitch and roll are those of the pose
-    root_order: RootOrder = "yaw_first"  # Interpretation S3; "xyz" goes without a tilt
+    root_order: RootOrder = "yaw_first"  # Interpretation S3; "xyz" has no tilt
     centre: Array = field(init=False, repr=False)  # (d,) coordinates of the box's middle
     half: Array = field(init=False, repr=False)  # (d,) half its sides
     periodic: NDArray[np.bool_] = field(init=False, repr=False)  # (d,) coordinates that wrap around
@@ -71,15 +71,10 @@ class SearchSpace:
         """How many coordinates a proposal has."""
         return len(self.centre)
 
-    @property
-    def tilt_mean(self) -> Array:
-        """Pitch and roll that go with the latents (3 + m, 2), as a `Tilt` has them; 0 where there is none."""
-        return np.zeros((3 + len(self.prior.low), 2)) if self.tilt is None else self.tilt.mean
-
     def around(self, coordinates: Array, start: Start | None = None, anchor: Array | None = None) -> "SearchSpace":
         """Return the space whose yaw range, and searched translation, are centred on coordinates (d,).
 
-        With a tilt so are pitch and roll, as far as its range lets them.
+        With a tilt so are pitch and roll, within its range.
         """
         root = np.array([coordinates[0], *self.root_centre[1:]])
         if self.tilt is not None:
@@ -101,7 +96,7 @@ class SearchSpace:
     def decode(self, proposals: Array) -> tuple[Array, Array]:
         """Return the poses (n, 66) and translations (n, 3) of proposals (n, d).
 
-        An aligned translation is only its anchor here; the problem, which knows the silhouette, aligns it.
+        An aligned translation is only its anchor here; the problem, which has the silhouette, aligns it.
         Raises ValueError where the shape does not fit or a proposal is not finite.
         """
         proposals = writeable(proposals)
@@ -110,8 +105,8 @@ class SearchSpace:
             raise InputError(f"proposals must have shape (n, {d}), got {proposals.shape}")
         n = len(proposals)
         poses, translations, latents = np.empty((n, ANGLES)), np.empty((n, 3)), np.empty((n, m))
-        box = self.centre, self.half, self.anchor, self.tilt_mean
-        if not unpack_proposals(proposals, *box, poses, translations, latents):
+        tilt = np.zeros((3 + m, 2)) if self.tilt is None else self.tilt.mean
+        if not unpack_proposals(proposals, self.centre, self.half, self.anchor, tilt, poses, translations, latents):
             raise InputError("proposals must be finite, got nan or infinity")
         if self.root_order == "xyz":
             poses[:, :3] = yaw_first(poses[:, :3])
@@ -120,13 +115,10 @@ class SearchSpace:
 
     def feasible(self, proposals: Array) -> NDArray[np.bool_]:
         """Return which proposals (n, d) lie in the box and mean a pose to the prior (n,). SAPSO 2.2."""
-        proposals = writeable(proposals)
-        n = len(proposals)
-        inside, latents = np.empty(n, dtype=bool), np.empty((n, len(self.prior.low)))
-        everyone = within(proposals, self.centre, self.half, inside, latents)
-        allowed = self.prior.feasible(latents)
-        return allowed if everyone else allowed & inside
+        latents = slice(self.dimensions - len(self.prior.low), None)
+        allowed = self.prior.feasible(self.centre[latents] + self.half[latents] * proposals[:, latents])
+        return np.asarray(allowed & (np.abs(proposals) <= 1.0).all(axis=1))
 
     def moved(self, proposals: Array, origin: "SearchSpace") -> Array:
-        """Return the proposals (n, d), the nearest in the box, that mean here what these mean in `origin`."""
+        """Return the proposals (n, d), the nearest in the box, that mean here what these (n, d) mean in `origin`."""
         return self.proposals(origin.centre + origin.half * proposals)

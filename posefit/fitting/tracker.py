@@ -1,12 +1,10 @@
 """Tracking by synthesis: predict, search, commit, frame by frame. SAPSO section 4."""
 
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -27,6 +25,7 @@ SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiple
 KEPT = 3  # frames: how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
+COORDINATES = "coordinates"  # in the details of a frame: (d,) of its pose in the search space
 FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
 
@@ -44,24 +43,26 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a tracker estimates in one frame."""
+    """What a tracker estimates in one frame; the time it took is measured where the tracker is driven."""
 
     pose: Array = field(repr=False)  # (66,)
     translation: Array  # (3,) metres
     cost: float
     areas: Areas = field(repr=False)  # (views, 3): R, B, Y
     evaluations: int
-    seconds: float
-    history: Array = field(repr=False)  # (populations,) best cost after each
-    coordinates: Array | None = field(default=None, repr=False)  # (d,) of the pose in a search space
-    spent: NDArray[np.int64] | None = field(default=None, repr=False)  # (populations,) evaluations so far after each
-    details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker wants to tell
-    # of all threads of the process, where a tracker says: unlike `seconds` it does not grow on a busy machine
-    cpu_seconds: float | None = None
-    posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker says
-    modes: Sequence[Mode] = ()  # that are in the posterior, the likeliest first; a followed scene's frames have them
-    lost: float | None = None  # how likely it is that the frame is lost, 0 to 1, where a tracker says
-    activity: str | None = None  # what the person does, such as "walk", where a tracker says
+    # (populations, 2) the evaluations so far and the best cost, after each population of the search
+    trace: Array = field(default_factory=lambda: np.empty((0, 2)), repr=False)
+    posterior: Posterior | None = field(default=None, repr=False)  # what else it may be, where a tracker reports it
+    lost: float | None = None  # how likely it is that the frame is lost, 0 to 1, where a tracker reports it
+    activity: str | None = None  # what the person does, such as "walk", where a tracker reports it
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)  # whatever else a tracker reports
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0  # of all threads of the process: unlike `seconds` it does not grow on a busy machine
+
+    @property
+    def modes(self) -> Sequence[Mode]:
+        """The modes of the posterior, the likeliest first."""
+        return () if self.posterior is None else self.posterior.modes
 
     def __post_init__(self) -> None:
         if self.lost is not None and not 0.0 <= self.lost <= 1.0:
@@ -100,7 +101,7 @@ class Task:
 class Tracker(Protocol):
     """Follows a person through a sequence; nothing to inherit.
 
-    One that looks ahead says how many observations it takes before it gives a frame: an attribute `lag`, else 1.
+    It takes one observation before it yields a frame, unless it is registered as one that looks ahead.
     """
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -175,7 +176,7 @@ class Follower:
             tilt=self._tilt,
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
-        earlier = [frame.coordinates for frame in task.before if frame.coordinates is not None]
+        earlier = [frame.details[COORDINATES] for frame in task.before if COORDINATES in frame.details]
         self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
 
     def space(self, observation: Observation) -> SearchSpace:
@@ -242,7 +243,6 @@ class SynthesisTracker:
         optimiser: Optimiser | None = None
         latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:
-            began, begun = time.perf_counter(), time.process_time()
             space = follower.space(observation)
             if not observation.usable:
                 latest = self._held(latest, space, observation)
@@ -252,7 +252,7 @@ class SynthesisTracker:
             problem = self.problem(space, observation)
             best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
             follower.commit(best.proposal)
-            latest = _frame(problem, best, time.perf_counter() - began, time.process_time() - begun)
+            latest = _frame(problem, best)
             yield latest
 
     def _held(self, latest: Frame | None, space: SearchSpace, observation: Observation) -> Frame:
@@ -264,7 +264,7 @@ class SynthesisTracker:
             places = np.array(observation.translation, dtype=np.float64)[None]
         problem = self.problem(space, observation)
         costs, areas = problem.cost_and_areas(poses, places)
-        return Frame(poses[0], places[0], float(costs[0]), areas[:, 0], 0, 0.0, np.empty(0), cpu_seconds=0.0)
+        return Frame(poses[0], places[0], float(costs[0]), areas[:, 0], 0)
 
     def problem(self, space: SearchSpace, observation: Observation) -> PoseProblem:
         """Return the problem that a frame is."""
@@ -280,11 +280,8 @@ class SynthesisTracker:
         return self.make(replace(space, start=None) if self.next_frame == "forget" else space, rng)
 
 
-def _frame(problem: PoseProblem, best: Minimum, seconds: float, cpu_seconds: float) -> Frame:
+def _frame(problem: PoseProblem, best: Minimum) -> Frame:
     poses, translations = problem.decode(best.proposal[None])
-    counts = problem.areas(poses, translations)[:, 0]
-    coordinates = problem.space.coordinates(best.proposal)
-    effort = (best.evaluations, seconds, best.history)
-    return Frame(
-        poses[0], translations[0], best.cost, counts, *effort, coordinates, best.spent, cpu_seconds=cpu_seconds
-    )
+    counts = problem.cost_and_areas(poses, translations)[1][:, 0]
+    details = {COORDINATES: problem.space.coordinates(best.proposal)}
+    return Frame(poses[0], translations[0], best.cost, counts, best.evaluations, best.trace, details=details)

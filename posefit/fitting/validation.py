@@ -1,14 +1,7 @@
-"""Checks what optimisers, priors and trackers of plugins return.
+"""Checks what optimisers and priors of plugins return: a broken rule ends the search, with one line that names them."""
 
-A broken rule ends the search with one line that names the plugin. The evaluations, areas and cost of a tracker's
-frames are compared with what is counted and computed here, and put right.
-"""
-
-import math
-from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any, Self
@@ -20,16 +13,8 @@ from posefit.errors import InputError
 from posefit.fitting.box import Space
 from posefit.fitting.optimiser import BudgetError, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.tracker import Frame, Observation, Task, Tracker
 from posefit.geometry.skeleton import Skeleton
-from posefit.limits import timed
-from posefit.reading import quoted
-from posefit.silhouette.cost import pose_costs
-from posefit.silhouette.drawn import PoseCount, uncounted
-
-UNCOUNTED_POSES = 10  # ours: a frame may draw so many beyond its evaluations, as to draw its result once more
-COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in another order
-
+from posefit.silhouette.drawn import PoseCount
 
 POSEFIT = Path(__file__).parents[1]  # whose lines are not a plugin's
 
@@ -41,19 +26,11 @@ class BrokenRuleError(InputError):
 class CheckedOptimiser:
     """An optimiser whose proposals are checked; errors name it by `name`.
 
-    `limit` is how many seconds an `ask` or a `tell` may take, where `posefit.limits.timed` can measure that.
     `evaluations` is the budget of a search, which has to hold the first population.
     """
 
-    def __init__(
-        self,
-        optimiser: Optimiser,
-        space: Space,
-        name: str,
-        limit: float | None = None,
-        evaluations: int | None = None,
-    ) -> None:
-        self._optimiser, self._space, self._name, self._limit = optimiser, space, name, limit
+    def __init__(self, optimiser: Optimiser, space: Space, name: str, evaluations: int | None = None) -> None:
+        self._optimiser, self._space, self._name = optimiser, space, name
         self._evaluations, self._first, self._drawn = evaluations, True, PoseCount()
 
     def ask(self) -> Array:
@@ -97,7 +74,7 @@ class CheckedOptimiser:
     @contextmanager
     def _called(self, what: str) -> Iterator[None]:
         """Raise BrokenRuleError where the body fails, or draws poses: all evaluations are the search's."""
-        with self._drawn.counting(), plugin_errors(self._name, what, self._limit):
+        with self._drawn.counting(), plugin_errors(self._name, what):
             yield
         if self._drawn.poses:
             raise self._broken(f"{what} must leave evaluations to the search, got {self._drawn.poses:g} of its own")
@@ -107,16 +84,13 @@ class CheckedOptimiser:
 
 
 @contextmanager
-def plugin_errors(
-    name: str, what: str, limit: float | None = None, passed: tuple[type[BaseException], ...] = ()
-) -> Iterator[None]:
+def plugin_errors(name: str, what: str, passed: tuple[type[BaseException], ...] = ()) -> Iterator[None]:
     """Raise BrokenRuleError, naming the plugin, for whatever the body raises, SystemExit too, but for what is `passed`.
 
     A BrokenRuleError stays as it is: it names another plugin, which this one called.
     """
     try:
-        with timed(limit):
-            yield
+        yield
     except BrokenRuleError:
         raise
     except passed as error:
@@ -124,8 +98,6 @@ def plugin_errors(
             raise InputError(str(error)) from error  # a plugin's own check of a setting
         raise
     except (Exception, SystemExit) as error:
-        if limit is not None and isinstance(error, TimeoutError):
-            raise BrokenRuleError(f"{name}: {what} must return within {limit:g} s, and did not") from None
         raise _broken_by(name, what, error) from error
 
 
@@ -146,7 +118,6 @@ class CheckedPrior:
     def __init__(self, prior: Prior, name: str) -> None:
         self._prior, self._name = prior, name
         self.low, self.high = np.asarray(prior.low), np.asarray(prior.high)
-        self.affine = getattr(prior, "affine", None)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn from joint angles (T, 63), and return itself."""
@@ -174,130 +145,3 @@ class CheckedPrior:
             return getattr(self._prior, method)(*arguments)
         except (Exception, SystemExit) as error:
             raise _broken_by(self._name, method, error) from error
-
-
-@dataclass(eq=False)
-class Audit:
-    """What trackers reported wrongly of their frames; `warnings` has a line for each kind."""
-
-    _findings: dict[str, tuple[str, int]] = field(default_factory=dict)  # by kind: the first of them, and how many
-
-    @property
-    def warnings(self) -> list[str]:
-        """One line for each kind: the first of it, and how many frames it concerns."""
-        return [f"{first} ({count} such frame{'s' if count > 1 else ''})" for first, count in self._findings.values()]
-
-    def clear(self) -> None:
-        """Forget all findings."""
-        self._findings.clear()
-
-    def note(self, kind: str, what: str) -> None:
-        """Add a finding; only the first of a kind is kept in full."""
-        first, count = self._findings.get(kind, (what, 0))
-        self._findings[kind] = first, count + 1
-
-
-class AuditedTracker:
-    """A tracker whose frames are checked and audited: a wrong figure is noted and put right.
-
-    Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
-    pose. An honest frame stays as it is.
-    """
-
-    def __init__(self, tracker: Tracker, task: Task, name: str, beta: float, audit: Audit) -> None:
-        self._tracker, self._task, self._name, self._beta, self._audit = tracker, task, name, beta, audit
-        self.lag: int | None = getattr(tracker, "lag", None)  # None for one that does not look ahead
-
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        """Yield the tracker's frame for each observation. Raises BrokenRuleError where one is missing or wrong."""
-        waiting: deque[Observation] = deque()  # those whose frames are still to come
-        unread: Exception | None = None  # why an observation could not be read
-        taken = reported = given = 0
-
-        def stream() -> Iterator[Observation]:
-            nonlocal taken, unread
-            rest = iter(observations)
-            while True:
-                try:
-                    with uncounted():  # to render a motion is no evaluation
-                        observation = next(rest, None)
-                except Exception as error:
-                    unread = error
-                    raise
-                if observation is None:
-                    return
-                taken += 1
-                waiting.append(observation)
-                yield observation
-
-        drawn, source = PoseCount(), stream()
-        frames: Iterator[Frame] | None = None
-        while True:
-            try:
-                with drawn.counting(), plugin_errors(self._name, "it", passed=(ImportError, GeneratorExit)):
-                    frames = iter(self._tracker.track(source, rng)) if frames is None else frames
-                    frame = next(frames, None)
-            except BrokenRuleError as broken:
-                if unread is not None and broken.__cause__ is unread:
-                    raise unread from None  # what could not be read is not the tracker's fault
-                raise
-            if frame is None:
-                break
-            given += 1
-            if given > taken:
-                raise self._broken(f"track must yield a frame for each observation, got {given} for {given - 1}")
-            self._check(frame)
-            # it may have drawn poses for observations that it looks at ahead
-            ahead = self._task.evaluations * (taken - given)
-            counted = math.ceil(drawn.poses / len(self._task.cameras)) - reported - ahead
-            frame = self._counted(frame, given - 1, counted, UNCOUNTED_POSES * taken)
-            frame = self._computed(frame, given - 1, waiting.popleft())
-            reported += frame.evaluations
-            yield frame
-        if given < taken or next(source, None) is not None:
-            raise self._broken(f"track must yield a frame for each observation, got {given} and then no more")
-
-    def _check(self, frame: Frame) -> None:
-        if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
-            raise self._broken(f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}")
-        if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
-            raise self._broken(f"a translation must be 3 finite metres, got {frame.translation}")
-        if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
-            raise self._broken(f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}")
-        if not isinstance(frame.seconds, float | int | np.number) or not 0.0 <= frame.seconds < math.inf:
-            raise self._broken(f"seconds must be a number, 0 or more, got {quoted(frame.seconds)}")
-
-    def _counted(self, frame: Frame, number: int, counted: int, leeway: int) -> Frame:
-        """Return the frame with the evaluations that were counted, where it reports fewer, and note it."""
-        label, budget = f"{self._name}: frame {number}", self._task.evaluations
-        if counted > frame.evaluations + leeway:
-            self._audit.note("said", f"{label} must say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
-            frame = replace(frame, evaluations=counted, spent=None)
-        if frame.evaluations > budget:
-            self._audit.note("budget", f"{label} must use at most {budget:,} evaluations, got {frame.evaluations:,}")
-        return frame
-
-    def _computed(self, frame: Frame, number: int, observation: Observation) -> Frame:
-        """Return the frame with the areas and the cost of its pose, and note where it reports others."""
-        label = f"{self._name}: frame {number}"
-        pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
-        observed = [replace(silhouette) for silhouette in observation.silhouettes]  # without bits that it may change
-        scene = self._task.body, self._task.cameras, observed
-        costs, counts = pose_costs(*scene, pose, place, self._beta)
-        true = counts[:, 0]
-        if not np.array_equal(true, frame.areas):
-            self._audit.note("areas", f"{label} must have its pose's areas, {true.tolist()}, got {_short(frame.areas)}")
-            frame = replace(frame, areas=true)
-        cost = float(costs[0])
-        if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= COST_TOLERANCE):
-            self._audit.note("cost", f"{label} must have its pose's cost, {cost:.6g}, got {_short(frame.cost)}")
-            frame = replace(frame, cost=cost, history=np.array([cost]), spent=None)
-        return frame
-
-    def _broken(self, rule: str) -> BrokenRuleError:
-        return BrokenRuleError(f"{self._name}: {rule}")
-
-
-def _short(value: object) -> str:
-    text = f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
-    return text if len(text) <= 80 else text[:77] + "..."

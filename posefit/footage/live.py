@@ -1,5 +1,6 @@
 """The frames of a camera, a network stream or a pipe as they come, and the person in each of them."""
 
+import os
 import sys
 import threading
 import time
@@ -66,7 +67,8 @@ class Stream:
         self._changed = threading.Condition()
         frames: Iterator[Image]
         if source == "-":
-            frames = netpbm_images(pipe or sys.stdin.buffer)
+            # a file of its own: Python ends by SIGABRT while a thread reads from its standard input
+            frames = netpbm_images(pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb"))
         else:
             capture = cv2.VideoCapture(int(source) if source.isdigit() else source)
             if not capture.isOpened():

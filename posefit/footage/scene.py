@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.fitting.tracker import Observation
+from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.masks import Range, span
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
@@ -43,6 +44,12 @@ class Scene:
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     first: int = 0  # the number of the first frame in the footage, or in the whole motion
+    reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
+
+    def motion(self, frames: Sequence[Frame]) -> Motion:
+        """Return the person's motion that some frames estimate."""
+        poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
+        return Motion(self.name, self.body.skeleton, poses, places, self.fps, self.first)
 
 
 def synthetic(
@@ -103,13 +110,13 @@ class LazyObservations(Sequence[Observation]):
 
 def rendered(motion: Motion, body: Body, cameras: Sequence[Camera]) -> LazyObservations:
     """Return the observations of a known motion."""
+    return LazyObservations(len(motion), partial(_rendered, motion, body, cameras))
 
-    def at(k: int) -> Observation:
-        pose, translation = motion.poses[k], motion.translations[k]
-        masks = [project(body, camera, pose, translation) for camera in cameras]
-        return Observation([Silhouette.of(mask) for mask in masks], translation)
 
-    return LazyObservations(len(motion), at)
+def _rendered(motion: Motion, body: Body, cameras: Sequence[Camera], k: int) -> Observation:
+    pose, translation = motion.poses[k], motion.translations[k]
+    masks = [project(body, camera, pose, translation) for camera in cameras]
+    return Observation([Silhouette.of(mask) for mask in masks], translation)
 
 
 def on_device(scene: Scene, device: str) -> Scene:
@@ -118,22 +125,25 @@ def on_device(scene: Scene, device: str) -> Scene:
     if device == "cpu":
         return scene
 
-    def at(k: int) -> Observation:
-        observation = scene.observations[k]
-        return replace(observation, silhouettes=[moved_to(mask, device) for mask in observation.silhouettes])
+    return replace(scene, observations=LazyObservations(scene.count, partial(_moved, scene.observations, device)))
 
-    return replace(scene, observations=LazyObservations(len(scene.observations), at))
+
+def _moved(observations: Sequence[Observation], device: str, k: int) -> Observation:
+    silhouettes = [moved_to(mask, device) for mask in observations[k].silhouettes]
+    return replace(observations[k], silhouettes=silhouettes)
 
 
 def with_corruption(
     observations: Sequence[Observation], noise: dict[str, float], dropped: float, seed: int
 ) -> LazyObservations:
     """Return observations with corruptions of some strength, and a share of the frames dropped; the same each time."""
+    return LazyObservations(len(observations), partial(_corrupted, observations, noise, dropped, seed))
 
-    def at(k: int) -> Observation:
-        observation, rng = observations[k], np.random.default_rng([RNG_STREAM_CORRUPTION, seed, k])
-        lost = k > 0 and rng.random() < dropped
-        masks = [corrupted(silhouette.mask, noise, rng) for silhouette in observation.silhouettes]
-        return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks], usable=not lost)
 
-    return LazyObservations(len(observations), at)
+def _corrupted(
+    observations: Sequence[Observation], noise: dict[str, float], dropped: float, seed: int, k: int
+) -> Observation:
+    observation, rng = observations[k], np.random.default_rng([RNG_STREAM_CORRUPTION, seed, k])
+    lost = k > 0 and rng.random() < dropped
+    masks = [corrupted(silhouette.mask, noise, rng) for silhouette in observation.silhouettes]
+    return replace(observation, silhouettes=[Silhouette.of(mask) for mask in masks], usable=not lost)

@@ -81,7 +81,7 @@ class Extraction:
                 came = f"{quoted(self.background)} with {self.name}"
                 raise InputError(f"background must be given for the method {' or '.join(takers)} only, got {came}")
             object.__setattr__(self, "settings", {**self.settings, "background": self.background})
-        check(self.name, offer.factory, self.settings)
+        object.__setattr__(self, "settings", check(self.name, offer.factory, self.settings))
         for setting in offer.settings:
             if setting.default is Parameter.empty and setting.name not in self.settings:
                 given = "frames A:B or an image" if setting.name == "background" else "given"

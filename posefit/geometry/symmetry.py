@@ -1,8 +1,8 @@
 """Poses with nearly the same silhouette as a given one: left and right exchanged, turned, reflected.
 
-A silhouette shows neither which leg is in front nor how deep anything is. A search that has settled on the wrong one of
-two such poses stays there, as each frame continues the last; a tracker may want to try the other one, too. These are
-plain functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones of the two sides are seldom
+A silhouette shows neither which leg is in front nor how deep anything is. A search that has chosen the wrong one of two
+such poses stays there, as each frame continues the last, unless a tracker tries the other one. These are plain
+functions of poses (n, 66), whose roots stay where they are; each undoes itself. Bones of the two sides are seldom
 equally long; the silhouettes differ as much as the sides do.
 """
 
@@ -51,16 +51,16 @@ def turned_poses(poses: Array) -> Array:
     return poses
 
 
-def reflected_poses(skeleton: Skeleton, poses: Array, towards: float) -> Array:
+def reflected_poses(skeleton: Skeleton, poses: Array, camera_yaw: float) -> Array:
     """Return poses (n, 66) reflected along the line of sight: towards the camera becomes away from it.
 
-    `towards` is the yaw in radians of a person who faces the camera, see `facing`. Near and far trade places, and
+    `camera_yaw` is the yaw in radians of a person who faces the camera, see `facing`. Near and far trade places, and
     so do left and right: a turn of 30 degrees out of the picture becomes one into it. Whatever the pose,
     and from whatever side, a level camera far away sees the same silhouette. From the side it is `mirrored_poses`, and
     from in front it is `turned_poses` with left and right exchanged.
     """
     reflected = mirrored_poses(skeleton, poses)
-    reflected[:, 0] = wrapped(2.0 * towards + np.pi - reflected[:, 0])
+    reflected[:, 0] = wrapped(2.0 * camera_yaw + np.pi - reflected[:, 0])
     return reflected
 
 
@@ -77,8 +77,8 @@ def exchanged_limbs(skeleton: Skeleton, poses: Array, limbs: Limbs) -> Array:
 
 def facing(camera: Camera, place: Array) -> float:
     """Return the yaw in radians of a person at a place (3,) who faces a camera."""
-    way = camera.position - np.asarray(place)
-    return float(np.arctan2(way[0], way[2]))
+    x, _, z = camera.position - np.asarray(place)
+    return float(np.arctan2(x, z))
 
 
 def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
@@ -88,11 +88,12 @@ def _exchanged(skeleton: Skeleton, poses: Array, names: Sequence[str]) -> Array:
     for j, frame in _frames(skeleton):
         if JOINTS[j] not in names:
             continue
-        mine, theirs = (slice(k, k + 3) for k in (angle_index(j), angle_index(MIRROR[j])))
+        angles, first = poses[:, angle_index(MIRROR[j]) :][:, :3], angle_index(j)
         if frame is None:
-            result[:, mine] = poses[:, theirs] * [1.0, -1.0, -1.0]
+            result[:, first : first + 3] = angles * [1.0, -1.0, -1.0]
         else:
-            result[:, mine] = joint_angles_from_rotation(frame @ rotation_from_joint_angles(poses[:, theirs]) @ frame.T)
+            rotations = frame @ rotation_from_joint_angles(angles) @ frame.T
+            result[:, first : first + 3] = joint_angles_from_rotation(rotations)
     return result
 
 

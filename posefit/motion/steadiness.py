@@ -8,10 +8,10 @@ from posefit.geometry.skeleton import JOINTS
 
 PACE = 30.0  # a second: the rate at which places are compared, so that jitter counts the same at any frame rate
 BALLS = JOINTS.index("lfoot"), JOINTS.index("rfoot")  # of the feet, which stay where they are while a foot rolls off
-LOW = 0.05  # metres above the lowest place of either foot, up to which a foot may stand
-SLOW = 0.2  # metres a second, up to which it may
-WINDOW = 2.0  # seconds about a frame in which that lowest place is searched: the ground may rise, and depth may drift
-SHORTEST = 0.1  # seconds that a foot stands at least
+MAX_STANDING_HEIGHT = 0.05  # metres above the lowest place of either foot
+MAX_STANDING_SPEED = 0.2  # metres a second
+WINDOW_SECONDS = 2.0  # about a frame, for that lowest place: the ground may rise, and depth may drift
+MIN_STANDING_SECONDS = 0.1
 
 
 def acceleration(joints: Array, fps: float) -> Array:
@@ -40,17 +40,22 @@ def standing(joints: Array, fps: float) -> NDArray[np.bool_]:
     around = np.arange(len(feet))
     before, after = np.maximum(around - half, 0), np.minimum(around + half, len(feet) - 1)
     speed = np.linalg.norm(feet[after] - feet[before], axis=2) * fps / (after - before)[:, None]
-    reach = max(round(0.5 * WINDOW * fps), 1)
-    lowest = np.array([feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in around])
-    stands = (speed < SLOW) & (feet[:, :, 1] < lowest[:, None] + LOW)
+    stands = (speed < MAX_STANDING_SPEED) & low(feet, fps, WINDOW_SECONDS, MAX_STANDING_HEIGHT)
     for side in range(2):
         for start, stop in runs(stands[:, side]):
-            stands[start:stop, side] &= stop - start >= SHORTEST * fps
+            stands[start:stop, side] &= stop - start >= MIN_STANDING_SECONDS * fps
     return np.asarray(stands)
 
 
+def low(feet: Array, fps: float, seconds: float, height: float) -> NDArray[np.bool_]:
+    """Return whether feet (T, n, 3) are less than `height` above the lowest of all (T, n) in so many seconds around."""
+    reach = max(round(0.5 * seconds * fps), 1)
+    lowest = np.array([feet[max(k - reach, 0) : k + reach + 1, :, 1].min() for k in range(len(feet))])
+    return np.asarray(feet[:, :, 1] < lowest[:, None] + height)
+
+
 def slides(joints: Array, stands: NDArray[np.bool_]) -> Array:
-    """Return how far a foot gets along the ground from where it first stood (steps,), in metres, step by step.
+    """Return how far a foot slides along the ground from where it first stood (steps,), in metres, step by step.
 
     `stands` (T, 2) is whether the left and the right foot stand: those of `standing`, or of another motion.
     """

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from posefit.arrays import Array
+
 PART = "<!--part-->"  # in the markup: the places of style, data and script
 SHARED = ("base", "chart", "body", "play")  # scripts of every page, in this order
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
@@ -39,16 +41,29 @@ def embedded(value: Any) -> str:
 def plain(value: Any) -> Any:
     """Return a value that JSON can hold: arrays as lists, floats of five digits, nan and infinities as None."""
     if isinstance(value, dict):
-        return {str(name): plain(one) for name, one in value.items()}
+        return {str(name): plain(inner) for name, inner in value.items()}
     if isinstance(value, np.ndarray):
-        return value.tolist() if value.dtype.kind == "i" else plain(value.tolist())
+        return value.tolist() if value.dtype.kind == "i" else _five_digits(value)
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [plain(inner) for inner in value]
     if isinstance(value, np.integer):
         return int(value)
     if isinstance(value, float | np.floating):
         return float(f"{value:.5g}") if np.isfinite(value) else None
     return value
+
+
+def _five_digits(values: Array) -> Any:
+    """Return floats as lists, each the nearest to five digits: whole numbers over, or times, a power of ten."""
+    finite = np.isfinite(values)
+    sizes = np.where(finite & (values != 0.0), np.abs(values), 1.0)
+    power = 4.0 - np.floor(np.log10(sizes))
+    scale = 10.0 ** np.abs(power)
+    numbers = np.where(finite, values, 0.0)
+    rounded = np.where(power >= 0.0, np.round(numbers * scale) / scale, np.round(numbers / scale) * scale)
+    plain_values = rounded.astype(object)
+    plain_values[~finite] = None
+    return plain_values.tolist()
 
 
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:

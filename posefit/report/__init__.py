@@ -12,14 +12,15 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | looking for | file |
 |---|---|
 | what the command does, in order, and what it refuses | write.py |
-| the rows of a ledger as arrays: tracks, or single searches | runs.py |
-| the figures of a row, their labels and digits | columns.py |
+| the rows of a ledger as one table | runs.py |
+| what differs between tracks and single searches | tracks.py, searches.py |
+| figures and the score: digits, averages, texts | columns.py |
 | the methods compared on the runs that they share; the leaderboard | contest.py |
-| cost over evaluations, targets reached, errors of joints, calibration, running times, as numbers | curves.py |
+| charts of the page and for papers, as numbers | charts.py |
 | the sentences of the first screen | summary.py |
-| the data of the page; its animations | content.py, animations.py |
+| the data of the page, by two lists of sections; its animations | content.py, animations.py |
 | the page: markup, style and scripts as one document | page/ |
-| figures by matplotlib, and the folder of a paper's figures and tables | figures.py |
+| charts by matplotlib, and the folder of a paper's figures and tables | figures.py |
 | LaTeX, CSV and IOHprofiler's files | export.py |
 | the command that runs one row again | repeat.py |
 

@@ -11,6 +11,7 @@ from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.report.runs import Runs
 from posefit.sweep.cell import TrackCell, cell_scene, digest_of
 from posefit.sweep.ledger import Ledger
+from posefit.uncertainty.modes import nearer_mirrored
 
 MAX_CHARACTERS = 5_500_000  # of all animations together
 MAX_FRAMES = 90  # of an animation; of longer tracks every second, third, ... frame is used
@@ -45,7 +46,7 @@ def animations_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None], first
             "estimate": in_16_bits(estimate - origins[instance]),
             "mpjpe": np.round(errors).astype(int).tolist(),
             "lost": np.flatnonzero(errors > metrics.LOST_MM).tolist(),
-            "swapped": np.flatnonzero(metrics.swapped(truth, estimate)).tolist(),
+            "swapped": np.flatnonzero(nearer_mirrored(truth, estimate)).tolist(),
         }
         used += len(tracks[row]["estimate"]) + 8 * len(truth)
         if used > MAX_CHARACTERS:

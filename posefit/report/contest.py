@@ -10,21 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.fitting.metrics import skill
-from posefit.report.columns import interquartile_mean, mean
 from posefit.report.runs import Runs
 from posefit.statistics.improvement import improvement_interval, probability_of_improvement
-from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES, iqm_intervals
-from posefit.statistics.means import mean_interval
+from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
 from posefit.statistics.pairing import Shared, most_shared
 from posefit.statistics.ranks import LEVEL, Comparison, compact_letters, wilcoxon
-from posefit.suites.functions import suite_function
-from posefit.tracking.measures import BASELINES
 
 BOOTSTRAP_SEED = 2013
 WORK = 1e8  # numbers that the resamples of one study may come to
 MIN_SEEDS = 3  # for the interval of a probability of improvement
-RANDOM = "random"  # the method that is the baseline of single searches
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,23 +31,19 @@ class Contest(Shared):
         """Return a figure of all runs (methods, instances, seeds)."""
         return np.asarray(self.runs.figures[figure][self.rows])
 
+    def rows_of(self, method: int) -> NDArray[np.int64]:
+        """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
+        if method in self.methods:
+            return np.asarray(self.rows[self.methods.index(method)].ravel())
+        return np.flatnonzero(self.runs.method == method).astype(np.int64)
+
     def places(self) -> list[dict[str, Any]]:
         """Return the fields of a plan that make each instance."""
         return [self.runs.places[i] for i in self.instances]
 
     def tested_errors(self) -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare.
-
-        A block of tracks is an instance with a seed. A block of single searches is an instance of a function, the same
-        pose in every dimension: the mean over seeds and dimensions counts.
-        """
-        if not self.runs.is_search:
-            return np.asarray(self.runs.figures["error"][self.blocks][:, :, None])
-        poses = [(place["function"], place["instance"], place["suite"]) for place in self.places()]
-        index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
-        block = np.array([index[pose] for pose in poses])
-        sums = np.array([np.bincount(block, row) for row in self.of("reached").mean(axis=2)])
-        return np.asarray((100.0 - sums / np.bincount(block))[:, :, None])
+        """Return the errors (methods, blocks, 1) that tests compare."""
+        return self.runs.kind.tested_errors(self)
 
     @property
     def testable(self) -> bool:
@@ -64,6 +54,14 @@ class Contest(Shared):
     def comparisons(self) -> list[Comparison]:
         """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
         return wilcoxon(self.tested_errors()) if self.testable else []
+
+    def rng(self) -> np.random.Generator:
+        """Return what resamples are drawn by."""
+        return np.random.default_rng(BOOTSTRAP_SEED)
+
+    def resamples(self, numbers: int) -> int:
+        """Return how many bootstrap resamples so many numbers may have."""
+        return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
 
     def fewer(self, points: int) -> Self:
         """Return the contest on so few seeds and instances that intervals at so many points are little work.
@@ -86,82 +84,34 @@ def contest_of(runs: Runs) -> Contest | None:
     return None if shared is None else Contest(**vars(shared), runs=runs)
 
 
-def resamples(numbers: int) -> int:
-    """Return how many bootstrap resamples so many numbers may have."""
-    return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
-
-
 def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for each method, best first; those that do not take part come last, with their own runs.
 
-    Of tracks, figures are interquartile means, and the error has an interval; shares of frames or joints are plain
-    means, as most runs lose none, and `lost_tracks` counts those that lose any. A skill is 1 - the row's error / the
-    baseline's on the same runs. Of single searches, `reached` is a mean over runs and targets with its interval, and
-    `above` a median. `behind` is the median difference from the leader in paired runs with its interval, `p` is
-    Wilcoxon's after Holm. Methods that share one of their `letters` do not differ significantly.
+    Figures are averages, the score has an interval, and the kind of runs adds its own: see `board` of `Tracks` and
+    `Searches`. `behind` is the median difference from the leader in paired runs with its interval, `p` is Wilcoxon's
+    after Holm. Methods that share one of their `letters` do not differ significantly.
     """
-    runs, score = contest.runs, contest.runs.score
-    ends = _search_intervals(contest) if runs.is_search else _error_intervals(contest)
-    baselines = {} if runs.is_search else {row["baseline"]: row["error"] for row in baseline_rows(contest)}
+    runs, score = contest.runs, contest.runs.kind.score
+    more = runs.kind.board(contest)
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
-        own, taking_part = shared_rows(contest, m), m in contest.methods
-        row: dict[str, Any] = {"method": m, "name": name, "runs": len(own), "failed": runs.failed[m]}
-        row |= {"taking_part": taking_part, "low": None, "high": None}
-        row |= {figure: column.average(runs.figures[figure][own]) for figure, column in runs.columns.items()}
-        for baseline, shared in baselines.items():
-            row[f"skill_{baseline}"] = _skill(row["error"], shared if taking_part else row[f"baseline_{baseline}"])
-        if "lost" in runs.figures:
-            row["lost_tracks"] = int((runs.figures["lost"][own] > 0.0).sum())
-        board.append({**row, **ends.get(m, {})})
-    sign, figure = -1.0 if score["better"] == "more" else 1.0, score["name"]
-    worst = [math.inf if row[figure] is None else sign * row[figure] for row in board]
+        own = contest.rows_of(m)
+        row = {
+            "method": m,
+            "name": name,
+            "runs": len(own),
+            "failed": runs.failed[m],
+            "warned": sum(k in runs.warnings for k in own.tolist()),
+            "taking_part": m in contest.methods,
+        }
+        row |= {figure: column.average(runs.figures[figure][own]) for figure, column in runs.kind.columns.items()}
+        board.append({**row, **more[m]})
+    sign = -1.0 if score.down else 1.0
+    worst = [math.inf if row[score.name] is None else sign * row[score.name] for row in board]
     board.sort(key=lambda row: (not row["taking_part"], worst[row["method"]], row.get("above", 0.0)))
     best_first = [row["method"] for row in board if row["taking_part"]]
     letters, duels = _letters(contest, best_first), _duels(contest, best_first[0])
     return [{**row, **duels[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
-
-
-def shared_rows(contest: Contest, method: int) -> NDArray[np.int64]:
-    """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
-    if method in contest.methods:
-        return np.asarray(contest.rows[contest.methods.index(method)].ravel())
-    return np.flatnonzero(contest.runs.method == method).astype(np.int64)
-
-
-def _error_intervals(contest: Contest) -> dict[int, dict[str, float]]:
-    """Return the ends of the interval of each method's interquartile mean."""
-    errors = contest.of("error")
-    rng = np.random.default_rng(BOOTSTRAP_SEED)
-    intervals = iqm_intervals(errors, rng, resamples=resamples(errors.size))
-    ends = zip(contest.methods, intervals.low.tolist(), intervals.high.tolist(), strict=True)
-    return {m: {"low": low, "high": high} for m, low, high in ends}
-
-
-def _search_intervals(contest: Contest, function: int | None = None) -> dict[int, dict[str, float]]:
-    """Return each method's mean share of targets, of all or of one function, with the interval of other instances."""
-    places = contest.places()
-    own = [k for k, place in enumerate(places) if function in (None, place["function"])]
-    strata, clusters = ([places[k][name] for k in own] for name in ("function", "instance"))
-    ends = {}
-    for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2)[:, own], strict=True):
-        share = mean_interval(shares, strata, clusters)
-        ends[m] = {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
-    return ends
-
-
-def function_shares(contest: Contest) -> list[dict[str, Any]]:
-    """Return the functions of a suite's searches, each with a row for each method, the best first."""
-    return [
-        {
-            "name": f"{function} {suite_function(function).name}",
-            "rows": sorted(
-                ({"method": m, **share} for m, share in _search_intervals(contest, function).items()),
-                key=lambda row: -row["reached"],
-            ),
-        }
-        for function in sorted({place["function"] for place in contest.places()})
-    ]
 
 
 def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
@@ -177,43 +127,17 @@ def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
     duels: dict[int, dict[str, float | None]] = {m: dict.fromkeys(names) for m in range(len(contest.runs.methods))}
     for pair in contest.comparisons:
         if place == pair.first:
-            values = -pair.difference, -pair.high, -pair.low, pair.adjusted
-            duels[contest.methods[pair.second]] = dict(zip(names, values, strict=True))
-        elif place == pair.second:
-            values = pair.difference, pair.low, pair.high, pair.adjusted
-            duels[contest.methods[pair.first]] = dict(zip(names, values, strict=True))
+            ends = -pair.difference, -pair.high, -pair.low
+        else:
+            ends = pair.difference, pair.low, pair.high
+        if place in (pair.first, pair.second):
+            other = contest.methods[pair.first + pair.second - place]
+            duels[other] = dict(zip(names, (*ends, pair.adjusted), strict=True))
     return duels
 
 
-def baseline_rows(contest: Contest) -> list[dict[str, Any]]:
-    """Return a row for each baseline, on the same runs as the methods.
-
-    Of single searches it is random search, if a method that takes part is it: the best of its variants.
-    """
-    if contest.runs.is_search:
-        shares = contest.of("reached")
-        random = [mean(shares[k]) for k, m in enumerate(contest.methods) if is_random(contest.runs, m)]
-        return [{"baseline": RANDOM, "reached": max(filter(None, random), default=0.0)}] if random else []
-    # of each the means (instances, seeds) over the methods that have a value
-    values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
-    errors = {name: interquartile_mean(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
-    return [
-        {"baseline": name, "error": error, **{f"skill_{other}": _skill(error, errors[other]) for other in BASELINES}}
-        for name, error in errors.items()
-    ]
-
-
-def _skill(error: float | None, baseline: float | None) -> float | None:
-    return None if error is None or baseline is None else skill(error, baseline)
-
-
-def is_random(runs: Runs, method: int) -> bool:
-    """Return whether a method is random search."""
-    return bool(runs.variants[method]["method"] == RANDOM)
-
-
 def paired_tests(contest: Contest) -> dict[str, Any] | None:
-    """Return the paired tests of a contest of tracks; None where there are not two methods and two blocks.
+    """Return the paired tests of a contest; None where there are not two methods and two blocks.
 
     `pairs` lists first, second, median difference of errors and its interval, p, p after Holm, and the probability that
     the first is better than the second with its interval, nan where that is not cheap: a difference below 0 is in
@@ -221,7 +145,7 @@ def paired_tests(contest: Contest) -> dict[str, Any] | None:
     """
     if not contest.testable:
         return None
-    errors, rng = contest.of("error"), np.random.default_rng(BOOTSTRAP_SEED)
+    errors, rng = contest.of("error"), contest.rng()
     pairs = [list(astuple(comparison)) for comparison in contest.comparisons]
     better = probability_of_improvement(errors)
     count = int(min(WORK / (errors[0].size * errors.shape[2] * len(pairs)), RESAMPLES))

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import ANGLES
-from posefit.report.runs import damage, views
+from posefit.report.tracks import damage, views
 from posefit.statistics.profiles import Trace
 from posefit.suites.functions import suite_function
 from posefit.suites.running import SuiteRun, budgets_differ, method_name

@@ -10,17 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.geometry.skeleton import JOINTS
-from posefit.report.columns import COLUMNS
+from posefit.report.charts import Chart, joint_errors, track_charts
 from posefit.report.contest import contest_of, leaderboard
-from posefit.report.curves import certainty, convergence, grid, joint_errors, reached
 from posefit.report.export import latex_table, write_csv
 from posefit.report.runs import Runs
 from posefit.statistics.intervals import Intervals
-from posefit.statistics.profiles import performance_profile
 from posefit.statistics.ranks import Ranking, friedman
 
 if TYPE_CHECKING:
@@ -31,9 +28,7 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES = ("-", "--", ":", "-.")
 METADATA: dict[str, dict[str, Any]] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}  # of formats
-LEVELS = 200  # of a performance profile
 _SIZE = (6.4, 3.6)  # inches
-_SHARES = (-0.02, 1.02)  # ends of an axis
 # a critical-difference plot: inches a row; rows above the line, and from one bar to the next
 _ROW, _ABOVE, _BAR = 0.24, 3.1, 0.4
 
@@ -47,25 +42,21 @@ def save(figure: "Figure", path: str | Path) -> None:
         figure.savefig(building, dpi=200, bbox_inches="tight", metadata=METADATA[kind])  # long names too
 
 
-def curves_figure(methods: Sequence[str], evaluations: Array, curves: Sequence[Intervals]) -> "Figure":
-    """Return the best costs over evaluations (p,), each with its band: of each method the intervals of p values."""
-    figure, axes = _figure("evaluations", "best cost")
-    for k, curve in enumerate(curves):
-        axes.plot(evaluations, curve.values, **_line(methods, k))
-        axes.fill_between(evaluations, curve.low, curve.high, color=_colour(k), alpha=0.18, linewidth=0)
-    axes.set_xscale("log")
-    return _with_legend(figure, methods)
-
-
-def shares_figure(
-    methods: Sequence[str], x: Array, shares: Array, x_label: str, y_label: str, *, log: bool = False
-) -> "Figure":
-    """Return the shares (methods, p) of runs, or of runs and targets, within values x (p,)."""
-    figure, axes = _figure(x_label, y_label)
-    for k, share in enumerate(shares):
-        axes.step(x, share, where="post", **_line(methods, k))
-    axes.set_xscale("log" if log else "linear")
-    axes.set_ylim(*_SHARES)
+def chart_figure(methods: Sequence[str], chart: Chart) -> "Figure":
+    """Return a chart as the page has it: a line for each method, with its band and its dots."""
+    figure, axes = _figure(chart.x_label, chart.y_label)
+    for x, y, end, top in chart.guides:
+        axes.plot([x, end], [y, top], color="0.7", linewidth=1, linestyle="--")
+    for k, line in enumerate(chart.lines):
+        if line is None:
+            continue
+        marker = "o" if line.dots else None
+        axes.plot(line.x, line.y, marker=marker, drawstyle="steps-post" if chart.stepped else None, **_line(methods, k))
+        if line.low is not None and line.high is not None:
+            axes.fill_between(line.x, line.low, line.high, color=_colour(k), alpha=0.18, linewidth=0)
+    axes.set_xscale("log" if chart.log else "linear")
+    if chart.most is not None:
+        axes.set_ylim(-0.02 * chart.most, 1.02 * chart.most)
     return _with_legend(figure, methods)
 
 
@@ -89,44 +80,6 @@ def joint_errors_figure(methods: Sequence[str], joints: Sequence[str], errors: S
     axes.set_ylim(len(joints) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
     axes.set_xlim(left=0.0)
-    return _with_legend(figure, methods)
-
-
-def reliability_figure(methods: Sequence[str], bins: Sequence[Sequence[Sequence[float]]]) -> "Figure":
-    """Return how often the likeliest mode is right, over its probability: on the diagonal if methods are calibrated.
-
-    Each method has rows of the number of frames, their mean probability, and the share that is right; the area of a dot
-    is the number.
-    """
-    figure, axes = _figure("probability of the likeliest mode", "share of frames where it is right", (5.2, 3.6))
-    axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
-    for k, rows in enumerate(bins):
-        count, probability, right = np.array(rows, dtype=float).T
-        axes.plot(probability, right, **_line(methods, k))
-        axes.scatter(probability, right, 8 + 80 * count / count.sum(), color=_colour(k))
-    axes.set_xlim(*_SHARES)
-    axes.set_ylim(*_SHARES)
-    return _with_legend(figure, methods)
-
-
-def coverage_figure(
-    methods: Sequence[str],
-    levels: Sequence[float],
-    widths: Sequence[Sequence[float]],
-    shares: Sequence[Sequence[float]],
-) -> "Figure":
-    """Return the share of joints within their intervals over their width: a line for each method, a dot for each level.
-
-    Horizontal lines are the nominal shares.
-    """
-    figure, axes = _figure("radius of intervals, mm", "share of joints within")
-    for level in levels:
-        axes.axhline(level, color="0.8", linewidth=1)
-    for k, (wide, share) in enumerate(zip(widths, shares, strict=True)):
-        axes.plot(wide, share, marker="o", **_line(methods, k))
-    axes.set_yticks([0.0, *levels, 1.0])
-    axes.set_xlim(left=0.0)
-    axes.set_ylim(*_SHARES)
     return _with_legend(figure, methods)
 
 
@@ -219,31 +172,14 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     if contest is None:
         raise InputError("figures must be of runs with errors, got none")
     names = [runs.methods[m] for m in contest.methods]
-    errors, evaluations = contest.of("error"), grid(contest)
-    figures: dict[str, Figure] = {}
-    curves = zip(names, convergence(contest, evaluations), strict=True)
-    if known := {name: curve for name, curve in curves if curve is not None}:
-        figures["convergence"] = curves_figure(list(known), evaluations, list(known.values()))
-        labels = ("evaluations", "share of runs and targets reached")
-        shares = reached(contest, evaluations)
-        figures["attainment"] = shares_figure(names, evaluations, shares, *labels, log=True)
-    levels = np.linspace(0.0, float(errors.max()), LEVELS)
-    shares = performance_profile(errors, levels)
-    figures["profile"] = shares_figure(names, levels, shares, "error, degrees", "share of runs within")
+    figures = {chart.name: chart_figure(names, chart) for chart in track_charts(contest, contest)}
     if joints := joint_errors(contest):
         figures["joints"] = joint_errors_figure(names, JOINTS, joints)
     if contest.testable:
         figures["critical-difference"] = critical_difference_figure(names, friedman(contest.tested_errors()))
-    if calibration := certainty(contest):
-        methods = {name: method for name, method in zip(names, calibration["methods"], strict=True) if method}
-        if bins := {name: method["reliability"] for name, method in methods.items() if method["reliability"]}:
-            figures["reliability"] = reliability_figure(list(bins), list(bins.values()))
-        if covered := {name: method for name, method in methods.items() if None not in method["coverage"]}:
-            widths, covers = ([method[kind] for method in covered.values()] for kind in ("width", "coverage"))
-            figures["coverage"] = coverage_figure(list(covered), calibration["levels"], widths, covers)
-    error, *others = runs.table_figures
-    table = {"method": "name", COLUMNS[error].heading: error, "low": "low", "high": "high", "group": "letters"}
-    table |= {**{COLUMNS[name].heading: name for name in others}, "runs": "runs"}
+    columns, (error, *others) = runs.kind.columns, runs.table_figures
+    table = {"method": "name", columns[error].heading: error, "low": "low", "high": "high", "group": "letters"}
+    table |= {**{columns[name].heading: name for name in others}, "runs": "runs"}
     rows = [{title: row[key] for title, key in table.items()} for row in leaderboard(contest)]
     with new_folder(path) as folder:
         for name, figure in figures.items():

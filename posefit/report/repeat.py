@@ -4,9 +4,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from posefit.sweep.cell import setting_text
+from posefit.settings import setting_text
 from posefit.sweep.check import FIELDS
-from posefit.sweep.table import is_search
 
 LAST_FIELDS = ("instance", "seed")  # the fields that rows with the same head differ in
 _BEGIN = "posefit sweep - --out rerun <<'END'\n"
@@ -15,7 +14,7 @@ _ESCAPES = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x2028, 0x20
 
 def repeat_command(spec: Mapping[str, Any]) -> str:
     """Return the shell command that runs the cell of a spec again, with the ledger `rerun`."""
-    if not is_search(spec):
+    if spec["kind"] == "track":
         return command_head(spec) + "".join(f"{name} = {_toml(spec[name])}\n" for name in LAST_FIELDS) + "END"
     plan = {
         "suite": spec["suite"],

@@ -5,18 +5,17 @@ from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
+from posefit.evaluation.measures import BASELINES
 from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
-from posefit.reading import counted, cut
+from posefit.reading import cut
 from posefit.report.content import data_of
 from posefit.report.export import logged_runs, write_csv, write_iohprofiler
 from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
-from posefit.tracking.measures import BASELINES
 
-MAX_MISSING = 20  # instances that are named if they are not compared
 SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
@@ -46,7 +45,7 @@ def write_report(
         library("figure")
     ledger = Ledger(*paths)
     runs = runs_of(ledger)
-    if runs.is_search and (figures is not None or iohprofiler is not None):
+    if runs.kind.name == "search" and (figures is not None or iohprofiler is not None):
         name = "iohprofiler" if figures is None else "figures"
         table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
         raise InputError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
@@ -69,60 +68,38 @@ def write_report(
 
 def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leader, what is left out, the leaderboard, and the page's place."""
-    lines = [*report["answer"]] if report.get("leaderboard") else []
-    lines += _gap_lines(report["header"])
-    lines += _board_lines(report)
+    lines = [*report["answer"]] if "leaderboard" in report else []
+    for text, details in report["header"]["trouble"]:
+        lines += [text, *(f"  {detail}" for detail in details)]
+    lines += _board_lines(report) if "leaderboard" in report else []
     return lines if report["out"] is None else [*lines, f"written to {report['out']}: open it in any browser"]
 
 
 def _board_lines(report: dict[str, Any]) -> list[str]:
-    """Return the leaderboard and, below it, the baselines that skills compare with."""
-    board = report.get("leaderboard") or []
-    if not board:
-        return []
+    """Return the leaderboard and, below it, the baseline that skills compare with."""
+    board = report["leaderboard"]
     score, digits = ("reached", 1) if "reached" in board[0] else ("error", 2)
+    title = {"error": "error deg", "reached": "targets %"}[score]
 
-    def number(name: str, digits: int, factor: float = 1.0) -> Callable[[dict[str, Any]], str]:
-        return lambda row: "-" if row.get(name) is None else f"{factor * row[name]:z.{digits}f}"
+    def number(value: float | None, digits: int) -> str:
+        return "-" if value is None else f"{value:z.{digits}f}"
 
-    def interval(row: dict[str, Any]) -> str:
-        return "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
+    def cells(row: dict[str, Any]) -> dict[str, str]:
+        """Return what stands below each title."""
+        ends = "" if row["low"] is None else f"{row['low']:.{digits}f} to {row['high']:.{digits}f}"
+        shown = {title: number(row[score], digits), "  95 % interval": ends}
+        shown |= {"  behind": number(row["behind"], digits), "      p": number(row["p"], 3)}
+        if score == "reached":
+            return {**shown, "   above": number(row["above"], 2)}
+        lost = "-" if row["lost"] is None else number(100.0 * row["lost"], 1)
+        shown |= {" lost in": f"{row['lost_tracks']}/{row['runs']}", "  lost %": lost}
+        return {**shown, "   skill": number(row[f"skill_{SKILL_OF}"], 2)}
 
-    columns: dict[str, Callable[[dict[str, Any]], str]] = {
-        {"error": "error deg", "reached": "targets %"}[score]: number(score, digits),
-        "  95 % interval": interval,
-        "  behind": number("behind", digits),
-        "      p": number("p", 3),
-    }
-    if score == "reached":
-        columns["   above"] = number("above", 2)
-    else:
-        columns[" lost in"] = lambda row: f"{row['lost_tracks']}/{row['runs']}"
-        columns |= {"  lost %": number("lost", 1, 100.0), "   skill": number(f"skill_{SKILL_OF}", 2)}
     width = max(len(BASELINES[SKILL_OF]), *(len(row["name"]) for row in board))
-    lines = [f"{'':{width}} {' '.join(columns)}"]
-    for row in board:
-        cells = [f"{show(row):>{len(title)}}" for title, show in columns.items()]
-        lines.append(f"{row['name']:{width}} {' '.join(cells)}")
+    lines = [f"{'':{width}} {' '.join(cells(board[0]))}"]
+    lines += [f"{row['name']:{width}} " + " ".join(f"{v:>{len(k)}}" for k, v in cells(row).items()) for row in board]
     compared = [row for row in report["baselines"] if row["baseline"] == SKILL_OF and row["error"] is not None]
     return lines + [f"{BASELINES[SKILL_OF]:{width}} {row['error']:9.2f}" for row in compared]
-
-
-def _gap_lines(header: dict[str, Any]) -> list[str]:
-    """Return the lines about failures, and the instances that are therefore not compared."""
-    lines = []
-    if header["failed"]:
-        by = "; ".join(f"{method} {count}" for method, count in header["failed_by"].items())
-        lines.append(f"{counted(header['failed'], 'cell')} failed, left out of all figures: {by}")
-        lines += [f"  {count} x {reason}" for reason, count in header["reasons"]]
-    lines += [header["unpaired"]] if header["unpaired"] else []
-    if gaps := header["dropped"]:
-        lines.append(f"left out of the comparison, for every method: {counted(len(gaps), 'instance')}")
-        for gap in gaps[:MAX_MISSING]:
-            why = f"no run of {'; '.join(gap['missing'])}" if gap["missing"] else "no seed in common"
-            lines.append(f"  {gap['instance']}: {why}")
-        lines += [f"  and {len(gaps) - MAX_MISSING} more"] if len(gaps) > MAX_MISSING else []
-    return lines
 
 
 def _check_places(ledger: Path, out: str | None, others: list[str | None]) -> None:

@@ -42,7 +42,7 @@ def areas(
 
     R is silhouette without body, B body without silhouette, Y both; unknown pixels are in none. A bone with an end
     nearer than 5 cm or behind the camera is not drawn. The counts do not depend on n or `threads`. They are made on
-    the silhouette's device.
+    the silhouette's device. Raises InputError where shapes do not fit or poses are not finite.
     """
     # Fresh, writeable arrays: numba would compile another kernel for read-only ones.
     poses, translations = writeable(poses), writeable(translations)
@@ -51,6 +51,8 @@ def areas(
         raise InputError(f"poses must have shape (n, {ANGLES}), got {poses.shape}")
     if translations.shape != (n, 3):
         raise InputError(f"translations must have shape {(n, 3)}, got {translations.shape}")
+    _check_finite("poses", poses)
+    _check_finite("translations", translations)
     if silhouette.mask.shape != (camera.height, camera.width):
         raise InputError(f"mask must have shape {(camera.height, camera.width)}, got {silhouette.mask.shape}")
     drawn.count_poses(len(poses), silhouette)
@@ -70,6 +72,11 @@ def areas(
 
     work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
     return out
+
+
+def _check_finite(name: str, values: Array) -> None:
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(values))} numbers that are not")
 
 
 def pose_costs(
@@ -138,10 +145,11 @@ def mismatch(areas: Areas, beta: float = BETA) -> Array:
 
     Raises InputError where the areas have another shape.
     """
-    if np.ndim(areas) != 2 or np.shape(areas)[1] != 3:
-        raise InputError(f"areas must have shape (n, 3), got {np.shape(areas)}")
-    costs = np.zeros(len(areas))
-    kernels.add_mismatch(areas, SCALE, beta, costs)
+    counts = np.asarray(areas)
+    if counts.ndim != 2 or counts.shape[1] != 3 or counts.dtype.kind not in "iuf":
+        raise InputError(f"areas must be numbers of shape (n, 3), got {counts.dtype} of shape {counts.shape}")
+    costs = np.zeros(len(counts))
+    kernels.add_mismatch(counts, SCALE, beta, costs)
     return costs
 
 
@@ -151,6 +159,8 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
     drawn.count_poses(1)
+    _check_finite("pose", pose)
+    _check_finite("translation", translation)
     nothing = np.zeros(strips_and_words(camera.width, camera.height), dtype=np.uint64)
     image = np.empty((1, *nothing.shape), dtype=np.uint64)
     drawing = body.skeleton.chain, body.radii, view_of(camera), kernels.Observed(nothing, nothing, 0), image

@@ -15,8 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
-from posefit.fitting.kernels import spreads_away
+from posefit.arrays import Array, jit, writeable
 from posefit.fitting.prior import Components
 
 HELD_OUT_PEOPLE = ("16", "49", "135")
@@ -156,3 +155,14 @@ def is_upright(pose: Array) -> bool:
     """Return whether a wrapped pose (66,) is one that boxes are learned from: upright, no joint turned right round."""
     tilts, joints = np.abs(pose[1:3]), np.abs(pose[3:])
     return bool(tilts.max() < math.radians(20.0) and joints.max() < 2.6)
+
+
+@jit
+def spreads_away(latents, spread, away):  # type: ignore[no-untyped-def]
+    """Write the distance of latents (n, m) from the middle (n,), in spreads (m,): every machine adds in this order."""
+    for i in range(latents.shape[0]):
+        total = 0.0
+        for m in range(latents.shape[1]):
+            scaled = latents[i, m] / spread[m]
+            total += scaled * scaled
+        away[i] = np.sqrt(total)

@@ -63,13 +63,13 @@ def run_on(
     where the plugin breaks a rule of optimisers; ImportError where a library it needs is not installed.
     """
     evaluations = EVALUATIONS * problem.dimension if evaluations is None else evaluations
-    chosen, space = dict(chosen or {}), problem.space
+    space = problem.space
     rng = np.random.default_rng([RNG_STREAM, seed, problem.id_function, problem.instance, problem.dimension])
     factory = registry().optimiser(method)
-    settings.check(method, factory, chosen)
-    with plugin_errors(f"optimiser {method}", "construction", None, (BudgetError, ImportError)):
+    chosen = settings.check(method, factory, chosen or {})
+    with plugin_errors(f"optimiser {method}", "construction", (BudgetError, ImportError)):
         optimiser = factory(space, rng, **settings.planned(factory, chosen, evaluations))
-    guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", None, evaluations)
+    guarded = CheckedOptimiser(optimiser, space, f"optimiser {method}", evaluations)
     minimise(problem.evaluate, guarded, evaluations, budget_known=True)
     return run_of(problem, method, chosen, seed=seed, budget=evaluations)
 

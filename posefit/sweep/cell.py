@@ -5,21 +5,19 @@ import io
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from posefit.errors import InputError
+from posefit.settings import settings_text
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
     from posefit.arrays import Array
-    from posefit.fitting.tracker import Frame
     from posefit.footage.scene import Scene
-    from posefit.geometry.skeleton import Skeleton
 
-MAX_TRACE_POINTS = 64
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
@@ -123,9 +121,10 @@ class TrackCell(Cell):
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""
+        from posefit.evaluation.errors import anytime_trace, mode_reliability
+        from posefit.evaluation.measures import MEASURES
         from posefit.geometry.skeleton import joint_distances
         from posefit.motion.clips import training_clips, training_motions
-        from posefit.tracking.measures import MEASURES
         from posefit.tracking.options import VIEW, TrackOptions
         from posefit.tracking.pipeline import track_scene
 
@@ -141,15 +140,15 @@ class TrackCell(Cell):
         assert result.truth is not None
         truth, estimate = result.truth.joints, result.motion.joints
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
-        measured = result.measures.as_dict()
+        measured = asdict(result.measures)
         row = {
             **{name: measured[name] for name in MEASURES if name not in UNLIKE},
-            "warnings": result.summary["warnings"],
+            "warnings": result.course.warnings,
             "evaluations_used": result.measures.evaluations,
-            "dimensions": result.summary["dimensions"],
+            "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],
-            "mode_reliability": _mode_reliability(result.estimates, truth, result.motion.skeleton),
-            "trace": anytime_trace(result.estimates),
+            "mode_reliability": mode_reliability(result.frames, truth, result.motion.skeleton),
+            "trace": anytime_trace(result.frames),
         }
         return CellResult(row, packed_joints(estimate=estimate, truth=truth))
 
@@ -286,60 +285,6 @@ def digest_of(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def settings_text(settings: Mapping[str, Any]) -> list[str]:
-    """Return settings as `--set` takes them."""
-    return [f"{name}={setting_text(value)}" for name, value in settings.items()]
-
-
-def anytime_trace(frames: "list[Frame]") -> dict[str, list[float]]:
-    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
-
-    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
-    """
-    import numpy as np
-
-    searched = [frame for frame in frames if len(frame.history)]
-    if not searched:
-        return {"evaluations": [], "cost": []}
-    spent = [_spent(frame) for frame in searched]
-    points = np.unique(np.concatenate(spent))
-    points = points[points >= max(one[0] for one in spent)]  # from where every frame has a cost
-    if len(points) > MAX_TRACE_POINTS:
-        wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
-        points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
-    costs = [
-        frame.history[np.searchsorted(one, points, side="right") - 1]
-        for frame, one in zip(searched, spent, strict=True)
-    ]
-    mean = np.mean(costs, axis=0)
-    return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
-
-
-def _spent(frame: "Frame") -> "Array":
-    """Return the evaluations (populations,) after each population; of equal ones where the tracker does not say."""
-    import numpy as np
-
-    if frame.spent is not None:
-        return np.asarray(frame.spent)
-    count = len(frame.history)
-    return np.asarray(np.arange(1, count + 1) * frame.evaluations // count)
-
-
-def _mode_reliability(frames: "list[Frame]", truth: "Array", skeleton: "Skeleton") -> list[list[float]]:
-    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
-    import numpy as np
-
-    from posefit.uncertainty.calibration import reliability
-    from posefit.uncertainty.modes import likeliest_is_right
-
-    weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
-    if not weighed:
-        return []
-    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
-    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
-    return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]
-
-
 def packed_joints(**arrays: "Array") -> bytes:
     """Return arrays in metres as an .npz, float32."""
     import numpy as np
@@ -351,12 +296,3 @@ def packed_joints(**arrays: "Array") -> bytes:
     }
     np.savez_compressed(buffer, **rounded)
     return buffer.getvalue()
-
-
-def setting_text(value: Any) -> str:
-    """Return a setting's value as `--set` takes it."""
-    if isinstance(value, bool) or value is None:
-        return str(value).lower()
-    if isinstance(value, list | tuple):
-        return ",".join(setting_text(one) for one in value)
-    return str(value)

@@ -1,5 +1,6 @@
 """Checks a cell's spec before anything runs: options of a track by their one declaration, all other fields here."""
 
+import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -7,15 +8,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from posefit import settings
 from posefit.errors import InputError
-from posefit.fitting.check import between, finite_number, whole
+from posefit.fitting.check import between, finite_number, one_of, whole
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
 from posefit.reading import SHOWN, quoted, suggestion
 from posefit.registry import Offer, registry, version_of
-from posefit.settings import population
 from posefit.silhouette.corruption import CORRUPTIONS
-from posefit.sweep.cell import ALL_AROUND, DROPPED, TrackCell, digest_of, settings_text
+from posefit.suites.functions import DIMENSIONS, SUITES, checked_address, suite_function
+from posefit.suites.problem import INFEASIBLE
+from posefit.sweep.cell import ALL_AROUND, DROPPED, SearchCell, TrackCell, digest_of, json_of
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions, declared
 
@@ -30,21 +33,18 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     Raises ValueError where a name is not known or a value makes no sense, and ImportError where a method needs a
     library that is not installed.
     """
-    for name in spec:
-        if name not in FIELDS:
-            raise InputError(f"a cell must say {', '.join(FIELDS)}, got {quoted(name)}{suggestion(name, FIELDS)}")
     for name in ("method", "motion"):
         if name not in spec:
             raise InputError(f"a cell must say its {name}, got none")
-    values = checked(spec)
-    texts = tuple(settings_text(values.get("settings", {})))
-    offers, settings = _of_method(values["method"], texts)
+    values = _checked(spec, CHECKS)
+    texts = tuple(settings.settings_text(values.get("settings", {})))
+    offers, chosen = _of_method(values["method"], texts)
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
         raise InputError(f"train must not contain the motion itself, got {values['motion']}")
     files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
     version = version_of(offer.origin for offer in offers)
-    cell = TrackCell(**{**values, "settings": dict(settings), "train": train, "files": files, "version": version})
+    cell = TrackCell(**{**values, "settings": dict(chosen), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
         raise InputError(f"evaluations must hold one population of {size}, got {cell.evaluations}")
     if files.get(cell.motion) and cell.frames > (length := _length(cell.motion, cell.fps)):
@@ -52,9 +52,35 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     return cell
 
 
-def checked(spec: Mapping[str, Any]) -> dict[str, Any]:
-    """Return fields of a cell, each by itself checked. Raises ValueError where a value makes no sense."""
-    return {name: CHECKS[name](name, value) for name, value in spec.items()}
+def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
+    """Return the single search that a spec describes, whose evaluations are a `budget` for each dimension.
+
+    None where its function does not have the dimension. Raises ValueError where anything is wrong, and ImportError
+    where the method needs a library that is not installed.
+    """
+    values = _checked(spec, SEARCH_CHECKS)
+    if (dimension := values["dimension"]) not in suite_function(values["function"]).dimensions:
+        return None
+    checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
+    evaluations = values.pop("budget") * dimension
+    version = _of_search(values["method"], json_of(values.get("settings", {})), evaluations)
+    return SearchCell(**{**values, "evaluations": evaluations, "version": version})
+
+
+def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entry of a list of optimisers with its settings, checked, by their names alone."""
+    method = _name("method", entry.get("method"))
+    given = flattened("settings", entry.get("settings", {})).items()
+    chosen = {name.rpartition(".")[2]: value for name, value in given}
+    return {**entry, "settings": settings.check(method, registry().optimiser(method), chosen)}
+
+
+def _checked(spec: Mapping[str, Any], checks: "Checks") -> dict[str, Any]:
+    """Return fields of a cell, each by itself checked. Raises ValueError where a name or a value makes no sense."""
+    if unknown := [name for name in spec if name not in checks]:
+        known = suggestion(unknown[0], checks)
+        raise InputError(f"a cell must say {', '.join(checks)}, got {quoted(unknown[0])}{known}")
+    return {name: checks[name](name, value) for name, value in spec.items()}
 
 
 def families(method: str) -> tuple[str, ...]:
@@ -80,12 +106,21 @@ def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], 
 
 
 @lru_cache(maxsize=1024)
+def _of_search(method: str, chosen: str, evaluations: int) -> str:
+    """Return the version of an optimiser. Raises ValueError where its settings, a JSON text, need a larger budget."""
+    offer = registry().offer("optimiser", method)
+    if (size := settings.population(offer.factory, json.loads(chosen), evaluations)) > evaluations:
+        raise InputError(f"evaluations must hold one population of {size}, got {evaluations} of {method}")
+    return version_of([offer.origin])
+
+
+@lru_cache(maxsize=1024)
 def _population(method: str, texts: tuple[str, ...], evaluations: int) -> int:
     """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
     offer = _offers(method)[0]
     if offer.kind != "optimiser":
         return 1
-    return population(offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations)
+    return settings.population(offer.factory, parsed_settings(_offers(method), texts)["optimiser"], evaluations)
 
 
 @lru_cache(maxsize=1024)
@@ -118,8 +153,7 @@ def _name(field: str, value: Any) -> str:
     return value
 
 
-def label(field: str, value: Any) -> str:
-    """Return what reports call a method."""
+def _label(field: str, value: Any) -> str:
     if not isinstance(value, str) or len(value) > SHOWN or not value.isprintable():
         raise InputError(f"{field} must be a text of at most {SHOWN} characters, got {quoted(value)}")
     return value
@@ -196,18 +230,44 @@ def _within(high: float) -> Callable[[str, Any], float]:
     return check
 
 
+def _whole(least: int) -> "Check":
+    return lambda field, value: whole(field, value, least)
+
+
+def _choice(*choices: object) -> "Check":
+    def checked(field: str, value: Any) -> Any:
+        one_of(field, value, choices)
+        return value
+
+    return checked
+
+
 _OPTIONS = {one.name: check for one in fields(TrackOptions) if (check := declared(one).check) is not None}
-CHECKS: dict[str, Callable[[str, Any], Any]] = {
-    **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
+Check = Callable[[str, Any], Any]
+Checks = Mapping[str, Check]
+CHECKS: Checks = {
     "method": _method,
     "motion": _motion,
+    **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
     "train": _train,
     "settings": flattened,
     "view_degrees": _views,
     "corruption": _corruption,
-    "instance": lambda field, value: whole(field, value, 0),
-    "name": lambda field, value: label(field, value),
+    "instance": _whole(0),
+    "name": _label,
     "frames": _frames,
     "yaw_off_degrees": _within(ALL_AROUND),
     "body_off_percent": _within(MAX_BODY_OFF),
+}
+SEARCH_CHECKS: Checks = {
+    "suite": _choice(*SUITES),
+    "method": _name,
+    "function": lambda _, value: suite_function(value).number,
+    "dimension": _choice(*DIMENSIONS),
+    "instance": _whole(0),
+    "budget": _whole(1),
+    "settings": flattened,
+    "infeasible": _choice(*INFEASIBLE),
+    "seed": _whole(0),
+    "name": _label,
 }

@@ -4,45 +4,45 @@ import json
 import os
 import re
 import shlex
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from posefit.errors import InputError
+from posefit.progress import bars_shown
 from posefit.reading import counted, cut
 from posefit.sweep.cell import Cell, json_of, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
-from posefit.sweep.engine import Engine, Limits, Run, estimate
+from posefit.sweep.engine import POLL_SECONDS, Engine, Limits, Run
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS, Plan
 from posefit.sweep.pool import Pool, cores
 
 VALUES = 12  # of a field, that a preview lists
 WARNINGS = 5  # of a preview
-
-Say = Callable[[str], None]
+TRIAL_SECONDS = 120.0  # that a trial of a preview may take at most, whatever a cell may
 
 
 def swept(
-    plan: Plan,
+    plan: Iterable[Cell],
     out: str | Path,
     engine: Engine,
-    say: Say,
+    say: Callable[[str], None],
     *,
     shard: str | None = None,
     retry_quarantined: bool = False,
     keep_old: bool = False,
+    quiet: bool = False,
 ) -> Tally:
     """Return how the cells of a plan, or of one shard, ended that an engine ran into a folder, with a bar on stderr.
 
     With `keep_old` a cell does not run that has a row of another version of posefit or of a plugin. The engine is
     closed at the end.
     """
-    from tqdm import tqdm
+    from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
         old: dict[str, Counter[str]] = {}  # the versions of rows that count for no cell of today, by the rest of a spec
@@ -57,25 +57,21 @@ def swept(
         if retry_quarantined:
             count = ledger.release_quarantined()
             say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
-        bar = tqdm(total=ledger.counts().total(), unit="cell", file=sys.stderr, dynamic_ncols=True, delay=1e-9)
-        start: list[int] = []
+        total, finished = (counts := ledger.counts()).total(), counts["done"] + counts["quarantined"]
+        if finished:
+            say(f"{finished} of {total} cells are done already")
+        hidden = quiet or not bars_shown()
+        with tqdm(total=total, initial=finished, unit="cell", dynamic_ncols=True, disable=hidden) as bar:
 
-        def watch(tally: Tally) -> None:
-            finished = tally.done + tally.quarantined
-            if not start:
-                start.append(finished)
-                bar.n = bar.initial = finished
-                if finished:
-                    say(f"{finished} of {tally.cells} cells are done already")
-            if tally.failed or tally.quarantined:
-                bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
-            bar.update(finished - bar.n)
+            def watch(tally: Tally) -> None:
+                if tally.failed or tally.quarantined:
+                    bar.set_postfix(failures=tally.failed, quarantined=tally.quarantined, refresh=False)
+                bar.update(tally.done + tally.quarantined - bar.n)
 
-        def say_beside_bar(message: str) -> None:
-            bar.clear()
-            say(message)
+            def say_beside_bar(message: str) -> None:
+                bar.clear()
+                say(message)
 
-        with bar:
             return drive(ledger, engine, say_beside_bar, watch)
 
 
@@ -89,7 +85,7 @@ def file_of(shard: str | None) -> str:
     return f"ledger-{int(match[1])}-of-{int(match[2])}.sqlite"
 
 
-def cells_of(plan: Plan, shard: str | None) -> Iterator[Cell]:
+def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     """Return the cells of a plan, or each Nth of them, from the Ith, for a shard I/N."""
     first, _, count = (shard or "1/1").partition("/")
     return islice(plan, int(first) - 1, None, int(count))
@@ -127,11 +123,16 @@ def preview(plan: str, out: str | None, shard: str | None, start: Callable[[], E
     if first:
         with closing(start()) as engine:
             workers = engine.window()
-            for (method, cell), taken in zip(first.items(), estimate(list(first.values()), engine), strict=True):
-                if isinstance(taken, str):
-                    untried[str(cell)] = taken
+            for method, cell in first.items():
+                for _ in range(2):  # the first compiles what is not compiled yet
+                    engine.submit(cell)
+                    while not (outcomes := engine.wait(POLL_SECONDS)):
+                        pass
+                    if outcomes[0].result is None:
+                        untried[str(cell)] = outcomes[0].reason or "what ran it was lost"
+                        break
                 else:
-                    seconds += taken * totals[method] / cell.total_evaluations / workers
+                    seconds += outcomes[0].result.row["seconds"] * totals[method] / cell.total_evaluations / workers
     if as_json:
         rest = {"seconds": seconds, "workers": workers, "untried": untried}
         yield f"], {json.dumps(rest)[1:]}"
@@ -182,16 +183,15 @@ def engine(
     return start
 
 
-def tally_text(tally: Tally, out: str) -> str:
+def tally_lines(tally: Tally, out: str) -> list[str]:
     """Return how a sweep ended, and the command that shows its results."""
     line = f"{tally.done} of {tally.cells} cells done, {tally.ran} of them now, written to {out}"
     if tally.quarantined:
         line += f"; {tally.quarantined} quarantined: posefit report names the reasons"
     if tally.stopped:
-        line += "; stopped: the same command goes on from there"
-    elif tally.done:
-        line += f"\nresults: posefit report {shlex.quote(out)} --out {shlex.quote(f'{out.rstrip(os.sep)}.html')}"
-    return line
+        return [f"{line}; stopped: the same command goes on from there"]
+    page = shlex.quote(f"{out.rstrip(os.sep)}.html")
+    return [line, f"results: posefit report {shlex.quote(out)} --out {page}"] if tally.done else [line]
 
 
 def duration_text(seconds: float) -> str:

@@ -9,19 +9,15 @@ A Dask cluster, here or elsewhere, is one too: cluster.py.
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
-from posefit.errors import InputError
+from posefit.errors import printable
 from posefit.fitting.check import between
 from posefit.limits import GIGABYTES, SECONDS
-from posefit.sweep.cell import Cell, CellResult
 
-J = TypeVar("J")  # a job: a cell, or whatever else its function takes
-R = TypeVar("R")  # its result
-Run = Callable[[Any], CellResult]
-TRIAL_SECONDS = 120.0  # that a trial of an estimate may take at most, whatever a cell may
+Run = Callable[[Any], Any]
 POLL_SECONDS = 0.2
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
@@ -37,26 +33,16 @@ class Limits:
         between("the limit of seconds", self.seconds, *SECONDS)
         between("the limit of gigabytes", self.gigabytes, *GIGABYTES)
 
-    @property
-    def overtime(self) -> str:
-        """Why a cell failed that took too long."""
-        return f"it ran past its limit of {self.seconds:g} s"
-
-    @property
-    def too_large(self) -> str:
-        """Why a cell failed that wanted too much memory."""
-        return f"it wanted more memory than its limit of {self.gigabytes:g} GB"
-
 
 @dataclass(frozen=True)
-class Outcome(Generic[J, R]):
-    """What became of a job: a result, or the reason why there is none, and whether that is the job's own fault.
+class Outcome:
+    """What became of a job, a cell or whatever an engine's function takes: a result, or the reason why there is none.
 
     With neither it was lost with what ran it, and counts as not tried.
     """
 
-    job: J
-    result: R | None = field(default=None, repr=False)
+    job: Any
+    result: Any = field(default=None, repr=False)
     reason: str | None = None
     own: bool = True  # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
 
@@ -65,14 +51,14 @@ class Engine(Protocol):
     """Runs so many jobs at a time."""
 
     def window(self) -> int:
-        """Return how many jobs may run at the moment. Raises EngineError where the engine is gone for good."""
+        """Return how many jobs may run at the moment. Raises InputError where the engine is gone for good."""
         ...
 
     def submit(self, job: Any) -> None:
         """Start a job."""
         ...
 
-    def wait(self, seconds: float) -> list[Outcome[Any, Any]]:
+    def wait(self, seconds: float) -> list[Outcome]:
         """Return the jobs that ended, once one has or the time is over."""
         ...
 
@@ -81,13 +67,9 @@ class Engine(Protocol):
         ...
 
 
-class EngineError(InputError):
-    """An engine cannot go on."""
-
-
 def text_of(error: BaseException) -> str:
     """Return an exception in one line."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
+    return printable(f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": "))
 
 
 def single_thread() -> None:
@@ -102,20 +84,3 @@ def single_thread() -> None:
     cv2.setNumThreads(1)
     numba.set_num_threads(1)
     threadpool_limits(1)
-
-
-def estimate(cells: Sequence[Cell], engine: Engine) -> list[float | str]:
-    """Return how many seconds each of some cells takes, run for the second time, or why it failed at the first."""
-    taken: list[float | str] = []
-    for cell in cells:
-        for _ in range(2):  # the first compiles what is not compiled yet
-            engine.submit(cell)
-            while not (outcomes := engine.wait(POLL_SECONDS)):
-                pass
-            if (result := outcomes[0].result) is None:
-                taken.append(outcomes[0].reason or "what ran it was lost")
-                break
-        else:
-            assert result is not None
-            taken.append(float(result.row["seconds"]))
-    return taken

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
-from posefit.reading import cut, quoted
+from posefit.reading import counted, cut, quoted
 from posefit.sweep.cell import Cell, CellResult, cell_from, other_version
 from posefit.sweep.row import checked_row
 from posefit.version import posefit_build
@@ -41,6 +41,8 @@ LOSSES = 50  # attempts that something outside ended
 BUSY_SECONDS = 60.0  # to wait for a reader that is in the way
 MAX_JOINTS_BYTES = 100_000_000  # of a cell, unpacked
 MAX_VALUE_BYTES = 200_000_000  # of a value in a file
+MIN_FILE_BYTES = 512  # a page of SQLite, at least
+COLUMNS = {"key", "kind", "spec", "status", "faults", "losses", "row", "arrays"}
 NAMES = ("key", "spec", "status")  # that a row has beside its figures
 SCHEMA = f"""
 PRAGMA journal_mode = WAL;
@@ -66,6 +68,7 @@ class Ledger:
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
+        self._paths = paths
         self.files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
         self._open = [(file, _reader(file)) for file in self.files]
         # of cells in several files the first finished one counts, or the first
@@ -74,6 +77,9 @@ class Ledger:
             for key, status in self._query(k, "SELECT key, status FROM cells WHERE status != 'planned'"):
                 if key not in self._places or (status == "done" and not self._places[key][1]):
                     self._places[key] = k, status == "done"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Ledger, tuple(Path(path).absolute() for path in self._paths)
 
     def __len__(self) -> int:
         return sum(done for _, done in self._places.values())
@@ -200,10 +206,9 @@ class Writer:
         except (OSError, sqlite3.Error) as error:
             raise _unwritable(self.path, error) from None
         try:
-            if self.path.stat().st_size:
-                _check_format(self.path, self._db)
-                if (found := self._db.execute("PRAGMA quick_check(1)").fetchone()[0]) != "ok":
-                    raise sqlite3.DatabaseError(found)
+            whole = _check_format(self.path, self._db) and self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
+            if whole and whole != "ok":
+                raise sqlite3.DatabaseError(whole)
             self._db.executescript(SCHEMA)
             self._db.execute("PRAGMA synchronous = FULL")  # what is written survives the loss of power
             self._db.execute("CREATE TEMP TABLE planned (key TEXT PRIMARY KEY)")
@@ -232,13 +237,8 @@ class Writer:
         """Write all that the body does, or nothing. Raises InputError where there is no room."""
         try:
             self._db.execute("BEGIN IMMEDIATE")
-            try:
+            with self._db:  # which commits, or rolls back
                 yield
-                self._db.execute("COMMIT")
-            except BaseException:
-                if self._db.in_transaction:
-                    self._db.execute("ROLLBACK")
-                raise
         except sqlite3.OperationalError as error:
             raise _unwritable(self.path, error) from None
 
@@ -327,20 +327,24 @@ def _reader(file: Path) -> sqlite3.Connection:
         database.execute("PRAGMA query_only = ON")
         if hasattr(database, "setlimit"):
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
-        _check_format(file, database)
+        if not _check_format(file, database):
+            raise InputError(f"{file}: expected a ledger that posefit sweep wrote, got an empty file")
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise _damaged(file, error) from None
     return database
 
 
-def _check_format(file: Path, database: sqlite3.Connection) -> None:
-    """Return nothing. Raises InputError where a file is no ledger of this format."""
-    columns = [row[1] for row in database.execute("PRAGMA table_info(cells)")]
-    kind = database.execute("SELECT type FROM sqlite_master WHERE name = 'cells'").fetchone()
-    if kind != ("table",) or not {"key", "kind", "spec", "status", "faults", "losses", "row", "arrays"} <= {*columns}:
+def _check_format(file: Path, database: sqlite3.Connection) -> bool:
+    """Return whether a file is a ledger, and not yet empty. Raises InputError where it is something else."""
+    tables = dict(database.execute("SELECT name, type FROM sqlite_master").fetchall())
+    if not tables and 0 < (size := file.stat().st_size) < MIN_FILE_BYTES:  # which SQLite takes for an empty one
+        raise sqlite3.DatabaseError(f"a file of {counted(size, 'byte')}, too short to be one")
+    columns = {row[1] for row in database.execute("PRAGMA table_info(cells)")}
+    if tables and (tables.get("cells") != "table" or not columns >= COLUMNS):
         raise InputError(f"{file}: expected a ledger that posefit sweep wrote, got another SQLite file")
-    if (form := database.execute("PRAGMA user_version").fetchone()[0]) != FORMAT:
+    if tables and (form := database.execute("PRAGMA user_version").fetchone()[0]) != FORMAT:
         raise InputError(f"{file}: expected a ledger of format {FORMAT}, got {form}")
+    return bool(tables)
 
 
 def _check_place(path: Path) -> None:

@@ -5,52 +5,52 @@ import os
 import pickle
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Any, Generic
+from typing import Any
 
 import cloudpickle
 from pebble import ProcessExpired, ProcessFuture, ProcessPool
 
 from posefit.errors import InputError
 from posefit.limits import end_with_parent, memory
-from posefit.sweep.engine import J, Limits, Outcome, R, single_thread, text_of
+from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
 START_SECONDS = 60.0  # that a process may take to begin a job
 LEFT = 64  # the status of a process that a job ended with 0
 # Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
 # out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
 OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2}
+_starting = threading.Lock()
 
 
-class Pool(Generic[J, R]):
+class Pool:
     """An engine of so many worker processes, each of which calls `prepare` first."""
 
-    def __init__(
-        self, workers: int, limits: Limits, run: Callable[[J], R], prepare: Callable[[], object] | None = None
-    ) -> None:
+    def __init__(self, workers: int, limits: Limits, run: Run, prepare: Callable[[], object] | None = None) -> None:
         if workers < 1:
             raise InputError(f"workers must be at least 1, got {workers}")
         self._workers, self._limits = workers, limits
         self._run, self._prepare = cloudpickle.dumps(run), cloudpickle.dumps(prepare)
-        self._running: dict[ProcessFuture[bytes], tuple[J, float]] = {}
+        self._running: dict[ProcessFuture[bytes], tuple[Any, float]] = {}
         self._start()
 
     def window(self) -> int:
         """Return how many processes there are."""
         return self._workers
 
-    def submit(self, job: J) -> None:
+    def submit(self, job: Any) -> None:
         """Start a job in an idle process."""
         arguments = self._run, cloudpickle.dumps(job), self._limits.gigabytes
         future = self._pool.schedule(_call, args=arguments, timeout=self._limits.seconds)
         self._running[future] = job, time.monotonic()
 
-    def wait(self, seconds: float) -> list[Outcome[J, R]]:
+    def wait(self, seconds: float) -> list[Outcome]:
         """Return the jobs that ended."""
         done = wait(self._running, seconds, FIRST_COMPLETED).done
         outcomes = [self._outcome(future) for future in tuple(self._running) if future in done]
@@ -72,12 +72,12 @@ class Pool(Generic[J, R]):
         arguments = os.getpid(), sys.path, self._prepare
         self._pool = ProcessPool(self._workers, initializer=_become_worker, initargs=arguments, context=_Context())
 
-    def _outcome(self, future: "ProcessFuture[bytes]") -> Outcome[J, R]:
+    def _outcome(self, future: "ProcessFuture[bytes]") -> Outcome:
         job, _ = self._running.pop(future)
         try:
             return Outcome(job, *pickle.loads(future.result()))
         except TimeoutError:
-            return Outcome(job, None, self._limits.overtime)
+            return Outcome(job, None, f"it ran past its limit of {self._limits.seconds:g} s")
         except ProcessExpired as error:
             code = error.exitcode or 0
             if code >= 0:
@@ -96,14 +96,13 @@ class _Process(SpawnProcess):
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
         main = sys.modules["__main__"]
-        before = {name: getattr(main, name, None) for name in ("__file__", "__spec__")}
-        try:
-            for name in before:
-                setattr(main, name, None)
-            return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
-        finally:
-            for name, value in before.items():
-                setattr(main, name, value)
+        with _starting:
+            before = {name: getattr(main, name, None) for name in ("__file__", "__spec__")}
+            try:
+                vars(main).update(dict.fromkeys(before))
+                return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
+            finally:
+                vars(main).update(before)
 
 
 class _Context(SpawnContext):
@@ -127,17 +126,15 @@ def _become_worker(parent: int, path: list[str], prepare: bytes) -> None:
 
 def _call(run: bytes, job: bytes, gigabytes: float) -> bytes:
     """Return, pickled, what a function makes of a job; or None, and why."""
-    too_large = Limits(gigabytes=gigabytes).too_large
-    ending: tuple[Any, str | None]
     try:
         with memory(gigabytes):
-            ending = pickle.loads(run)(pickle.loads(job)), None
-        return cloudpickle.dumps(ending)  # type: ignore[no-any-return]
+            result = pickle.loads(run)(pickle.loads(job))
+        return cloudpickle.dumps((result, None))  # type: ignore[no-any-return]
     except MemoryError:
-        ending = None, too_large
+        reason = f"it wanted more memory than its limit of {gigabytes:g} GB"
     except BaseException as error:  # an exit too: it is the cell's, and ends nothing else
-        ending = None, text_of(error)
-    return pickle.dumps(ending)
+        reason = text_of(error)
+    return pickle.dumps((None, reason))
 
 
 def cores() -> int:

@@ -2,6 +2,8 @@
 
 import json
 import marshal
+from dataclasses import fields
+from types import NoneType
 from typing import Any
 
 from posefit.errors import InputError
@@ -9,24 +11,22 @@ from posefit.fitting.check import one_of, whole
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.suites.functions import checked_address
-from posefit.suites.problem import INFEASIBLE
-from posefit.sweep.cell import SearchCell, TrackCell
-from posefit.sweep.check import CHECKS
+from posefit.sweep.cell import KINDS
+from posefit.sweep.check import CHECKS, SEARCH_CHECKS
 
-LARGEST = 1e30  # of a number: its square is finite, and so is itself in 32 bits
+LARGEST = 1e30  # of a figure: its square is finite, and so is itself in 32 bits
 MAX_KNOWN_SPECS = 10_000  # in memory, of those that were checked
-SCALAR, FIGURE = object(), object()  # what a setting may be, and a figure: a number, or some by their names
-# A value that stands for all of its type; in a list or a table, of all of its elements
-_MAPPINGS = {"settings": {"": SCALAR}, "corruption": {"": 0.0}, "files": {"": ""}}
-SPECS: dict[str, dict[str, Any]] = {
-    "track": {**TrackCell("", "", ("",)).spec, **_MAPPINGS},
-    "search": {**SearchCell("", "", 1, 9, 0, 1).spec, "settings": {"": SCALAR}},
-}
-_ROW = {"warnings": [""], "trace": {"": [0.0]}}
-ROWS: dict[str, dict[str, Any]] = {
-    "track": {**_ROW, "joint_errors_mm": [0.0], "mode_reliability": [[0.0]]},
-    "search": {**_ROW, "cost": 0.0, "truth_cost": 0.0},
-}
+NUMBER = (float, int)
+FIGURE = (*NUMBER, NoneType, {"": (*NUMBER, NoneType)})  # or some by their names
+SETTING = (*NUMBER, str, bool, NoneType)
+# What a value is that no check of a plan's decides: a type, one of several, or a list or table of some
+SHAPES: dict[str, Any] = {
+    "kind": str, "method": str, "motion": str, "version": str, "train": [str], "files": {"": str},
+    "settings": {"": (*SETTING, [SETTING])}, "evaluations": int, "reasons": [str], "warnings": [str],
+    "trace": {"": [NUMBER]}, "joint_errors_mm": [NUMBER], "mode_reliability": [[NUMBER]], "truth_cost": NUMBER,
+}  # fmt: skip
+SPECS = {name: {"kind", *(field.name for field in fields(kind))} for name, kind in KINDS.items()}
+ROWS = {"track": {"warnings", "trace", "joint_errors_mm", "mode_reliability"}, "search": {"trace", "truth_cost"}}
 _known_specs: set[bytes] = set()
 
 
@@ -34,22 +34,25 @@ def checked_row(key: str, spec: str, status: str, faults: str, row: str | None) 
     """Return a row of a ledger as a mapping. Raises InputError saying what was expected instead."""
     values = _parsed(spec)
     one_of("kind", kind := str(values.get("kind")), SPECS)
+    _check_names(values, SPECS[kind])
     same = marshal.dumps({**values, "seed": 0, "instance": 0}, 2)  # thousands of rows differ in nothing else
-    _check(values, SPECS[kind], ("seed", "instance") if same in _known_specs else ())
+    checks = CHECKS if kind == "track" else SEARCH_CHECKS
+    for name in ("seed", "instance") if same in _known_specs else values:
+        if name in SHAPES or name not in checks:
+            _check_shape(name, values[name])
+        elif (checked := checks[name](name, values[name])) != values[name] and list(checked) != values[name]:
+            raise InputError(f"{name} must be what posefit writes, got {quoted(values[name])}")
+    whole("evaluations", values["evaluations"], 1)
     if kind == "search":
         checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
-        one_of("infeasible", values["infeasible"], INFEASIBLE)
-    for name in ("seed", "instance", "evaluations") if kind == "search" else CHECKS.keys() - {"motion", "train"}:
-        if name not in ("method", "settings"):
-            whole(name, values[name], name == "evaluations") if kind == "search" else CHECKS[name](name, values[name])
     if len(_known_specs) < MAX_KNOWN_SPECS:
         _known_specs.add(same)
+    figures = _parsed(row or "") if status == "done" else _parsed('{"reasons": ' + faults + "}")
+    _check_names(figures, ROWS[kind] | figures.keys() if status == "done" else {"reasons"})
+    for name, value in figures.items():
+        _check_shape(name, value)
     if status != "done":
-        reasons = _parsed('{"reasons": ' + faults + "}")
-        _check(reasons, {"reasons": [""]})
-        return {"key": key, "spec": values, "status": "quarantined", **reasons}
-    figures = _parsed(row or "")
-    _check(figures, ROWS[kind] | dict.fromkeys(figures.keys() - ROWS[kind], FIGURE))
+        return {"key": key, "spec": values, "status": "quarantined", **figures}
     trace = figures["trace"]
     used, costs = trace.get("evaluations", [0]), trace.get("cost", [])
     rising = used == sorted(set(used)) and all(number >= 1 for number in used) and costs == sorted(costs, reverse=True)
@@ -72,28 +75,22 @@ def _parsed(text: str) -> dict[str, Any]:
     return values
 
 
-def _check(values: dict[str, Any], models: dict[str, Any], names: tuple[str, ...] = ()) -> None:
-    if values.keys() != models.keys():
-        wrong = min(values.keys() ^ models.keys())
-        raise InputError(
-            f"a row must hold what posefit writes, got {'one more' if wrong in values else 'none'}: {quoted(wrong)}"
-        )
-    for name in names or models:
-        if not _like(values[name], models[name], name != "seed"):
-            raise InputError(f"{name} must be what posefit writes, got {quoted(values[name])}")
+def _check_names(values: dict[str, Any], names: set[str]) -> None:
+    if values.keys() != names:
+        came = "one more" if (wrong := min(values.keys() ^ names)) in values else "none"
+        raise InputError(f"a row must hold what posefit writes, got {came}: {quoted(wrong)}")
 
 
-def _like(value: Any, model: Any, bounded: bool = True) -> bool:
-    """Return whether a value has the type and shape of its model, and numbers of a size."""
-    if model is FIGURE:
-        return value is None or _like(value, {"": None} if isinstance(value, dict) else 0.0)
-    if model is None or model is SCALAR:
-        parts = value if model is SCALAR and isinstance(value, list) else [value]
-        texts = (str, bool, type(None)) if model is SCALAR else (type(None),)
-        return all(isinstance(part, texts) or _like(part, 0.0) for part in parts)
-    if isinstance(model, list | dict):
-        parts, like = (value, model[0]) if isinstance(model, list) else (getattr(value, "values", list)(), model[""])
-        return isinstance(value, type(model)) and all(_like(part, like) for part in parts)
-    if isinstance(model, float):
-        return type(value) in (int, float) and -LARGEST < value < LARGEST
-    return type(value) is type(model) and (not bounded or isinstance(value, str) or -LARGEST < value < LARGEST)
+def _check_shape(name: str, value: Any) -> None:
+    if not _has_shape(value, SHAPES.get(name, FIGURE)):
+        raise InputError(f"{name} must be what posefit writes, got {quoted(value)}")
+
+
+def _has_shape(value: Any, shape: Any) -> bool:
+    if isinstance(shape, tuple):
+        return any(_has_shape(value, one) for one in shape)
+    if isinstance(shape, list):
+        return isinstance(value, list) and all(_has_shape(part, shape[0]) for part in value)
+    if isinstance(shape, dict):
+        return isinstance(value, dict) and all(_has_shape(part, shape[""]) for part in value.values())
+    return type(value) is shape and (shape not in NUMBER or -LARGEST < value < LARGEST)

@@ -15,9 +15,9 @@ import numpy as np
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
+from posefit.settings import settings_text
 from posefit.suites.problem import TARGETS
 from posefit.suites.running import SuiteRun
-from posefit.sweep.cell import settings_text
 
 if TYPE_CHECKING:
     import pandas as pd

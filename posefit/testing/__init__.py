@@ -55,9 +55,11 @@ def prior_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None
     return _checks("prior", factory, settings)
 
 
-def tracker_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:
-    """Return the checks of a tracker's factory."""
-    return _checks("tracker", factory, settings)
+def tracker_checks(
+    factory: Callable[..., Any], *, settings: dict[str, Any] | None = None, looks_ahead: bool = False
+) -> list[Check]:
+    """Return the checks of a tracker's factory, which is registered as one that `looks_ahead` or not."""
+    return _checks("tracker", factory, settings, looks_ahead)
 
 
 def segmenter_checks(factory: Callable[..., Any], *, settings: dict[str, Any] | None = None) -> list[Check]:

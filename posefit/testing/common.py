@@ -38,13 +38,14 @@ class PluginCase:
 
 def construction(case: PluginCase) -> None:
     """A factory takes what its kind is given, and keyword-only settings."""
-    kinds = [one.kind for one in inspect.signature(case.factory).parameters.values()]
+    parameters = inspect.signature(case.factory).parameters
+    kinds = [one.kind for one in parameters.values()]
     expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
-    by_position = [kind for kind in kinds if kind is not inspect.Parameter.KEYWORD_ONLY]
-    taken = ", ".join(case.arguments)
+    by_position = [name for name, one in parameters.items() if one.kind is not inspect.Parameter.KEYWORD_ONLY]
+    taken, more = ", ".join(case.arguments), ", ".join(by_position[len(case.arguments) :])
+    came = f"{more} before the *" if more else f"({', '.join(by_position)})"
     expect(
-        len(by_position) == len(case.arguments),
-        f"a factory must take ({taken}) and keyword-only settings, got {len(by_position)} that are not keyword-only",
+        len(by_position) == len(case.arguments), f"a factory must take ({taken}) and keyword-only settings, got {came}"
     )
     for setting in settings_of(case.factory):
         if setting.annotation is inspect.Parameter.empty:

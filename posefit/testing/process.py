@@ -121,7 +121,8 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     settings = parse_texts(offer.name, offer.factory, texts)
     if kind == "prior" and settings:
         offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check
-    options = {"next_frame": offer.next_frame} if kind == "optimiser" else {}
+    registered = {"optimiser": "next_frame", "tracker": "looks_ahead"}
+    options: dict[str, Any] = {registered[kind]: getattr(offer, registered[kind])} if kind in registered else {}
     checks: list[Check] = getattr(testing, f"{kind}_checks")(offer.factory, settings=settings, **options)
     names = [check.name for check in checks]
     for rule in only:

@@ -11,8 +11,7 @@
 | the steps of tracking, in their order | pipeline.py, and the files that it names |
 | names become an optimiser, a prior or a tracker, with settings checked and a budget | method.py |
 | what a trajectory costs, and which of two is kept | trajectory.py |
-| errors and baselines of a track; what every figure is called, its unit and meaning | evaluation.py, measures.py |
-| the folder that appears whole, and goes on where it ended; whether two tracks are the same | outputs.py, identity.py |
-| pictures, the page | picture.py, drawing.py, page/ |
-| the printed table, and the signs of trust | table.py, trust.py |
+| errors or signs of trust, at the end | evaluate.py, and `posefit.evaluation` |
+| what comes back | result.py |
+| frames as they come | live.py |
 """

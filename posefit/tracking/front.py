@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from posefit.errors import InputError
 from posefit.fitting.check import whole
+from posefit.fitting.driving import clocks
 from posefit.footage.images import IMAGES
 from posefit.footage.readers import name_of
 from posefit.footage.scene import Scene
@@ -17,12 +18,12 @@ from posefit.footage.source import Footage, check_used, kind_of, scene_of
 from posefit.motion import built_in
 from posefit.motion.clips import Source, training_clips, training_motions
 from posefit.motion.motion import Motion
+from posefit.output.folder import OutputFolder, Recorder
+from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
-from posefit.tracking.identity import Digest, digest_of
 from posefit.tracking.method import resolved
 from posefit.tracking.options import VIEW, TrackOptions, declared
-from posefit.tracking.outputs import Output, OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
 from posefit.version import __version__
@@ -70,19 +71,25 @@ def track(
         if value and out is None:
             raise InputError(f"{name} must be given with out, the folder of the track, got none")
     progress = progress or interactive()
-    folder = Output()
+    recorder = Recorder()
     if out is not None:
-        folder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
-    with folder as output:
+        recorder = OutputFolder(out, force, resume, _identity(sources, chosen, options.get("train", ())), progress.log)
+    with recorder:
         with progress.phase("masks"):
+            start = clocks()
             scene = scene or scene_of(sources, progress, **chosen.view)
-        names = {
-            "source": [each.name if isinstance(each, Motion) else name_of(each) for each in sources],
-            "frames_chosen": list(chosen.frames),
-            "view_degrees": options.get("view_degrees"),
-        }
+            if scene.truth is None:  # a known motion is drawn frame by frame, as it is tracked
+                seconds, cpu_seconds = (clocks() - start).tolist()
+                scene = replace(scene, reading_seconds=(seconds, cpu_seconds))
         training = training_motions(clips, scene.fps)
-        return track_scene(scene, training, chosen, output=output, progress=progress, source=names)
+        track = track_scene(scene, training, chosen, recorder=recorder, progress=progress)
+        names = [each.name if isinstance(each, Motion) else name_of(each) for each in sources]
+        view_degrees = options.get("view_degrees")
+        setup = replace(track.setup, source=names, frames_chosen=list(chosen.frames), view_degrees=view_degrees)
+        track = replace(track, setup=setup)
+        with progress.phase("write"):
+            recorder.finish(scene, track.frames, track.table, track.gait, track.summary)
+        return track
 
 
 def fit(source: Footage | Sequence[Any] = "walk", *, frame: int = 0, **options: Any) -> Fit:

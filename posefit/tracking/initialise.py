@@ -1,11 +1,13 @@
 """What is estimated before the first frame: its pose, by several restarts, and the person's build."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
+from posefit.arrays import Array
+from posefit.fitting.driving import clocks
 from posefit.fitting.shape import Shape, fit_shape
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
@@ -14,7 +16,7 @@ from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
-from posefit.tracking.options import TrackOptions
+from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit.tracking.restarts import (
     RESTARTS,
     TRIAL_STRIDE,
@@ -26,7 +28,6 @@ from posefit.tracking.restarts import (
 
 BODY_FRAMES = 12  # to which a build is fitted
 MIN_BODY_FRAMES = 5
-COMPILE_SECONDS = 60.0  # that a plugin's first calls may take longer than its limit
 WARM_UP_POPULATIONS = 8
 
 
@@ -36,7 +37,7 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
     return Task(
         scene.body,
         scene.cameras,
-        options.budget,
+        options.evaluations or EVALUATIONS,
         scene.yaw,
         scene.anchor,
         translation=options.translation or ("aligned" if scene.truth is None else "known"),
@@ -49,12 +50,14 @@ def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> 
 
 def initialise(
     scene: Scene, method: Method, task: Task, options: TrackOptions, progress: Progress
-) -> tuple[Task, Shape | None]:
-    """Return a task with its first pose, where restarts search it, and the person's build, where it is fitted."""
-    with _compiling_announced(progress.log):
-        looks_ahead = _warm_up(method, task, scene)
-    footage = scene.truth is None
-    restarts = (RESTARTS if footage and not looks_ahead else 0) if options.restarts is None else options.restarts
+) -> tuple[Task, Shape | None, Array]:
+    """Return a task with its first pose, where it is searched, and the person's build, where it is fitted.
+
+    Also the clocks (2,), see `posefit.fitting.driving.clocks`, at the moment when everything was compiled.
+    """
+    _warm_up(method, task, scene)
+    start, footage = clocks(), scene.truth is None
+    restarts = (RESTARTS if footage and not method.looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
     if restarts:
         progress.log(f"looking for the first pose, {restarts} times")
@@ -70,7 +73,7 @@ def initialise(
         height = options.height or (task.body.stature if alone else None)
         shape = fitted_build(task, scene.observations, method.follow, body_frames, height, options.seed)
         task = replace(task, body=shape.body)
-    return task, shape
+    return task, shape, start
 
 
 def fitted_build(
@@ -93,33 +96,9 @@ def fitted_build(
     return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned)
 
 
-def _warm_up(method: Method, task: Task, scene: Scene) -> bool:
-    """Return whether a method looks ahead, after it searched a few populations of the first frame to be compiled."""
+def _warm_up(method: Method, task: Task, scene: Scene) -> None:
+    """Search a few populations of the first frame, so that everything is compiled."""
     population_size = method.settings.get("optimiser", {}).get("population_size", POPULATION_SIZE)
     few = replace(task, evaluations=min(task.evaluations, WARM_UP_POPULATIONS * population_size))
-    first = next(iter(scene.observations))
-    tracker = None
     with suppress(ValueError):  # what fails for want of evaluations is reported where it fails with all of them
-        tracker = method.tracker(few, COMPILE_SECONDS)
-        next(tracker.track([first], np.random.default_rng(0)))
-    return getattr(tracker, "lag", None) is not None
-
-
-@contextmanager
-def _compiling_announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Announce once that something is compiled that is not in numba's cache."""
-    from numba.core import event
-
-    class Once(event.Listener):  # type: ignore[misc]
-        announced = False
-
-        def on_start(self, _event: event.Event) -> None:
-            if not self.announced:
-                self.announced = True
-                say("compiling the kernels, once on this machine; this takes ten seconds or more ...")
-
-        def on_end(self, _event: event.Event) -> None:
-            pass
-
-    with event.install_listener("numba:compile", Once()):
-        yield
+        next(method.follow(few, [next(iter(scene.observations))], np.random.default_rng(0)))

@@ -27,11 +27,10 @@ from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
-from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart
+from posefit.tracking.options import TrackOptions, declared
+from posefit.tracking.restarts import GAP, RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart, relocalised
 
 METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
-WHOLE = ("frames", "size", "label", "holes", "hypotheses", "passes", "smooth", "body_frames")  # need all frames
 LINES, ARRAYS = "frames.jsonl", "poses.npz"
 
 
@@ -68,9 +67,9 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     does not fit or needs all frames, and where the stream breaks off.
     """
     chosen = TrackOptions(**options)
-    for declared in fields(chosen):
-        if declared.name in WHOLE and getattr(chosen, declared.name) != declared.default:
-            raise InputError(f"{declared.name} must be left out with live, got {getattr(chosen, declared.name)}")
+    for each in fields(chosen):
+        if not declared(each).live and getattr(chosen, each.name) != each.default:
+            raise InputError(f"{each.name} must be left out with live, got {getattr(chosen, each.name)}")
     chosen = chosen.changed(method=chosen.method or METHOD, train=chosen.train or built_in.other_styles("walk"))
     clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
@@ -94,7 +93,8 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
             progress.log(f"looking for the first pose, {restarts} times")
             task, _ = best_restart(task, scene.observations, method.follow, restarts, chosen.seed)
-        for frame in method.relocalising(task, footage=True).track(coming(), np.random.default_rng(chosen.seed)):
+        gap = GAP if method.relocalise_gap is None else method.relocalise_gap
+        for frame in relocalised(task, method.follow, coming(), np.random.default_rng(chosen.seed), gap):
             live = waiting.popleft()
             came, began = live.source.arrived, first[0].source.arrived
             yield LiveFrame(live.source.number, came - began, time.perf_counter() - came, live.usable, frame)

@@ -14,24 +14,17 @@ from posefit import settings
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
+from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation, Prediction, SynthesisTracker, Task, Tracker
-from posefit.fitting.validation import (
-    Audit,
-    AuditedTracker,
-    BrokenRuleError,
-    CheckedOptimiser,
-    CheckedPrior,
-    plugin_errors,
-)
+from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser, CheckedPrior, plugin_errors
 from posefit.footage.source import Footage, kind_of
 from posefit.motion import built_in, recorded
-from posefit.reading import quoted, suggestion
+from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import GAP, RelocalisingTracker
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
@@ -62,9 +55,7 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
     if family in offers["optimiser"]:
         return MethodNames(optimiser, default_prior)
     known = [*sorted(offers["tracker"]), *sorted(offers["optimiser"])]
-    hint = suggestion(optimiser, known) or "; posefit plugins doctor says whether a plugin failed to load"
-    if family in offers["prior"]:
-        hint = f"; as a prior it is @{optimiser}"
+    hint = f"; as a prior it is @{optimiser}" if family in offers["prior"] else registry().hint(family, known)
     raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}")
 
 
@@ -79,51 +70,36 @@ def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
     known = isinstance(source, str) and source in built_in.names()
     prior, method = DEFAULT_FOOTAGE_PRIOR if kind_of(source) != "motion" else DEFAULT_PRIOR, options.method
     offers, set_names = registry().offers, {name.partition(".")[0] for name in options.settings}
-    searched = known or options.optimiser is not None or options.prior is not None or set_names - {DEFAULT_TRACKER}
+    searched = known or set_names - {DEFAULT_TRACKER}
     if method is None and not searched and DEFAULT_TRACKER in offers["tracker"]:
         method = DEFAULT_TRACKER
-    elif not callable(method):
+    elif method is None or isinstance(method, str):
         method = str(method_names(method or next(iter(set_names & {*offers["optimiser"]}), None), prior))
     train = options.train
     if not train and method == DEFAULT_TRACKER:
         train = [recorded.LIBRARY]
     train = train or built_in.other_styles(str(source) if known else "walk")
     evaluations = options.evaluations
-    if method == DEFAULT_TRACKER and evaluations is options.iterations is options.population_size is None:
+    if method == DEFAULT_TRACKER and evaluations is None:
         evaluations = DEFAULT_TRACKER_EVALUATIONS
     return options.changed(method=method, train=train, evaluations=evaluations)
 
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A method ready to track: a prior has been learned, and trackers are made of it."""
+    """A method ready to track: its prior has learned, and `build` makes a tracker of a task."""
 
     name: str
     prior: Prior | None  # of a tracker of its own, None
-    beta: float  # of the silhouette cost
     settings: dict[str, dict[str, Any]]
-    audit: Audit  # of what the trackers made of it report
+    looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
     relocalise_gap: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
-    _make: Callable[[Task, float], Tracker] = field(repr=False)
-
-    def tracker(self, task: Task, patience: float = 0.0) -> Tracker:
-        """Return a tracker for a task, whose plugin may take so many seconds longer to propose a population."""
-        return self._make(task, patience)
-
-    def looks_ahead(self, task: Task) -> bool:
-        """Return whether the tracker of a task takes several observations before it gives a frame."""
-        return getattr(self.tracker(task), "lag", None) is not None
-
-    def relocalising(self, task: Task, footage: bool) -> Tracker:
-        """Return a tracker that in footage relocalises after gaps, unless it looks ahead."""
-        tracker, gap = self.tracker(task), self.relocalise_gap
-        if gap is None:
-            gap = GAP if footage and getattr(tracker, "lag", None) is None else 0
-        return RelocalisingTracker(task, self.follow, gap) if gap else tracker
+    audit: Audit  # of what its trackers report
+    build: Callable[[Task], Tracker] = field(repr=False)
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""
-        return self.tracker(task).track(observations, rng)
+        return drive(self.build(task), task, observations, rng, self.audit)
 
     def dimensions(self, task: Task) -> int | None:
         """Return how many coordinates a proposal has; None of a tracker of its own, which need not have any."""
@@ -139,42 +115,41 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     BrokenRuleError where a plugin does not do what its kind has to.
     """
     chosen = options.method
-    if callable(chosen) or (names := method_names(chosen)).tracker is not None:
-        for name in ("optimiser", "prior"):
-            if (plugin := getattr(options, name)) is not None:
-                raise InputError(f"{name} must not be given beside a tracker, got {plugin} and {chosen}")
-        return _tracker_method(_offered("tracker", chosen), options.settings)
-    optimiser = _offered("optimiser", options.optimiser or names.optimiser)
-    prior = None if options.prior is not None else registry().offer("prior", names.prior)
+    if isinstance(chosen, tuple):
+        optimiser, given_prior = _offered("optimiser", chosen[0]), chosen[1]
+    else:
+        names = None if callable(chosen) else method_names(chosen)
+        if names is None or names.tracker is not None:
+            return _tracker_method(_offered("tracker", chosen), options.settings)
+        optimiser, given_prior = _offered("optimiser", names.optimiser), names.prior
+    prior = registry().offer("prior", given_prior) if isinstance(given_prior, str) else None
     mine = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     mine.setdefault("prior", {})
     given = mine["optimiser"]
-    mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations, options.population_size)
-    settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
+    mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations)
+    mine["optimiser"] = settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
     if prior is not None:
         with _rules(prior):
             learned = prior.factory(**mine["prior"]).fit(task.angles, task.body.skeleton)
             _check_prior(learned, task.angles, prior)
         learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
-        assert options.prior is not None
-        learned, name = options.prior, type(options.prior).__name__
+        learned, name = given_prior, type(given_prior).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
     prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **mine["tracker"]})
     tilt = prediction.tilted(learned, task.training)
 
-    def make(task: Task, patience: float) -> Tracker:
-        limit = None if options.ask_seconds is None else options.ask_seconds + patience
-
-        def build(space: Space, rng: np.random.Generator) -> Optimiser:
+    def build(task: Task) -> Tracker:
+        def optimiser_of(space: Space, rng: np.random.Generator) -> Optimiser:
             with _rules(optimiser):
                 made = optimiser.factory(space, rng, **mine["optimiser"])
-            return CheckedOptimiser(made, space, optimiser.label, limit, task.evaluations)
+            return CheckedOptimiser(made, space, optimiser.label, task.evaluations)
 
-        return SynthesisTracker(task, learned, build, optimiser.next_frame, prediction, tilt)
+        return SynthesisTracker(task, learned, optimiser_of, optimiser.next_frame, prediction, tilt)
 
     label = f"{optimiser.name}@{name}"
-    return Method(label, learned, prediction.beta, mine, Audit(), prediction.relocalise_gap, make)
+    audit = Audit(label, prediction.beta)
+    return Method(label, learned, mine, False, prediction.relocalise_gap, audit, build)
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
@@ -188,7 +163,8 @@ def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any
 def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
-    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`. Raises InputError where a
+    They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
+    left out where it alone has such a setting. Raises InputError where a
     text has another form, names a plugin that is not among `offers` or a setting that it does not know, or where a
     value does not fit.
     """
@@ -197,7 +173,10 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
     for item in given:
         left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
         name, dot, setting = left.partition(".")
-        if not (equals and dot):
+        if not dot:  # the name may be left out where one plugin alone has the setting
+            having = [name for name, (_, factory) in places.items() if left in settings.names(factory)]
+            name, setting = (having[0], left) if len(having) == 1 else ("", "")
+        if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
             known = ", ".join(places)
@@ -207,7 +186,7 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
         each[name][setting] = value
     for name, (_, factory) in places.items():
         if isinstance(given, Mapping):
-            settings.check(name, factory, each[name])
+            each[name] = settings.check(name, factory, each[name])
         else:
             each[name] = settings.parse(name, factory, each[name])
     return {kind: each[name] for name, (kind, _) in places.items()}
@@ -218,14 +197,14 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
     defaults = {setting.name: setting.default for setting in offer.settings}
     beta = {"beta": BETA, **defaults, **mine}["beta"]  # of the costs that it gives
     beta = float(beta) if isinstance(beta, float | int) else BETA
-    audit = Audit()
 
-    def make(task: Task, _patience: float) -> Tracker:
+    def build(task: Task) -> Tracker:
         with _rules(offer):
-            tracker = offer.factory(task, **mine)
-        return AuditedTracker(tracker, task, offer.label, beta, audit)
+            tracker: Tracker = offer.factory(task, **mine)
+        return tracker
 
-    return Method(offer.name, None, beta, {"tracker": mine}, audit, None, make)
+    gap = 0 if offer.looks_ahead else None
+    return Method(offer.name, None, {"tracker": mine}, offer.looks_ahead, gap, Audit(offer.label, beta), build)
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
@@ -268,4 +247,6 @@ def _offered(kind: Kind, chosen: "str | Callable[..., Any] | None") -> Offer:
     if isinstance(chosen, str):
         return registry().offer(kind, chosen)
     frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"
-    return Offer(kind, getattr(chosen, "__name__", type(chosen).__name__), chosen, "the caller", "", frames)
+    looks_ahead = bool(getattr(chosen, "looks_ahead", False))
+    name = getattr(chosen, "__name__", type(chosen).__name__)
+    return Offer(kind, name, chosen, "the caller", "", frames, looks_ahead)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 from posefit.errors import InputError
 from posefit.fitting.check import finite_number, one_of, pair, whole
 from posefit.geometry.units import UNITS
-from posefit.limits import HEIGHTS, RATES, SECONDS
+from posefit.limits import HEIGHTS, RATES
 from posefit.reading import quoted
-from posefit.settings import POPULATION_SIZE
 
 if TYPE_CHECKING:
     from posefit.fitting.optimiser import OptimiserFactory
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from posefit.geometry.units import Unit
     from posefit.motion.clips import FileOptions, Source
 
-ITERATIONS = 60  # C of the SAPSO paper, section 5.2
+EVALUATIONS = 2440  # of a frame: N (C + 1) with N = 40 and C = 60 of the SAPSO paper, section 5.2
 LARGEST_SIDE = 16_384  # pixels of a rendered picture
 
 Check = Callable[[str, Any], Any]  # of a name and a value that is not None: the value as it is used; raises InputError
@@ -45,6 +44,8 @@ class Option(NamedTuple):
     parse: Callable[[str], Any] = str  # of a text of the command line; bool for a pair of flags
     repeated: bool = False  # whether the flag may be given several times
     identifies: bool = True  # whether a track that goes on must have the same value
+    heading: str = ""  # in the help, of this option and those below it
+    live: bool = True  # whether it makes sense for frames that come one by one
 
 
 def option(default: Any, text: str, *more: Any, **others: Any) -> Any:
@@ -79,8 +80,8 @@ def _int(default: int | None, text: str, least: int, placeholder: str = "N", **o
     return option(default, text, lambda name, value: whole(name, value, least), placeholder, **others)
 
 
-def _float(text: str, ends: tuple[float, float], placeholder: str, unit: str = "") -> Any:
-    return option(None, text, _between(*ends, unit), placeholder, parse=float)
+def _float(text: str, ends: tuple[float, float], placeholder: str, unit: str = "", **others: Any) -> Any:
+    return option(None, text, _between(*ends, unit), placeholder, parse=float, **others)
 
 
 def _size(name: str, value: Any) -> tuple[int, int]:
@@ -112,6 +113,12 @@ def _device(_name: str, value: Any) -> str:
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
     several = hasattr(value, "__len__") and not isinstance(value, str)
     return tuple(_between(-360.0, 360.0, " degrees")(name, degrees) for degrees in (value if several else [value]))
+
+
+def _method(name: str, value: Any) -> Any:
+    if not (isinstance(value, str) or callable(value) or (isinstance(value, tuple) and len(value) == 2)):
+        raise InputError(f"{name} must be a name, a factory, or a pair of optimiser and prior, got {quoted(value)}")
+    return value
 
 
 def _sources(name: str, value: Any) -> Sequence[Any]:
@@ -151,31 +158,9 @@ def text_label(text: str) -> int:
 class TrackOptions:
     """The options of a track, checked; what is None or empty is decided by the source."""
 
-    method: "str | TrackerFactory | None" = option(
-        None,
-        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
-        "for a built-in motion.",
-        unit="METHOD",
+    asf: str | Path | None = option(
+        None, "Skeleton of SOURCE; by default the only .asf beside an .amc.", None, "FILE", heading="What is seen"
     )
-    optimiser: "OptimiserFactory | None" = option(None, "An optimiser's factory instead of a name.", flag="")
-    prior: "Prior | None" = option(None, "A prior that has learned instead of a name.", flag="")
-    settings: Mapping[str, Any] | Sequence[str] = option(
-        (),
-        "Of a plugin, such as sapso.cooling=0.9; repeatable.",
-        None,
-        "NAME.SETTING=VALUE",
-        "set",
-        repeated=True,
-    )
-    train: "Sequence[Source]" = option(
-        (),
-        "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
-        "exemplars, else other styles of a built-in motion, or walks.",
-        _sources,
-        "SOURCE",
-        repeated=True,
-    )
-    asf: str | Path | None = option(None, "Skeleton of SOURCE; by default the only .asf beside an .amc.", None, "FILE")
     camera: "Camera | str | Path | Sequence[Camera | str | Path]" = option(
         (),
         "Calibration, one a view; guessed where absent.",
@@ -200,7 +185,7 @@ class TrackOptions:
         (), "Where a camera stands: 0 in front, 90 to the side; repeatable.", _degrees, "DEGREES", None, float, True
     )
     size: tuple[int, int] | None = option(
-        None, "Image of a rendered motion, by default 320x240.", _size, "WxH", parse=text_size
+        None, "Image of a rendered motion, by default 320x240.", _size, "WxH", parse=text_size, live=False
     )
     fps: float | None = _float("Rate to resample a motion to, or of masks; by default 30, or theirs.", RATES, "HZ")
     frames: "Range" = option(
@@ -210,39 +195,76 @@ class TrackOptions:
         "A:B",
         "",  # `track` has it, and `fit` one frame instead
         text_range,
+        live=False,
     )
     extraction: "Extraction | None" = option(None, "How the person is taken out of video.", flag="")
     height: float | None = _float("How tall the person in the footage stands.", HEIGHTS, "METRES", " metres")
-    label: int | None = _int(None, "Of masks: the value or the colour that the person has.", 0, parse=text_label)
+    label: int | None = _int(
+        None, "Of masks: the value or the colour that the person has.", 0, parse=text_label, live=False
+    )
     holes: float | None = _float(
         "Of masks: fill holes up to this share of the person; by default 0.02.",
         (0.0, 1.0),
         "SHARE",
         ", a share of the person's area",
+        live=False,
+    )
+    method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(
+        None,
+        "OPTIMISER@PRIOR, OPTIMISER, @PRIOR or a tracker, see `posefit plugins`; by default exemplars, or annealed@pca "
+        "for a built-in motion. In Python also a tracker's factory, or a pair: an optimiser's name or factory, and a "
+        "prior's name or one that has learned.",
+        _method,
+        "METHOD",
+        heading="Method and budget",
+    )
+    settings: Mapping[str, Any] | Sequence[str] = option(
+        (),
+        "Of a plugin, such as sapso.cooling=0.9 or, where one alone has it, cooling=0.9; repeatable.",
+        None,
+        "[NAME.]SETTING=VALUE",
+        "set",
+        repeated=True,
+    )
+    train: "Sequence[Source]" = option(
+        (),
+        "What the method learns from: a motion, a folder, library, or library:16; repeatable. By default library for "
+        "exemplars, else other styles of a built-in motion, or walks.",
+        _sources,
+        "SOURCE",
+        repeated=True,
     )
     evaluations: int | None = _int(
-        None, "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 2440.", 1, "POSES"
+        None,
+        "Budget of a frame; by default 9760 of exemplars, else N (C + 1) = 40 x 61 = 2440.",
+        1,
+        "POSES",
     )
-    population_size: int | None = _int(None, "N, by default 40.", 1)
-    iterations: int | None = _int(None, "C, by default 60.", 1, "C")
-    ask_seconds: float | None = _float("How long a plugin may take to propose a population.", SECONDS, "SECONDS")
     translation: "Translation | None" = option(
         None,
         "Of the root: known (the truth), searched, or aligned.",
         _one_of("known", "searched", "aligned"),
         "HOW",
+        heading="How it is followed",
     )
     first_pose: Literal["searched", "given"] = option(
         "searched", "searched, or given (the true one).", _one_of("searched", "given"), "HOW"
     )
     restarts: int | None = _int(None, "Searches of an unknown first pose: 8, or 0 for a tracker that looks ahead.", 0)
-    body_frames: int | None = _int(None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", 0)
-    hypotheses: int = _int(1, "Tracks from different initial guesses, each at the full budget; one is kept.", 1)
-    smooth: bool | None = option(
-        None, "The root moves smoothly, and feet do not slide; the default for footage.", parse=bool, identifies=False
+    body_frames: int | None = _int(
+        None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", 0, live=False
     )
-    passes: int = _int(1, "How often a smooth track is followed.", 1, identifies=False)
-    seed: int = _int(0, "Of all random numbers.", 0)
+    hypotheses: int = _int(
+        1, "Tracks from different initial guesses, each at the full budget; one is kept.", 1, live=False
+    )
+    smooth: bool | None = option(
+        None,
+        "The root moves smoothly, and feet do not slide; the default for footage.",
+        parse=bool,
+        identifies=False,
+        live=False,
+    )
+    seed: int = _int(0, "Of all random numbers.", 0, heading="Method and budget")
     threads: int = _int(1, "The result is the same with any number.", 1, identifies=False)
     device: str = option(
         "cpu", "Where poses are drawn: cpu, or cuda with a GPU.", _device, "cpu|cuda", identifies=False
@@ -255,13 +277,6 @@ class TrackOptions:
                 object.__setattr__(self, each.name, each.default)
             elif value is not each.default and check is not None:
                 object.__setattr__(self, each.name, check(each.name, value))
-        if self.evaluations is not None and self.iterations is not None:
-            raise InputError("evaluations and iterations must not both be given: a budget has so many iterations")
-
-    @property
-    def budget(self) -> int:
-        """The evaluations of a frame: N (C + 1) where they are not given."""
-        return self.evaluations or (self.population_size or POPULATION_SIZE) * ((self.iterations or ITERATIONS) + 1)
 
     @property
     def view(self) -> dict[str, Any]:
@@ -280,18 +295,5 @@ class TrackOptions:
         return replace(self, **values)
 
 
-VIEW = (
-    "asf",
-    "camera",
-    "view_degrees",
-    "size",
-    "fps",
-    "frames",
-    "extraction",
-    "height",
-    "up",
-    "unit",
-    "rate",
-    "label",
-    "holes",
-)
+_NAMES = [each.name for each in fields(TrackOptions)]
+VIEW = _NAMES[: _NAMES.index("method")]  # how a source is looked at: see `TrackOptions.view`

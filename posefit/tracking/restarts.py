@@ -3,15 +3,14 @@
 | when | what is tried | what is kept |
 |---|---|---|
 | before the first frame | `best_restart`: searches of the first frame, followed over a few more | the cheapest |
-| after a gap, or while costs are high | `RelocalisingTracker`: such restarts beside the track as it is | the cheapest |
+| after a gap, or while costs are high | `relocalised`: such restarts beside the track as it is | the cheapest |
 | with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
 | where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
-| with several passes | `smoothing.smooth`: all frames again, their path known | the new one, if about as cheap |
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy, deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain, islice, tee
 from typing import Literal
 
@@ -27,9 +26,9 @@ from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion.steadiness import runs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.trajectory import effort_of, mean_cost, with_total_effort
+from posefit.tracking.trajectory import Tracked, mean_cost, with_effort_of, with_total_effort
 
-RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "pass": 2026, "back": 1902}  # part of the seed of what is tracked again
+RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902}  # part of the seed of what is tracked again
 RESTARTS = 8  # searches of the first frame
 TRIAL_FRAMES = 10  # by which a restart is judged
 TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
@@ -53,7 +52,7 @@ SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
 
 
-def stream(seed: int, kind: Literal["hypothesis", "spin", "pass", "back"], number: int) -> np.random.Generator:
+def stream(seed: int, kind: Literal["hypothesis", "spin", "back"], number: int) -> np.random.Generator:
     """Return the random generator of something that is tracked again; that of the first track is of the seed alone."""
     return np.random.default_rng([seed, RNG_STREAMS[kind], number])
 
@@ -147,61 +146,57 @@ def after(task: Task, frame: Frame) -> Task:
 # While a track goes on.
 
 
-@dataclass(frozen=True, eq=False)
-class RelocalisingTracker:
-    """Follows as `follow` does, and searches at all yaws again where the person may have turned unseen.
+def relocalised(
+    task: Task, follow: Follow, observations: Iterable[Observation], rng: np.random.Generator, gap: int = GAP
+) -> Iterator[Frame]:
+    """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
 
-    That is in the first frame that shows the person after a `gap` of frames that do not, and where for half a second
-    every cost is half as high again as is typical since the last relocalisation. Eight restarts are compared with the
-    track as it is, over about a second of the observations to come; the cheapest goes on. The frame has the evaluations
-    and the time of all of them.
+    That is in the first frame that shows the person after a `gap` of frames that do not, none for 0, and where for half
+    a second every cost is half as high again as is typical since the last relocalisation. Eight restarts are compared
+    with the track as it is, over about a second of the observations to come; the cheapest goes on. The frame has the
+    evaluations and the time of all of them.
     """
+    if not gap:
+        yield from follow(task, observations, rng)
+        return
+    coming, rest = tee(observations)
+    frames = follow(task, rest, rng)
+    many = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
+    few = max(round(HIGH_COST_SECONDS * task.fps), 1)
+    latest: Frame | None = None  # that showed the person
+    unseen, costs = 0, list[float]()  # frames since then; and since the last relocalisation
 
-    task: Task
-    follow: Follow
-    gap: int = GAP
+    def add(frame: Frame, usable: bool) -> None:
+        nonlocal latest, unseen
+        if RELOCALISED in frame.details:
+            costs.clear()
+        unseen += 1
+        if usable:
+            latest, unseen = frame, 0
+            costs.append(frame.cost)
 
-    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
-        """Yield a `Frame` for each observation."""
-        coming, rest = tee(observations)
-        going = self.follow(self.task, rest, rng)
-        many = max(round(TYPICAL_COST_SECONDS * self.task.fps), 1)
-        few = max(round(HIGH_COST_SECONDS * self.task.fps), 1)
-        latest: Frame | None = None  # that showed the person
-        unseen, costs = 0, list[float]()  # frames since then; and since the last relocalisation
-
-        def add(frame: Frame, usable: bool) -> None:
-            nonlocal latest, unseen
-            if RELOCALISED in frame.details:
-                costs.clear()
-            unseen += 1
-            if usable:
-                latest, unseen = frame, 0
-                costs.append(frame.cost)
-
-        if len(self.task.before) > 1:  # a single one is what the track was begun with
-            for earlier in self.task.before:
-                add(earlier, earlier.evaluations > 0)
-        for observation in coming:
-            typical, high, tried = costs[:-few], costs[-few:], None
-            costly = len(typical) >= many and min(high) > COST_RISE * float(np.median(typical))
-            if observation.usable and latest is not None and (costly or unseen >= self.gap):
-                window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]
-                seeds = independent(rng).integers(0, 2**32, 2).tolist()
-                around = replace(self.task, yaw=None, anchor=latest.translation, first_pose=None, before=())
-                on = after(around, latest)
-                task, tried = best_restart(around, window, self.follow, RESTARTS, seeds, on)
-                if task is not on:
-                    going = self.follow(task, chain([observation], copy(coming)), rng)
-            if (frame := next(going, None)) is None:
-                return
-            if tried is not None:
-                effort = effort_of([frame, *tried])
-                spent = None if frame.spent is None else frame.spent + effort["evaluations"] - frame.evaluations
-                frame = replace(frame, **effort, spent=spent, details={**frame.details, RELOCALISED: task is not on})
-            add(frame, observation.usable)
-            yield frame
-        yield from going  # none: the tracker gets to its end
+    if len(task.before) > 1:  # a single one is what the track was begun with
+        for earlier in task.before:
+            add(earlier, earlier.evaluations > 0)
+    for observation in coming:
+        typical, high, trials = costs[:-few], costs[-few:], None
+        costly = len(typical) >= many and min(high) > COST_RISE * float(np.median(typical))
+        if observation.usable and latest is not None and (costly or unseen >= gap):
+            window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]
+            seeds = independent(rng).integers(0, 2**32, 2).tolist()
+            around = replace(task, yaw=None, anchor=latest.translation, first_pose=None, before=())
+            on = after(around, latest)
+            best, trials = best_restart(around, window, follow, RESTARTS, seeds, on)
+            if best is not on:
+                frames = follow(best, chain([observation], copy(coming)), rng)
+        if (frame := next(frames, None)) is None:
+            return
+        if trials is not None:
+            frame = with_effort_of(frame, [frame, *trials])
+            frame = replace(frame, details={**frame.details, RELOCALISED: best is not on})
+        add(frame, observation.usable)
+        yield frame
+    yield from frames  # none: the tracker gets to its end
 
 
 # Several hypotheses.
@@ -240,16 +235,16 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
 
 
 def retrack_spins(
-    task: Task, observations: Sequence[Observation], frames: Sequence[Frame], follow: Follow, seed: int
-) -> tuple[list[Frame], tuple[int, int] | None]:
-    """Return a track without spins, and the first and last frame of those that stay; None where all do.
+    task: Task, observations: Sequence[Observation], tracked: Tracked, follow: Follow, seed: int
+) -> Tracked:
+    """Return a track without spins, whose `stay` is the first and last frame of those that stay; None where all do.
 
     Those are of the longest run that faces as most frames do, see `facing_consensus`, between its surest ends. The
     person is followed onward from the last, and backwards from the first by training motions in reverse. The old track
     is kept where the new one spins as often, or costs half as much again. Frames that are tracked again have the effort
     of both tracks.
     """
-    usable = np.array([observation.usable for observation in observations])
+    frames, usable = tracked.frames, np.array([observation.usable for observation in observations])
 
     def spins(track: Sequence[Frame]) -> int:
         return int(spin_mask(np.array([frame.pose[0] for frame in track]), usable, task.fps).sum())
@@ -257,7 +252,7 @@ def retrack_spins(
     before = spins(frames)
     every = runs(facing_consensus(frames, task.cameras, usable, task.fps)) if before else []
     if not every:
-        return list(frames), None
+        return tracked
     first, last = stay = surest_ends(frames, *max(every, key=lambda run: run[1] - run[0]), task.fps)
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
@@ -276,7 +271,7 @@ def retrack_spins(
     better = cheap and spins(new) < before
     new = with_total_effort([frames, new], int(better))
     new[first : last + 1] = frames[first : last + 1]
-    return new, stay if better else None
+    return tracked._replace(frames=new, stay=stay if better else None)
 
 
 def backwards(task: Task) -> Task:

@@ -1,9 +1,12 @@
-"""What a track gives: its motion, errors or signs of trust, tables, pictures and files; and one frame of it, a fit."""
+"""What a track gives: frames and motion, errors or signs of trust, a table, pictures and files; and one frame, a fit.
+
+Everything but `save`, `page` and `show` is a plain value, and pickles.
+"""
 
 import importlib
 import webbrowser
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
@@ -13,17 +16,22 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.evaluation.errors import Table, unseen
+from posefit.evaluation.measures import Measures
+from posefit.evaluation.trust import Trust
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.measuring.centres import PLACES
+from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
+from posefit.output.files import page_of
+from posefit.output.folder import OutputFolder
+from posefit.output.text import brief, table
 from posefit.progress import QUIET
 from posefit.reading import quoted, suggestion
-from posefit.tracking.evaluation import unseen
-from posefit.tracking.measures import Measures
-from posefit.tracking.table import brief, table
 from posefit.uncertainty.modes import TrackMode
+from posefit.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,29 +40,90 @@ if TYPE_CHECKING:
 INLINE_HEIGHT = 720  # pixels of the page in a notebook
 
 
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What was tracked, and how."""
+
+    motion: str
+    source: list[str] | None = None  # one a camera
+    frames_chosen: list[int | None] | None = None
+    view_degrees: Any = None
+    method: str
+    settings: Mapping[str, Mapping[str, Any]]
+    seed: int
+    train: list[str]
+    evaluations_per_frame: int
+    dimensions: int | None
+    translation: str
+    first_pose: str
+    smooth: bool
+    views: int
+    camera: str
+    size_pixels: tuple[int, int]
+    fps: float
+    frames: int
+    version: str = __version__
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """How the track went, and what it leaves open."""
+
+    hypotheses: list[dict[str, Any]]
+    build: Mapping[str, Any] | None
+    trace: list[list[float]] | None
+    modes: list[float] | None
+    none_of_modes: float | None
+    unknown_sides: list[int] | None
+    lost_frames: list[int] | None
+    relocalised: list[int]
+    retracked_outside: tuple[int, int] | None
+    backwards_share: float
+    warnings: list[str]
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """A tracked motion with its errors or signs of trust."""
 
     motion: Motion  # the estimate
-    truth: Motion | None = field(repr=False)
+    frames: list[Frame] = field(repr=False)  # the tracker's, smoothed
+    table: Table = field(repr=False)  # a column (T,) for each figure of a frame: see posefit.evaluation.errors.FRAME
     measures: Measures = field(repr=False)
-    frames: list[dict[str, float]] = field(repr=False)  # one row a frame: see posefit.tracking.measures.FRAME
-    summary: dict[str, Any] = field(repr=False)  # what `posefit track --json` prints
-    estimates: list[Frame] = field(repr=False)  # the tracker's frames, smoothed
+    trust: Trust | None = field(repr=False)  # where the truth is unknown
+    gait: Gait = field(repr=False)
+    setup: Setup = field(repr=False)
+    course: Course = field(repr=False)
+    modes: list[TrackMode] = field(repr=False)  # of the whole track, the likeliest first
     scene: Scene = field(repr=False)
-    modes: list[TrackMode] = field(default_factory=list, repr=False)  # of the whole track, the likeliest first
 
     def __len__(self) -> int:
-        return len(self.estimates)
+        return len(self.frames)
 
     def __str__(self) -> str:
         return table(self.summary)
 
     @property
-    def trust(self) -> str:
+    def summary(self) -> dict[str, Any]:
+        """Everything but the frames, as `posefit track --json` prints it."""
+        trust, gait = None if self.trust is None else asdict(self.trust), self.gait.as_dict()
+        values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.course), "trust": trust, "gait": gait}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+    @property
+    def verdict(self) -> str:
         """Whether the track can be trusted, in one sentence; where the truth is known, its errors."""
         return brief(self.summary)[0]
+
+    @property
+    def truth(self) -> Motion | None:
+        """The true motion, where it is known."""
+        return self.scene.truth
+
+    @property
+    def unseen(self) -> set[int]:
+        """The numbers of the frames that were held or are called lost."""
+        return unseen(self.table)
 
     @property
     def joints(self) -> Array:
@@ -69,12 +138,12 @@ class Track:
     @property
     def activity(self) -> list[str | None]:
         """What the person does in each frame, such as `walk`; None where the method does not say."""
-        return [frame.activity for frame in self.estimates]
+        return [frame.activity for frame in self.frames]
 
     @property
     def unknown_sides(self) -> NDArray[np.bool_]:
         """In which frames (T,) left and right are unknown; between two of these they may be exchanged as well."""
-        return np.isin(self.scene.first + np.arange(len(self)), self.summary["unknown_sides"] or [])
+        return np.isin(self.table["frame"], self.course.unknown_sides or [])
 
     def angles(self, name: str) -> Array:
         """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.
@@ -91,22 +160,20 @@ class Track:
         from posefit.measuring.angles import clinical_angles
 
         angles = clinical_angles(self.motion.skeleton, self.motion.poses)
-        blank = np.isin(np.arange(len(self)), list(unseen(self.frames)))
+        blank = np.isin(np.arange(len(self)), list(self.unseen))
         return {name: np.where(blank, np.nan, values) for name, values in angles.items()}
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a table of one row a frame: seconds of the footage, measures, angles in degrees, joints in metres.
+        """Return a table of one row a frame: measures, angles in degrees, joints in metres.
 
         Columns are those of frames.csv and angles.csv. Raises ImportError where pandas is not installed.
         """
         from posefit.measuring.tables import import_pandas
 
-        rows = {name: [row[name] for row in self.frames] for name in self.frames[0] if name != "cpu_seconds"}
         axes = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
         points = dict(zip(axes, self.joints.reshape(len(self), -1).T, strict=True))
-        seconds = (self.motion.first + np.arange(len(self))) / self.motion.fps
         table: pd.DataFrame = import_pandas().DataFrame(
-            {**rows, "seconds": seconds, "activity": self.activity, **self._angles(), **points}
+            {**self.table, "activity": self.activity, **self._angles(), **points}
         )
         return table
 
@@ -114,9 +181,7 @@ class Track:
         """Return frame k alone. Raises InputError where there is none."""
         if not -len(self) <= k < len(self):
             raise InputError(f"frame must lie in 0 to {len(self) - 1}, got {k}")
-        frame, row = self.estimates[k], self.frames[k]
-        summary = {name: value for name, value in self.summary.items() if name != "history"}
-        return Fit(frame.pose, frame.translation, row["cost"], row["iou"], frame.history, summary, self, k)
+        return Fit(self, range(len(self))[k])
 
     def show(self) -> Any:
         """Open the page of the track, in which the body turns: in a notebook inline, elsewhere in a browser."""
@@ -137,30 +202,55 @@ class Track:
 
     def page(self) -> str:
         """Return the page that `show` opens and that `save` writes as track.html."""
-        from posefit.tracking.outputs import page_of
-
-        return page_of(self.scene, self.estimates, self.frames, self.summary)
+        return page_of(self.scene, self.frames, self.table, self.summary)
 
     def save(self, folder: str | Path, force: bool = False) -> None:
         """Write every file of a track to a new folder, or with `force` over earlier ones."""
-        from posefit.tracking.outputs import OutputFolder
-
         with OutputFolder(folder, force, False, {}, QUIET.log) as output:
-            output.finish(self.scene, self.estimates, self.frames, self.summary)
+            output.finish(self.scene, self.frames, self.table, self.gait, self.summary)
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The estimated pose of one frame."""
+    """The estimated pose of one frame, number `k` of a track."""
 
-    pose: Array = field(repr=False)  # (66,) radians
-    translation: Array  # (3,) metres
-    cost: float
-    iou: float
-    history: Array = field(repr=False)  # (populations,) best cost after each
-    summary: Mapping[str, Any] = field(repr=False)
     track: Track = field(repr=False)
-    k: int = field(repr=False)
+    k: int
+
+    @property
+    def frame(self) -> Frame:
+        """What the tracker estimated."""
+        return self.track.frames[self.k]
+
+    @property
+    def pose(self) -> Array:
+        """The pose (66,) in radians."""
+        return self.frame.pose
+
+    @property
+    def translation(self) -> Array:
+        """The root's place (3,) in metres."""
+        return self.frame.translation
+
+    @property
+    def cost(self) -> float:
+        """The silhouette mismatch, 0 to 100. SAPSO (4)."""
+        return self.frame.cost
+
+    @property
+    def iou(self) -> float:
+        """The overlap of body and mask, the mean over the views."""
+        return float(self.track.table["iou"][self.k])
+
+    @property
+    def trace(self) -> Array:
+        """The evaluations so far and the best cost (populations, 2), after each population of the search."""
+        return self.frame.trace
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The summary of its track."""
+        return self.track.summary
 
     @property
     def body(self) -> Body:
@@ -176,13 +266,13 @@ class Fit:
         """Return the body drawn on the masks, or on the picture; with `ax`, shown on these axes of matplotlib."""
         from PIL import Image
 
-        from posefit.tracking.picture import Painter
+        from posefit.output.picture import Painter
 
         scene = self.track.scene
         filmed = None
         if scene.pictures is not None:
             filmed = next(picture for k, picture in enumerate(scene.pictures()) if k == self.k)
-        painted = Painter(scene).overlay(self.track.estimates[self.k], scene.observations[self.k], filmed)
+        painted = Painter(scene).overlay(self.frame, scene.observations[self.k], filmed)
         image = Image.fromarray(painted[..., ::-1])
         if ax is not None:
             ax.imshow(image)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.fitting.driving import with_evaluations
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton, root_centred
@@ -49,12 +50,6 @@ class TrajectoryCost:
         return self.cost + self.motion
 
 
-def motion_of(scene: Scene, frames: Sequence[Frame]) -> Motion:
-    """Return the estimated motion of a scene's person."""
-    poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-    return Motion(scene.name, scene.body.skeleton, poses, places, scene.fps, scene.first)
-
-
 def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
     """Return the mean cost of the frames that show enough of the person; of all frames where none does."""
     costs = np.array([frame.cost for frame in frames])
@@ -62,26 +57,22 @@ def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
 
 
 def effort_of(frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return the evaluations and the time of several frames together; CPU time where all have it."""
-    cpu_seconds = [frame.cpu_seconds for frame in frames if frame.cpu_seconds is not None]
-    return {
-        "evaluations": sum(frame.evaluations for frame in frames),
-        "seconds": sum(frame.seconds for frame in frames),
-        "cpu_seconds": sum(cpu_seconds) if len(cpu_seconds) == len(frames) else None,
-    }
+    """Return the evaluations and the time of several frames together."""
+    return {name: sum(getattr(frame, name) for frame in frames) for name in ("evaluations", "seconds", "cpu_seconds")}
+
+
+def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
+    """Return a frame with the evaluations and the time of several together.
+
+    The course of its search is given as if all went on abreast: its evaluations are stretched to those of all.
+    """
+    effort = effort_of(together)
+    return replace(with_evaluations(frame, effort.pop("evaluations")), **effort)
 
 
 def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:
-    """Return the frames of the track that is kept, with the evaluations and the time of all tracks.
-
-    The course of a search is given as if all tracks went on abreast: its evaluations are stretched to those of all.
-    """
-    frames = []
-    for together in zip(*tracks, strict=True):
-        frame, effort = together[kept], effort_of(together)
-        spent = None if frame.spent is None else frame.spent * effort["evaluations"] // max(frame.evaluations, 1)
-        frames.append(replace(frame, **effort, spent=spent))
-    return frames
+    """Return the frames of the track that is kept, with the evaluations and the time of all tracks."""
+    return [with_effort_of(together[kept], together) for together in zip(*tracks, strict=True)]
 
 
 def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]) -> Tracked:

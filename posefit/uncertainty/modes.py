@@ -48,6 +48,7 @@ class Posterior:
     weights: Array = field(repr=False)  # (K,) which sum to 1
     coherent: bool = False
     recalibration: Recalibration | None = field(default=None, repr=False)  # learned corrections of these poses' errors
+    modes: Sequence[Mode] = ()  # see `modes_of`, which the frames of a track have filled in
 
     def __post_init__(self) -> None:
         count = len(np.atleast_1d(self.weights))
@@ -72,8 +73,8 @@ class Posterior:
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """Return the posterior that `as_dict` gave."""
         corrections = None if stored["recalibration"] is None else Recalibration(**stored["recalibration"])
-        arrays = {name: np.array(stored[name]) for name in ARRAYS}
-        return cls(**arrays, coherent=stored["coherent"], recalibration=corrections)
+        poses, translations, weights = (np.array(stored[name]) for name in ARRAYS)
+        return cls(poses, translations, weights, coherent=stored["coherent"], recalibration=corrections)
 
 
 def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
@@ -165,7 +166,10 @@ _PAIRED = np.array([j for j in range(len(JOINTS)) if SIDES[j] != "middle"])
 
 
 def nearer_mirrored(targets: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15."""
+    """Return whether joints (T, 27, 3) are nearer to targets (T, 27, 3) when they are mirrored. Interpretation S15.
+
+    In a side view a pose and its mirror image have nearly one silhouette.
+    """
     return mirrored_gain(targets, joints) > 0.0
 
 

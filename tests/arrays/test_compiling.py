@@ -1,6 +1,7 @@
 """What is compiled once is found by later processes; a damaged cache, and none at all, cost a compilation."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -70,15 +71,76 @@ def test_a_change_of_another_file_of_the_package_is_no_stale_result(run: Any) ->
     assert run() == (12.0, [])
 
 
-def test_an_empty_or_cut_file_is_a_miss(run: Any, tmp_path: Path) -> None:
+def emptied(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:20])
+
+
+def garbled(file: Path) -> None:
+    file.write_bytes(b"\x80\x05garbage" * 99)
+
+
+def with_zeros(file: Path) -> None:  # what a machine without power leaves
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2] + bytes(len(content) - len(content) // 2))
+
+
+def unreadable(file: Path) -> None:  # whoever reads, the administrator too
+    file.unlink()
+    file.symlink_to(file.name)
+
+
+def with_another_bit(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+def test_a_damaged_file_is_a_miss(run: Any, tmp_path: Path) -> None:
     run()
-    for suffix, length in ((".nbi", 0), (".nbi", 20), (".nbc", 0), (".nbc", 20)):
-        files = list((tmp_path / "cache").rglob(f"*{suffix}"))
+    cases = [(damage, pattern) for damage in (emptied, cut, garbled, unreadable) for pattern in ("*.nbi", "*.nbc")]
+    for damage, pattern in (*cases, (with_zeros, "*.nbc"), (with_another_bit, "*.nbc"), (emptied, "*.nb?")):
+        files = list((tmp_path / "cache").rglob(pattern))
         assert files
         for file in files:
-            file.write_bytes(file.read_bytes()[:length])
-        assert run() == (12.0, ["scaled"])
+            damage(file)
+        assert run() == (12.0, ["scaled"]), (damage, pattern)
     assert run() == (12.0, [])
+
+
+ANNOUNCED = """
+import logging, multiprocessing, sys
+import numpy as np
+from posefit_loops import scaled
+
+if __name__ == "__main__":
+    if "child" in sys.argv:
+        child = multiprocessing.get_context("fork").Process(target=scaled, args=(np.arange(4.0),))
+        child.start()
+        child.join()
+    else:
+        logging.getLogger("posefit").disabled = "quiet" in sys.argv
+        print(scaled(np.arange(4.0)), scaled(np.arange(4)))
+"""
+
+
+def test_compiling_is_announced_once_in_the_process_that_a_user_started(tmp_path: Path) -> None:
+    (tmp_path / "posefit_loops.py").write_text(LOOPS.replace("from constants import FACTOR", "FACTOR = 1.0"))
+    (tmp_path / "script.py").write_text(ANNOUNCED)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"
+    announced = {}
+    for word in ("child", "quiet", "", "again"):
+        if word != "again":
+            shutil.rmtree(tmp_path / "cache", ignore_errors=True)
+        command = [sys.executable, str(tmp_path / "script.py"), word]
+        ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        announced[word] = ran.stderr.splitlines()
+    message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
+    assert announced == {"child": [], "quiet": [], "": [message], "again": []}
 
 
 @pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"])

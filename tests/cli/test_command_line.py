@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -28,7 +29,7 @@ from tests.commands import error_of, printed, run
 from tests.files import arrays
 from tests.plugins.test_registry import point, registering
 
-FEW = ["--population-size", "10", "--iterations", "4"]
+FEW = ["--evaluations", "50", "--set", "annealed.population_size=10"]
 QUICK = [*FEW, "--size", "120x90"]
 FILES = {
     "poses.npz", "track.amc", "track.bvh", "track.trc", "track.c3d", "track.glb", "track.mot", "model.osim",
@@ -100,18 +101,17 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
 
 
 def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None:
-    tracks = [
-        posefit.track("walk", frames=(0, 4), population_size=40, iterations=5, seed=3, threads=threads)
-        for threads in (1, 2)
-    ]
+    tracks = [posefit.track("walk", frames=(0, 4), evaluations=240, seed=3, threads=threads) for threads in (1, 2)]
     np.testing.assert_array_equal(tracks[0].motion.poses, tracks[1].motion.poses)
-    other = posefit.track("walk", frames=(0, 4), population_size=40, iterations=5, seed=4)
+    other = posefit.track("walk", frames=(0, 4), evaluations=240, seed=4)
     assert np.abs(other.motion.poses - tracks[0].motion.poses).max() > 0.0
 
 
 def test_the_command_is_the_typed_call() -> None:
     summary = printed("track", "walk", "--frames", "0:3", "--seed", "7", *QUICK)
-    called = posefit.track("walk", frames=(0, 3), seed=7, population_size=10, iterations=4, size=(120, 90)).summary
+    called = posefit.track(
+        "walk", frames=(0, 3), seed=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90)
+    ).summary
     for key in KEYS - TIMES:
         assert summary[key] == called[key]
 
@@ -120,9 +120,9 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     summary = printed("fit", "walk", "--frame", "7", "--out", tmp_path / "fit", *QUICK)
     assert len(summary["pose_degrees"]) == 66
     assert summary["frames"] == 1
-    fit = posefit.fit("walk", frame=7, population_size=10, iterations=4, size=(120, 90))
+    fit = posefit.fit("walk", frame=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90))
     np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
-    assert fit.history.ndim == 1
+    assert fit.trace.shape[1] == 2
 
 
 def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,9 +173,35 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     assert (out / "summary.json").read_text() == before
     assert run("track", "walk", "--frames", "0:3", "--out", out, "--force", *QUICK).exit_code == 0
     assert json.loads((out / "summary.json").read_text())["frames"] == 3
+    link = tmp_path / "link"
+    link.symlink_to(out)
+    force = ["track", "walk", "--frames", "0:2", "--force", *QUICK, "--out"]
+    assert "link: expected a folder to write to, got a link" in error_of(*force, link)
+    before = sorted(path.name for path in out.iterdir())
     (out / "precious.txt").write_text("mine")
-    assert "precious.txt" in error_of("track", "walk", "--out", out, "--force", *QUICK)
-    assert (out / "precious.txt").read_text() == "mine"
+    assert "got one with precious.txt, which is none of posefit's" in error_of(*force, out)
+    (out / "precious.txt").unlink()
+    (out / "gait.csv").rename(tmp_path / "gait.csv")
+    (out / "gait.csv").mkdir()
+    (out / "gait.csv" / "precious.txt").write_text("mine")
+    assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
+    assert (out / "gait.csv" / "precious.txt").read_text() == "mine"
+    shutil.rmtree(out / "gait.csv")
+    (out / "gait.csv").symlink_to(tmp_path / "gait.csv")
+    assert "got one with gait.csv, which is none of posefit's" in error_of(*force, out)
+    assert (link.is_symlink(), sorted(path.name for path in out.iterdir())) == (True, before)
+
+
+def test_a_folder_of_somebodys_own_files_is_never_replaced(tmp_path: Path) -> None:
+    for name, content in (("summary.json", '{"version": "mine"}'), ("summary.json", "["), ("angles.csv", "mine")):
+        own = tmp_path / name.partition(".")[0] / str(len(content))
+        own.mkdir(parents=True)
+        (own / name).write_text(content)
+        message = error_of("track", "walk", "--frames", "0:2", "--force", "--out", own, *QUICK)
+        assert f"expected a folder of earlier results to replace, got one with {name}" in message
+        assert [(path.name, path.read_text()) for path in own.iterdir()] == [(name, content)]
+    (tmp_path / "empty").mkdir()
+    assert run("track", "walk", "--frames", "0:2", "--force", "--out", tmp_path / "empty", *QUICK).exit_code == 0
 
 
 def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
@@ -322,6 +348,11 @@ def test_check_reports_every_rule_and_how_many_ran() -> None:
     passed = {"check": "ranges", "outcome": "passed", "detail": "4 latents", "traceback": ""}
     assert passed in report["results"]
     assert "optimiser must be one of" in error_of("check", "optimiser", "nothing")
+    assert error_of("check", "optimiser", "mixture").endswith("got 'mixture'; its kind is segmenter")
+    assert error_of("check", "optimiser", "pca").endswith("got 'pca'; its kind is prior")
+    assert error_of("check", "optimizer", "sapso").endswith("got 'optimizer'; did you mean 'optimiser'?")
+    assert error_of("track", "walk", "--method", "mixture").endswith("got 'mixture'; its kind is segmenter")
+    assert error_of("track", "walk", "--method", "pca").endswith("got 'pca'; as a prior it is @pca")
     assert "a setting of pca must be one of" in error_of("check", "prior", "pca", "--set", "colour=red")
     assert "a setting must be SETTING=VALUE" in error_of("check", "prior", "pca", "--set", "colour")
 
@@ -427,7 +458,7 @@ def test_a_setting_that_makes_no_sense_is_one_line() -> None:
     [
         ("--help", "numba scipy cv2 sklearn numpy pandas tqdm"),
         (
-            "track walk --frames 0:2 --size 120x90 --population-size 20 --iterations 3 --out OUT",
+            "track walk --frames 0:2 --size 120x90 --evaluations 80 --out OUT",
             "sklearn scipy.stats scipy.optimize pandas matplotlib cmaes skimage",
         ),
     ],

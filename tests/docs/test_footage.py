@@ -15,8 +15,8 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.motion.asf import write_asf
 from posefit.motion.motion import Motion
+from posefit.output.drawing import draw_body
 from posefit.reading import parsed_json
-from posefit.tracking.drawing import draw_body
 from tests.cases import each
 
 SIZE = (160, 120)
@@ -119,7 +119,7 @@ def test_a_calibrated_film_is_seen_by_the_camera_that_filmed_it(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_a_film_gives_figures_8_and_10(tmp_path: Path) -> None:
-    words = [str(write_humaneva(tmp_path, walk(40))), "--iterations", "20", "--out", str(tmp_path / "out")]
+    words = [str(write_humaneva(tmp_path, walk(40))), "--evaluations", "840", "--out", str(tmp_path / "out")]
     result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(main, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     ((name, film),) = parsed_json((tmp_path / "out" / "report.json").read_text())["films"].items()

@@ -30,7 +30,7 @@ def test_any_population_on_any_number_of_environments_is_the_library_bit_for_bit
         ends["target_cost"] = 20.0  # which is reached long before the budget's end
     for env in (gym.make(version, **ends), gym.make_vec(version, num_envs=7, **ends)):
         minimum = drive(env, name, seed=5, evaluations=400)
-        np.testing.assert_array_equal(minimum.history, expected.history)
+        np.testing.assert_array_equal(minimum.trace, expected.trace)
         np.testing.assert_array_equal(minimum.proposal, expected.proposal)
 
 
@@ -39,7 +39,7 @@ def test_each_environment_has_its_instance_and_its_search() -> None:
     minima = drive_each(vector, "cma", seed=5, instances=[3, 4, 3], evaluations=200)
     for minimum, (number, seed) in zip(minima, ((3, 5), (4, 6), (3, 7)), strict=True):
         expected = alone("cma", number, seed, 200)
-        np.testing.assert_array_equal(minimum.history, expected.history)
+        np.testing.assert_array_equal(minimum.trace, expected.trace)
         np.testing.assert_array_equal(minimum.proposal, expected.proposal)
         assert minimum.evaluations == expected.evaluations
 

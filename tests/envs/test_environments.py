@@ -34,15 +34,11 @@ SHORT: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.fixture(autouse=True)
-def no_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    monkeypatch.setenv("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-
-
-@pytest.mark.filterwarnings("ignore:.*pkg_resources.*:UserWarning", "ignore:.*pkg_resources.*:DeprecationWarning")
 @each(("name", "arguments"), VARIANTS)
-def test_the_checker_passes_without_a_warning(name: str, arguments: dict[str, Any]) -> None:
+def test_the_checker_passes_without_a_warning(
+    name: str, arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pygame", None)  # nor is a window needed
     check_env(gym.make(f"posefit_envs:{name}", **arguments).unwrapped)
 
 
@@ -84,7 +80,7 @@ def test_it_can_be_pickled_and_copied_in_the_middle(name: str) -> None:
 
 
 @each("name", SEARCHES)
-def test_pictures_are_rgb_and_a_window_opens(name: str) -> None:
+def test_pictures_are_rgb(name: str) -> None:
     env = gym.make(name, render_mode="rgb_array")
     env.reset(seed=0)
     before = np.asarray(env.render())
@@ -94,21 +90,6 @@ def test_pictures_are_rgb_and_a_window_opens(name: str) -> None:
     assert before.dtype == after.dtype == np.uint8
     assert before.shape[2] == 3
     assert (before != after).any()
-    pytest.importorskip("pygame")
-    window = gym.make(name, render_mode="human")
-    window.reset(seed=0)
-    window.step(window.action_space.sample())
-    window.close()
-    window.close()
-
-
-def test_without_pygame_or_a_display_the_error_names_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
-    with pytest.raises(error.DependencyNotInstalled, match="needs a display, got none .*; use render_mode rgb_array"):
-        gym.make("posefit/FitImage-v0", render_mode="human").reset(seed=0)
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(error.DependencyNotInstalled, match=r"needs pygame: .* pip install 'posefit\[human\]'"):
-        gym.make("posefit/FitImage-v0", render_mode="human").reset(seed=0)
 
 
 def test_fit_ends_at_the_target_or_with_the_budget() -> None:
@@ -123,6 +104,24 @@ def test_fit_ends_at_the_target_or_with_the_budget() -> None:
     assert [end[1] for end in ends] == [-cost for cost in costs]
     assert [end[4]["best_cost"] for end in ends] == [min(costs[: k + 1]) for k in range(3)]
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
+
+
+def test_the_last_proposal_that_reaches_the_target_terminates_and_does_not_truncate() -> None:
+    proposals = np.array([np.ones(9), np.zeros(9)], dtype=np.float32)
+    env = gym.make("posefit/FitImage-v0", instance=3, target_cost=0.0)
+    env.reset(seed=0)
+    far, near = (env.step(proposal)[4]["cost"] for proposal in proposals)
+    assert near < far
+    limits = {"instance": 3, "target_cost": near, "max_evaluations": 2}
+    env, vector = gym.make("posefit/FitImage-v0", **limits), gym.make_vec("posefit/FitImage-v0", 1, **limits)
+    env.reset(seed=0)
+    vector.reset(seed=0)
+    assert [env.step(proposal)[2:4] for proposal in proposals] == [(False, False), (True, False)]
+    ends = [vector.step(proposal[None])[2:4] for proposal in proposals]
+    assert [(bool(terminated[0]), bool(truncated[0])) for terminated, truncated in ends] == [
+        (False, False),
+        (True, False),
+    ]
 
 
 def test_the_reward_is_the_mismatch_of_the_two_channels() -> None:
@@ -165,6 +164,28 @@ def test_track_proposals_mean_what_the_tracker_makes_of_them() -> None:
     assert (terminated, truncated) == (True, False)
     np.testing.assert_array_equal(poses, [frame.pose for frame in frames])
     assert len({float(pose[0]) for pose in poses}) == 3  # the box moved on with each frame
+
+
+def test_numbers_of_numpy_are_taken_as_arguments() -> None:
+    arguments: dict[str, Any] = {
+        "instance": np.int64(3), "size": np.array([64, 48]), "view_degrees": np.array([0.0, 90.0]),
+        "mismatch_percent": np.float32(2.0), "noise": {"holes": np.float32(0.5)}, "errors": np.True_,
+    }  # fmt: skip
+    plain = {"instance": 3, "size": (64, 48), "view_degrees": [0.0, 90.0], "mismatch_percent": 2.0}
+    plain |= {"noise": {"holes": 0.5}, "errors": True}
+    own: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+        "posefit/FitState-v0": (
+            {"image": np.True_, "max_evaluations": np.int64(9)},
+            {"image": True, "max_evaluations": 9},
+        ),
+        "posefit/Race-v0": (
+            {"generations": np.array([3, 6]), "searches": np.int8(2)},
+            {"generations": (3, 6), "searches": 2},
+        ),
+    }
+    for name, (numbers, same) in own.items():
+        first, second = (gym.make(name, **more).reset(seed=1) for more in ({**arguments, **numbers}, {**plain, **same}))
+        assert data_equivalence(first, second)
 
 
 TWO = r"generations must be two whole numbers such as \(100, 220\), got "
@@ -213,8 +234,16 @@ def test_wrong_arguments_are_named(name: str, arguments: dict[str, Any], message
 def test_unknown_arguments_and_modes_are_named() -> None:
     with pytest.raises(TypeError, match="an argument must be one of motion, .*, got 'nois'; did you mean 'noise'"):
         gym.make("posefit/Track-v0", nois={"holes": 0.3})
-    with pytest.raises(error.UnsupportedMode, match="render_mode must be one of rgb_array, human, got 'ansi'"):
+    with pytest.raises(TypeError, match="one of motion, .*, optimiser, .*, got 'optimizer'; did you mean 'optimiser'"):
+        gym.make("posefit/Race-v0", optimizer="cma")
+    with pytest.raises(error.UnsupportedMode, match="render_mode must be one of rgb_array, got 'ansi'"):
         gym.make("posefit/Track-v0", render_mode="ansi")
+
+
+def test_unknown_options_of_a_reset_are_named() -> None:
+    env = gym.make("posefit/Track-v0").unwrapped
+    with pytest.raises(error.Error, match="an option of reset must be one of instance, got 'instances'; did you mean"):
+        env.reset(options={"instances": 3})
 
 
 @each("name", SEARCHES)

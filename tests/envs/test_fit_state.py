@@ -45,6 +45,12 @@ def test_it_shows_the_best_proposals_and_the_last_ones_with_their_costs() -> Non
     np.testing.assert_allclose(state[16:], [2.0 * 7.0 / 11.0 - 1.0, 2.0 / 50.0 - 1.0], rtol=1e-6)
 
 
+def test_a_tie_is_no_improvement() -> None:
+    for costs, stale in (((30.0, 30.0), 1), ((50.0,), 1), ((30.0, 30.0, 20.0), 0), ((30.0, 40.0, 30.0), 2)):
+        memory = remembered(1, *((0.1 * place, cost) for place, cost in enumerate(costs)))
+        assert memory.stale.tolist() == [stale]
+
+
 def test_what_costs_no_less_than_the_middle_is_never_among_the_best() -> None:
     records = remembered(1, (0.1, 50.0), (0.2, 70.0), (0.3, 30.0), (0.4, 30.0)).records[0]
     np.testing.assert_array_equal(records[:4, 0], [0.3, 0.4, 0.0, 0.0])  # of equal ones the earlier first

@@ -47,6 +47,12 @@ CASES = {
     "posefit/Track-v0": TRACK,
     "posefit/Race-v0": RACE,
 }
+SHORT: dict[str, dict[str, Any]] = {
+    "posefit/FitImage-v0": {"max_evaluations": 5, "target_cost": 40.0},  # some end sooner
+    "posefit/FitState-v0": {"max_evaluations": 5},
+    "posefit/Track-v0": {"frames": 2, "evaluations_per_frame": 2},
+    "posefit/Race-v0": {"searches": 2, "generations": (2, 6)},
+}
 CHANGING = ("posefit/FitState-v0", "posefit/Race-v0")  # whose reset gives infos of a search
 
 
@@ -138,10 +144,30 @@ def test_a_reset_of_some_gives_what_gymnasiums_own_gives(name: str, arguments: d
                 vector.step(vector.action_space.sample())
         # those that go on show the observation from before, the picture too
         ours, theirs = (vector.reset(options={"reset_mask": np.array(mask)}) for vector in (native, own))
-        assert data_equivalence(ours[0], theirs[0])
-        assert sorted(ours[1]) == sorted(theirs[1])
-        for key, value in theirs[1].items():
-            np.testing.assert_array_equal(ours[1][key], value)
+        assert data_equivalence(ours, theirs)
+
+
+@each("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+@each(("name", "arguments"), [(name, {**CASES[name][-1], **SHORT[name]}) for name in CASES])
+def test_it_resets_as_gymnasiums_own_does(name: str, arguments: dict[str, Any], mode: AutoresetMode) -> None:
+    native = gym.make_vec(name, 3, max_episode_steps=7, autoreset_mode=mode, **arguments)
+    sync = gym.make_vec(name, 3, "sync", {"autoreset_mode": mode}, max_episode_steps=7, **arguments)
+    assert native.metadata["autoreset_mode"] is mode
+    assert data_equivalence(native.reset(seed=[5, 40, 5]), sync.reset(seed=[5, 40, 5]))
+    sync.action_space.seed(1)
+    ends = 0
+    for _ in range(25):
+        actions = sync.action_space.sample()
+        ours, theirs = native.step(actions), sync.step(actions)
+        ends += int(np.count_nonzero(theirs[2] | theirs[3]))
+        assert data_equivalence(ours, theirs)
+        assert native.np_random_seed == sync.np_random_seed == (5, 40, 5)
+    assert ends > 3
+    for seed in (None, [None, 8, None], 70):  # a later reset without a seed goes on with the generators
+        assert data_equivalence(native.reset(seed=seed), sync.reset(seed=seed))  # type: ignore[arg-type]
+        assert native.np_random_seed == sync.np_random_seed
+    states = [[rng.bit_generator.state for rng in vector.np_random] for vector in (native, sync)]
+    assert states[0] == states[1]
 
 
 @each("name", CASES)
@@ -178,8 +204,11 @@ def test_mistakes_are_named(name: str) -> None:
         vector.step(np.zeros((2, 9)))
     with pytest.raises(error.InvalidAction, match="actions must be finite"):
         vector.step(np.full((3, 9), np.nan))
-    with pytest.raises(error.UnsupportedMode, match="rgb_array for a vector environment, got human"):
-        gym.make_vec(name, num_envs=3, render_mode="human")
+    with pytest.raises(error.Error, match="option of reset must be .* got 'reset_masks'; did you mean 'reset_mask'"):
+        vector.reset(options={"reset_masks": np.array([True, False, False])})
+    for mode in (AutoresetMode.DISABLED, "same"):
+        with pytest.raises(error.Error, match="autoreset_mode must be one of NextStep, SameStep, got "):
+            gym.make_vec(name, num_envs=3, autoreset_mode=mode)
     with pytest.raises(error.Error, match="num_envs must be at least 1, got 0"):
         gym.make_vec(name, num_envs=0)
     with pytest.raises(TypeError, match="colour"):

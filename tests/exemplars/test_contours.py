@@ -9,7 +9,7 @@ from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
 from posefit.tracking.smoothing.contours import MaskContours
-from posefit_exemplars.contours import POINT_SPACING, FrameContours, precisions
+from posefit_exemplars.contours import POINT_SPACING, fitted, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
@@ -30,9 +30,8 @@ def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, rea
     """Return the step of Gauss and Newton (69,) by the derivatives of a drawn body, number by number."""
     curve, slope = np.diag(LOOSE), LOOSE * np.append(np.zeros(3), pose - mean)
     for number, camera in enumerate(walk.task.cameras):
-        view = MaskContours.of(camera, number, [walk.observations[k]], place[None])
-        numbers = moved_bodies(walk.task.body, view.camera, pose, place)
-        curves, slopes = pull_of_view(view, 0, *numbers, reach, round(POINT_SPACING * view.metres[0] / view.step))
+        view = MaskContours.of(camera, number, [walk.observations[k]], place[None], POINT_SPACING)
+        curves, slopes = pull_of_view(view, 0, *moved_bodies(walk.task.body, view.camera, pose, place), reach)
         curve += curves
         slope += slopes
     free = np.append([True] * 3, walk.motion.skeleton.free)
@@ -46,8 +45,8 @@ def step_of_twin(walk: Walk, k: int, pose: Array, place: Array, mean: Array, rea
 def test_a_step_is_that_of_a_slow_twin(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=2), views)
     poses, places = off(walk, 1, 0.05)
-    frame = FrameContours.of(walk.task.cameras, walk.observations[1], places[0])
-    moved, shifted = frame.fitted(walk.task, poses[:1], places[:1], poses[1:2], LOOSE, (0.09,))
+    contours = FrameCosts(walk.task, walk.observations[1]).contours(places[0])
+    moved, shifted = fitted(walk.task.body, contours, (poses[:1], places[:1]), poses[1:2], LOOSE, (0.09,))
     expected = step_of_twin(walk, 1, poses[0], places[0], poses[1], 0.09)
     np.testing.assert_allclose(poses[0] - moved[0], expected[3:], atol=2e-4)
     np.testing.assert_allclose(places[0] - shifted[0], expected[:3], atol=2e-5)
@@ -59,8 +58,7 @@ def test_fitted_poses_cost_less_and_the_true_one_stays(views: tuple[float, ...])
     frame_costs = FrameCosts(walk.task, walk.observations[2])
     poses, places = off(walk, 2, 0.1)
     poses[0] = walk.motion.poses[2]
-    frame = frame_costs.contours(places[0])
-    moved, _ = frame.fitted(walk.task, poses, places, poses, LOOSE, REACHES)
+    moved, _ = fitted(walk.task.body, frame_costs.contours(places[0]), (poses, places), poses, LOOSE, REACHES)
     before, after = frame_costs.full(poses, places), frame_costs.full(moved, places)
     assert after[1:].sum() < 0.6 * before[1:].sum()
     joints = walk.motion.skeleton.joints
@@ -70,7 +68,7 @@ def test_fitted_poses_cost_less_and_the_true_one_stays(views: tuple[float, ...])
 
 def test_without_a_contour_a_pose_goes_to_its_mean(walker: Walk) -> None:
     poses, places = off(walker, 0, 0.03)
-    frame = FrameContours.of(walker.task.cameras, replace(walker.observations[0], silhouettes=EMPTY), places[0])
-    moved, shifted = frame.fitted(walker.task, poses, places, poses[::-1], LOOSE, (0.09,))
+    contours = FrameCosts(walker.task, replace(walker.observations[0], silhouettes=EMPTY)).contours(places[0])
+    moved, shifted = fitted(walker.task.body, contours, (poses, places), poses[::-1], LOOSE, (0.09,))
     np.testing.assert_allclose(moved, poses[::-1], atol=1e-9)
     np.testing.assert_allclose(shifted, places, atol=1e-12)

@@ -85,10 +85,8 @@ def test_states_are_interpolated_between_frames_and_not_between_clips(two: Exemp
     codes, turns, ways = two.continuation(ends, 0.1)  # of both clips
     np.testing.assert_allclose(codes, two.codes[ends], atol=1e-6)
     assert np.abs(turns).max() == np.abs(ways).max() == 0.0
-    half = 0.5 * (two.times[1] - two.times[0])
-    np.testing.assert_allclose(
-        two.continuation(np.array([0]), half)[0][0], 0.5 * (two.codes[0] + two.codes[1]), atol=1e-6
-    )
+    halfway, *_ = two.continuation(np.array([0]), 0.5 * (two.times[1] - two.times[0]))
+    np.testing.assert_allclose(halfway[0], 0.5 * (two.codes[0] + two.codes[1]), atol=1e-6)
 
 
 def test_a_mirror_image_is_the_reflection_of_every_joint() -> None:
@@ -127,11 +125,7 @@ def test_states_are_made_once_for_the_same_motions() -> None:
     made = exemplars_of([walk], SKELETON, False)
     assert exemplars_of([replace(walk, poses=walk.poses.copy())], SKELETON, False) is made
     moved, faster = replace(walk, translations=walk.translations + 1e-9), replace(walk, fps=60.0)
-    for motions in (
-        [moved],
-        [faster],
-        [walk.frames(0, 4), walk.frames(4, 12)],
-        [walk.frames(0, 6), walk.frames(6, 12)],
-    ):
+    parts = ([walk.frames(0, k), walk.frames(k, 12)] for k in (4, 6))
+    for motions in ([moved], [faster], *parts):
         assert exemplars_of(motions, SKELETON, False) is not made
         made = exemplars_of(motions, SKELETON, False)

@@ -54,12 +54,8 @@ def test_errors_are_expected_to_grow_with_the_cost_up_to_the_greatest_where_noth
 @each("views", [(45.0,), (45.0, 135.0)])
 def test_mirror_costs_are_those_of_the_mirrored_and_each_reflected_pose(views: tuple[float, ...]) -> None:
     walk = walk_of(built_in.motion("walk-a", frames=1), views)
-    frame_costs, pose, place = (
-        FrameCosts(walk.task, walk.observations[0]),
-        walk.motion.poses[0],
-        walk.motion.translations[0],
-    )
-    skeleton = walk.motion.skeleton
+    frame_costs, skeleton = FrameCosts(walk.task, walk.observations[0]), walk.motion.skeleton
+    pose, place = walk.motion.poses[0], walk.motion.translations[0]
     reflected = [reflected_poses(skeleton, pose[None], facing(camera, place)) for camera in walk.task.cameras]
     images = [mirrored_poses(skeleton, pose[None]), *reflected]
     expected = [frame_costs.cost_and_areas(image[0], place)[0] for image in images]
@@ -104,7 +100,5 @@ def test_the_depth_is_unknown_where_one_camera_alone_shows_the_person() -> None:
         ((first, second), [unknown, shown[1]], second.position),
         ((first,), shown[:1], first.position),
     ):
-        frame_costs = FrameCosts(
-            replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes)
-        )
-        np.testing.assert_array_equal(frame_costs.camera_position, position)
+        task, observation = replace(walk.task, cameras=cameras), replace(walk.observations[0], silhouettes=silhouettes)
+        np.testing.assert_array_equal(FrameCosts(task, observation).camera_position, position)

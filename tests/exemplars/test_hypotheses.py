@@ -18,7 +18,7 @@ from tests.exemplars.conftest import Walk, walk_of
 BUDGET = 9760
 
 
-def one(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
+def single(code: float, rate: float, joint: str = "lwrist") -> Hypotheses:
     """Return a hypothesis one joint of which is so far from the origin, and moves so far a frame, in codes' metres."""
     joints, rates = np.zeros((2, 1, len(JOINTS), 3))
     joints[0, JOINTS.index(joint), 1], rates[0, JOINTS.index(joint), 1] = np.sqrt(len(JOINTS)) * np.array([code, rate])
@@ -32,7 +32,7 @@ def test_every_joint_is_in_one_part() -> None:
 
 def test_what_steps_cost_by_hand() -> None:
     def cost(code: float, rate: float, later: float, later_rate: float) -> float:
-        return float(step_costs(0.03, one(code, rate), one(later, later_rate))[0, 0])
+        return float(step_costs(0.03, single(code, rate), single(later, later_rate))[0, 0])
 
     np.testing.assert_allclose(cost(0.0, 0.06, 0.06, 0.06), 0.0, atol=1e-5)  # it goes on as it does
     np.testing.assert_allclose(cost(0.1, 0.0, 0.1, 0.0), 0.0, atol=1e-5)
@@ -45,10 +45,10 @@ def test_what_steps_cost_by_hand() -> None:
     np.testing.assert_allclose(cost(0.0, 0.0, 0.0, 0.03), 1 / 32 + 1 / 8 + 0.1, atol=1e-5)
     assert cost(0.0, 0.0, 1.0, 0.0) == MAX_PART_COST
     # two parts that are far off cost twice as much as one
-    assert float(step_costs(0.03, one(0.0, 0.0), one(1.0, 0.0))[0, 0]) == MAX_PART_COST
-    both = one(1.0, 0.0)
+    assert float(step_costs(0.03, single(0.0, 0.0), single(1.0, 0.0))[0, 0]) == MAX_PART_COST
+    both = single(1.0, 0.0)
     both.joints[0, JOINTS.index("rfoot"), 1] = 9.0
-    assert float(step_costs(0.03, one(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
+    assert float(step_costs(0.03, single(0.0, 0.0), both)[0, 0]) == 2.0 * MAX_PART_COST
 
 
 def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
@@ -58,17 +58,11 @@ def test_legs_of_one_clip_go_with_the_arms_of_another() -> None:
     poses = walk.poses.copy()
     poses[:, arms] = other.poses[14:26, arms]
     scene = walk_of(replace(walk, name="both", poses=poses), (0.0, 70.0))
-    errors = {
-        fitted: np.mean(
-            [scene.errors_mm(scene.track(evaluations=2440, fitted=fitted, seed=s)).mean() for s in range(3)]
-        )
+    plain, fitted = (
+        np.mean([scene.errors_mm(scene.track(evaluations=2440, fitted=fitted, seed=seed)).mean() for seed in range(3)])
         for fitted in (False, True)
-    }
-    assert errors[True] < 0.6 * errors[False]
-
-
-def hypotheses_of(walk: Walk) -> ExemplarTracker:
-    return ExemplarTracker(replace(walk.task, evaluations=BUDGET))
+    )
+    assert fitted < 0.6 * plain
 
 
 def estimates(walk: Walk, poses: Array, others: Array) -> Iterator[Estimate]:
@@ -84,7 +78,7 @@ def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turn
     count = 10
     truth = walker.motion.poses[:count]
     noise = np.random.default_rng(0).normal(0.0, 0.05, truth.shape) * walker.motion.skeleton.free
-    follower = hypotheses_of(walker).hypotheses
+    follower = ExemplarTracker(replace(walker.task, evaluations=BUDGET)).hypotheses
     assert follower is not None
     frames = list(follower.follow(estimates(walker, turned_poses(truth), truth + noise), np.random.default_rng(0)))
     skeleton = walker.motion.skeleton

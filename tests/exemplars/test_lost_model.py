@@ -37,7 +37,7 @@ def frame_of(walker: Walk, usable: bool = True) -> Frame:
     posterior = Posterior(np.array([pose, mirrored]), np.zeros((2, 3)), np.array([0.75, 0.25]))
     details = {"usable": usable, "mirror_costs": np.array([7.0, 9.0, 6.0]) if usable else np.empty(0)}
     areas = np.array([[30, 10, 70]])
-    return Frame(pose, np.zeros(3), 4.0, areas, 1, 0.0, np.empty(0), posterior=posterior, details=details)
+    return Frame(pose, np.zeros(3), 4.0, areas, 1, posterior=posterior, details=details)
 
 
 def test_features_are_evidence_and_its_means_and_missing_evidence_is_the_last() -> None:

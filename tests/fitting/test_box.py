@@ -8,8 +8,10 @@ from scipy.stats import kstest, truncnorm
 
 from posefit import SearchSpace, Start
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting import box
 from posefit.fitting.box import converted, draw_population, repair, sample_normal
+from posefit.fitting.cma import CMAES
 from posefit.motion import built_in
 from posefit.testing.toy import Toy, anywhere, ball, shell
 from posefit_priors.pca import PCA
@@ -120,3 +122,21 @@ def test_moving_to_another_box_keeps_the_pose() -> None:
     moved_poses, moved_places = new.decode(converted(new, proposals, old))
     np.testing.assert_allclose(moved_poses, poses, atol=1e-12)
     np.testing.assert_allclose(moved_places, places, atol=1e-12)
+
+
+def test_a_population_has_a_whole_number_of_proposals() -> None:
+    for count in (-1, 0, 2.5, True):
+        with pytest.raises(InputError, match="^count must be .*at least 1, got "):
+            draw_population(Toy(3), np.random.default_rng(0), count)  # type: ignore[arg-type]
+
+
+def test_what_cannot_be_drawn_around_an_infeasible_mean_is_the_copy_of_a_feasible_draw() -> None:
+    # three deviations from what is feasible: one draw of 741 is, so that 100 redraws help one proposal of eight
+    start = Start(np.array([0.6, 0.0]), np.array([0.1, 0.1]), np.zeros(2))
+    space = Toy(2, lambda proposals: np.asarray(proposals[:, 0] > 0.9), start=start)
+    assert not space.feasible(start.mean[None])[0]
+    drawn = draw_population(space, np.random.default_rng(0), 200)
+    assert space.feasible(drawn).all()
+    assert 10 < len(np.unique(drawn, axis=0)) < 60
+    asked = CMAES(space, np.random.default_rng(0)).ask()
+    assert space.feasible(asked).all()

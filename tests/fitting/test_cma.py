@@ -7,6 +7,7 @@ import pytest
 from cmaes import CMA
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.fitting.box import Start, displacement
 from posefit.fitting.cma import CMAES, Strategy
 from posefit.testing.toy import Toy, shell, sphere
@@ -150,3 +151,12 @@ def test_settings_out_of_range_are_refused_by_name() -> None:
     for wrong in ({"population_size": 4}, {"spread": 0.0}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             CMAES(Toy(2), np.random.default_rng(0), **wrong)
+
+
+def test_a_spread_of_nothing_is_refused() -> None:
+    for spread in (np.zeros(4), np.full(4, np.nan), np.array([0.1, -0.1, 0.1, 0.1])):
+        space = Toy(4, start=Start(np.zeros(4), spread, np.zeros(4)))
+        with pytest.raises(InputError, match="spread must be above 0 in some coordinate and negative in none, got"):
+            CMAES(space, np.random.default_rng(0))
+    narrow = Toy(4, start=Start(np.zeros(4), np.array([0.1, 0.0, 0.1, 0.1]), np.zeros(4)))
+    assert np.abs(CMAES(narrow, np.random.default_rng(0)).ask()[:, 1]).max() < 1e-5

@@ -51,7 +51,7 @@ def test_a_cost_has_the_same_bits_whatever_stands_beside_it(
     parts = [problem.evaluate(proposals[k : k + 7]) for k in range(0, 1000, 7)]
     np.testing.assert_array_equal(np.concatenate(parts), costs)
     np.testing.assert_array_equal([problem.evaluate(proposal[None])[0] for proposal in proposals[:20]], costs[:20])
-    np.testing.assert_array_equal(problem.cost(*problem.decode(proposals)), costs)
+    np.testing.assert_array_equal(problem.cost_and_areas(*problem.decode(proposals))[0], costs)
     assert problem.evaluate(proposals[:0]).shape == (0,)
 
 
@@ -65,7 +65,7 @@ def test_a_search_gets_the_costs_of_the_areas_without_views_that_know_nothing(
     cameras = [problem.cameras[0]] * 3
     several = replace(problem, cameras=cameras, silhouettes=[blind, whole, half], beta=0.3, threads=threads)
     proposals = drawn(several, 40)
-    counts = several.areas(*several.decode(proposals))
+    counts = several.cost_and_areas(*several.decode(proposals))[1]
     shares = np.array([100.0 * (0.7 * b / (b + y) + 0.3 * r / (r + y)) for r, b, y in np.concatenate(counts[1:])])
     np.testing.assert_allclose(several.evaluate(proposals), shares.reshape(2, -1).mean(axis=0))
     nothing = replace(several, silhouettes=[blind] * 3, blank=True)
@@ -93,7 +93,8 @@ def test_a_proposal_means_the_same_pose_at_every_size(problem: PoseProblem, tran
 
 def test_small_pictures_rank_poses_as_the_whole_one_does_and_the_true_one_first(problem: PoseProblem) -> None:
     sizes = [problem.coarser(factor) for factor in (1, 2, 4)]
-    assert [size.cost(WALK.poses[:1], WALK.translations[:1]).tolist() for size in sizes] == [[0.0]] * 3
+    true = WALK.poses[:1], WALK.translations[:1]
+    assert [size.cost_and_areas(*true)[0].tolist() for size in sizes] == [[0.0]] * 3
     costs = np.array([size.evaluate(drawn(problem, 300)) for size in sizes])
     ranks = costs.argsort(axis=1).argsort(axis=1)
     whole, half, quarter = ranks - ranks.mean()
@@ -167,8 +168,7 @@ class Walker:
 def test_the_budget_is_used_in_whole_populations() -> None:
     best = minimise(lambda x: -x[:, 0], Walker(7), 40)
     assert (best.evaluations, best.cost) == (35, -4.0)
-    assert best.history.tolist() == [0.0, -1.0, -2.0, -3.0, -4.0]
-    assert best.spent.tolist() == [7, 14, 21, 28, 35]
+    assert best.trace.tolist() == [[7.0, 0.0], [14.0, -1.0], [21.0, -2.0], [28.0, -3.0], [35.0, -4.0]]
     with pytest.raises(BudgetError, match="evaluations must hold one population of 7, got 6"):
         minimise(lambda x: x[:, 0], Walker(7), 6)
 

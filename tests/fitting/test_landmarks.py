@@ -48,13 +48,13 @@ def likelihoods(landmarks: Array, poses: Array) -> Array:
     return landmark_likelihoods(WALK.skeleton, [CAMERA], landmarks, poses, places)
 
 
-def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_sure() -> None:
+def test_landmarks_at_the_joints_cost_least_and_as_little_as_their_sides_are_certain() -> None:
     # the other side is far off in each group but for those joints that lie on each other
     poses = WALK.poses[3] + np.random.default_rng(0).normal(0.0, 0.1, (20, 66)) * WALK.skeleton.free
     poses[0] = WALK.poses[3]
-    found = costs(landmarks_of(1.0), poses)
-    assert found.argmin() == 0
-    assert -1e-9 <= found[0] <= -np.log(1.0 - EXCHANGED).sum() + 1e-9
+    by_pose = costs(landmarks_of(1.0), poses)
+    assert by_pose.argmin() == 0
+    assert -1e-9 <= by_pose[0] <= -np.log(1.0 - EXCHANGED).sum() + 1e-9
 
 
 def test_one_joint_off_by_hand() -> None:
@@ -67,15 +67,13 @@ def test_one_joint_off_by_hand() -> None:
     other = np.linalg.norm(landmarks[0, wrist, :2] - pixels[MIRROR[wrist]]) / metre[MIRROR[wrist]] / DEVIATION
     rare = EXCHANGED[ARMS]
     arms = (1.0 - rare) * (1.0 + 4.5) ** -0.5 + rare * (1.0 + 0.5 * other**2) ** -0.5
-    # the groups that nothing is seen of cost nothing
+    # groups without landmarks cost nothing
     np.testing.assert_allclose(costs(landmarks, WALK.poses[3:4]), [-np.log(arms)], rtol=1e-9)
 
 
 def test_exchanged_sides_cost_what_their_share_says() -> None:
-    direct, exchanged = (
-        costs(landmarks_of(1.0), WALK.poses[3:4]),
-        costs(landmarks_of(1.0)[:, list(MIRROR)], WALK.poses[3:4]),
-    )
+    landmarks = landmarks_of(1.0)
+    direct, exchanged = (costs(points, WALK.poses[3:4]) for points in (landmarks, landmarks[:, list(MIRROR)]))
     most = np.log((1.0 - EXCHANGED) / EXCHANGED).sum()
     assert 0.3 * most < exchanged[0] - direct[0] <= most + 1e-9
 
@@ -87,18 +85,18 @@ def test_exchanged_landmarks_are_expected_to_stay_so() -> None:
     before = exchanged_given(first, usual[None])
     twice = landmark_costs(first) + landmark_costs(second, exchanged_next(before, 1.0 / 30.0))
     total = np.zeros(first.shape[:2])
-    for one, rare in enumerate((1.0 - usual, usual)):
-        for other, expected in enumerate((1.0 - usual, usual)):
-            step = PERSISTENCE * (one == other) + (1.0 - PERSISTENCE) * expected
-            total += rare * np.exp(first[..., one]) * step * np.exp(second[..., other])
+    for now, share in enumerate((1.0 - usual, usual)):
+        for later, expected in enumerate((1.0 - usual, usual)):
+            step = PERSISTENCE * (now == later) + (1.0 - PERSISTENCE) * expected
+            total += share * np.exp(first[..., now]) * step * np.exp(second[..., later])
     np.testing.assert_allclose(twice, -np.log(total).sum(axis=1), rtol=1e-9)
 
 
 def test_the_odds_of_sides_are_at_most_those_of_the_usual_shares() -> None:
     usual = EXCHANGED[[LEGS, ARMS]]
     most = np.log((1.0 - usual) / usual).sum()
-    marks = landmarks_of(1.0)
-    right, wrong = (likelihoods(one, WALK.poses[3:4])[0] for one in (marks, marks[:, list(MIRROR)]))
+    landmarks = landmarks_of(1.0)
+    right, wrong = (likelihoods(points, WALK.poses[3:4])[0] for points in (landmarks, landmarks[:, list(MIRROR)]))
     assert 0.3 * most < side_odds(right) <= most
     np.testing.assert_allclose(side_odds(wrong), -side_odds(right), rtol=1e-9)
     assert side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0]) == 0.0

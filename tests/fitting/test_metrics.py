@@ -11,6 +11,7 @@ from posefit.fitting import metrics
 from posefit.geometry.rotation import rotation_from_joint_angles
 from posefit.geometry.skeleton import JOINTS, MIRROR
 from posefit.motion import built_in
+from posefit.uncertainty.modes import nearer_mirrored
 
 seeds = st.integers(0, 2**32 - 1)
 rotations = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(lambda angles: rotation_from_joint_angles(np.array(angles)))
@@ -41,8 +42,8 @@ def test_a_mirrored_stride_counts_as_swapped(joints: Array) -> None:
     mirrored = (rooted * [-1.0, 1.0, 1.0])[:, list(MIRROR)]  # it goes along +z
     strides = np.abs(rooted[:, JOINTS.index("lfoot"), 2] - rooted[:, JOINTS.index("rfoot"), 2]) > 0.3
     assert strides.sum() >= 5
-    assert metrics.swapped(joints, mirrored)[strides].all()
-    assert not metrics.swapped(joints, joints + np.random.default_rng(0).normal(0.0, 0.003, joints.shape)).any()
+    assert nearer_mirrored(joints, mirrored)[strides].all()
+    assert not nearer_mirrored(joints, joints + np.random.default_rng(0).normal(0.0, 0.003, joints.shape)).any()
 
 
 def test_chosen_angles_alone_count() -> None:
@@ -116,7 +117,7 @@ def test_an_estimate_in_one_point_is_at_the_centroid_for_pa_mpjpe() -> None:
 def test_left_and_right_names_traded_count_as_swapped(joints: Array) -> None:
     half = joints.copy()
     half[:5] = half[:5, list(MIRROR)] + [0.1, 0.2, 0.3]
-    assert metrics.swapped(joints, half).tolist() == [True] * 5 + [False] * 15
+    assert nearer_mirrored(joints, half).tolist() == [True] * 5 + [False] * 15
 
 
 @given(seeds, rotations)
@@ -124,6 +125,6 @@ def test_where_the_pair_stands_and_faces_does_not_decide_a_swap(joints: Array, s
     rng = np.random.default_rng(seed)
     estimate = joints + rng.normal(0.0, 0.05, joints.shape)
     estimate[::2] = estimate[::2, list(MIRROR)]
-    swapped = metrics.swapped(joints, estimate)
-    moved = metrics.swapped(joints @ rotation.T + rng.normal(size=3), estimate @ rotation.T + rng.normal(size=3))
+    swapped = nearer_mirrored(joints, estimate)
+    moved = nearer_mirrored(joints @ rotation.T + rng.normal(size=3), estimate @ rotation.T + rng.normal(size=3))
     np.testing.assert_array_equal(moved, swapped)

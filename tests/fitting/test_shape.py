@@ -22,7 +22,7 @@ POSES, PLACES = WALK.poses[::4], WALK.translations[::4]
 
 def frames_at(places: Sequence[np.ndarray]) -> list[Frame]:
     nothing = np.zeros((1, 3), np.int64)
-    return [Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0)) for pose, place in zip(POSES, places, strict=True)]
+    return [Frame(pose, place, 0.0, nothing, 0) for pose, place in zip(POSES, places, strict=True)]
 
 
 def observed(body: Body, cameras: list[Camera]) -> list[Observation]:

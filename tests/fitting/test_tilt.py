@@ -132,7 +132,7 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     learned = PCA().fit(task.angles)
 
     def tilt(choice: TrackOptions) -> Tilt | None:
-        tracker = prepare(choice, task).tracker(task)
+        tracker = prepare(choice, task).build(task)
         assert isinstance(tracker, SynthesisTracker)
         return Follower(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
 
@@ -140,8 +140,8 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     assert Follower(task_of(), Line(), Prediction(), before).space(NOTHING).tilt is before
     assert tilt(TrackOptions(method="@pca")) is not None
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
-    assert tilt(TrackOptions(prior=learned)) is None
-    assert tilt(TrackOptions(prior=learned, settings={"tracker.tilt": "learned"})) is not None
+    assert tilt(TrackOptions(method=("annealed", learned))) is None
+    assert tilt(TrackOptions(method=("annealed", learned), settings={"tracker.tilt": "learned"})) is not None
 
 
 @each(

@@ -22,6 +22,7 @@ from posefit.footage.video import Video
 from posefit.geometry.calibration import Calibration
 from posefit.geometry.rotation import wrapped
 from posefit.progress import Progress
+from posefit.uncertainty.modes import nearer_mirrored
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, iou, truth, walk
@@ -44,8 +45,8 @@ def test_a_video_is_tracked_from_nothing_but_its_frames(filmed: tuple[Path, list
     assert result.summary["fps"] == 25.0
     assert result.summary["translation"] == "aligned"
     assert result.summary["iou"] > 0.75  # masks of 900 pixels
-    assert result.summary["body"]["stature"] == pytest.approx(1.7)
-    assert set(result.summary["body"]["factors"]) == set(result.summary["body"]["spread"])
+    assert result.summary["build"]["stature_m"] == pytest.approx(1.7)
+    assert set(result.summary["build"]["factors"]) == set(result.summary["build"]["spread"])
     # the camera is on the person's left, so they walk to the left of the image, and face there
     assert result.motion.translations[-1, 0] < result.motion.translations[0, 0] - 0.5
     assert np.abs(wrapped(result.motion.poses[:, 0] + np.pi / 2)).mean() < np.radians(45.0)
@@ -77,7 +78,7 @@ def test_two_calibrated_cameras_place_the_person(filmed: tuple[Path, list[Any]],
     assert np.median(away) < 0.03  # metres
     joints = [motion.joints, motion.skeleton.joints(result.motion.poses, result.motion.translations)]
     assert np.median(metrics.mpjpe_mm(*joints)) < 50.0
-    assert metrics.swapped(*joints).mean() < 0.2
+    assert nearer_mirrored(*joints).mean() < 0.2
     other = film(tmp_path / "front.avi", [NOBODY] * EMPTY + truth(0.6))
     # coming nearer the person covers the same place all the time, which a mixture would learn
     how = Extraction("median")

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from posefit.fitting.tracker import Frame
+from posefit.output.folder import OutputFolder
+from posefit.output.identity import digest_of
 from posefit.sweep.ledger import FILE, NAMES, Writer
-from posefit.tracking.identity import digest_of
-from posefit.tracking.outputs import OutputFolder
 from posefit.uncertainty.modes import Posterior
 from tests.report.browser import result
 from tests.report.searched import cell as search_cell
@@ -35,8 +35,8 @@ def written(folder: Path) -> dict[str, bytes]:
         ledger.plan(cells(2))
         ledger.finish(cells(1)[0].key, result(cells(1)[0], 1.0))
     frame = Frame(
-        np.zeros(66), np.zeros(3), 1.0, np.ones((2, 3)), 40, 0.1, np.ones(2), np.ones(9), np.array([20, 40]),
-        {"a": np.ones(2), "b": "text"}, 0.1, Posterior(np.zeros((2, 66)), np.zeros((2, 3)), np.ones(2)), (), 0.5, "walk",
+        np.zeros(66), np.zeros(3), 1.0, np.ones((2, 3)), 40, np.array([[20, 2.0], [40, 1.0]]),
+        Posterior(np.zeros((2, 66)), np.zeros((2, 3)), np.ones(2)), 0.5, "walk", {"a": np.ones(2), "b": "text"}, 0.1,
     )  # fmt: skip
     with suppress(_ReadError), OutputFolder(folder / "made" / NAME, False, False, SPEC, lambda _: None) as output:
         for seed in range(3):

@@ -16,7 +16,7 @@ from posefit.measuring.gait import Gait, backwards, backwards_warning, gait_of
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
-from posefit.tracking.table import gait_line, table
+from posefit.output.text import gait_line, table
 from tests.cases import each
 from tests.measuring.walker import SPEED, walker
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from posefit.output import page as track_page
 from posefit.page.document import SHARED, part
 from posefit.report import page as report_page
 from posefit.report.figures import COLOURS
-from posefit.tracking import page as track_page
 
 ROOT = Path(__file__).parents[2]
 MIN_CONTRAST = 4.5  # WCAG 2.2, 1.4.3, of text; here of marks and lines too

@@ -7,10 +7,12 @@ import warnings
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 
+import numpy as np
 import pytest
 
 import posefit
-from posefit.registry import Registry, load
+from posefit.registry import Registry, load, registry
+from posefit.testing.toy import Toy, sphere
 from tests.cases import each
 
 LIBRARIES = {
@@ -53,6 +55,23 @@ def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     assert 720 <= summary["evaluations"] <= 800
     assert summary["iou"] > 0.5
     assert set(threading.enumerate()) <= threads
+
+
+def test_a_library_says_afterwards_what_it_said_before() -> None:
+    optuna, config = pytest.importorskip("optuna"), pytest.importorskip("pymoo.config").Config
+    before = optuna.logging.get_verbosity(), config.warnings["not_compiled"]
+    try:
+        optuna.logging.set_verbosity(optuna.logging.DEBUG)
+        config.warnings["not_compiled"] = True
+        for name in ("optuna", "pymoo"):
+            optimiser = registry().optimiser(name)(Toy(3), np.random.default_rng(0))
+            proposals = optimiser.ask()
+            optimiser.tell(proposals, sphere(proposals))
+        assert optuna.logging.get_verbosity() == optuna.logging.DEBUG
+        assert config.warnings == {"not_compiled": True}
+    finally:
+        optuna.logging.set_verbosity(before[0])
+        config.warnings["not_compiled"] = before[1]
 
 
 def test_an_unknown_variant_is_named() -> None:

@@ -98,6 +98,17 @@ def test_a_broken_plugin_is_left_out_with_a_warning_and_the_others_work(kinds: A
             load(points, kinds, {"POSEFIT_STRICT_PLUGINS": "1"}, ["track"])
 
 
+def test_an_unknown_name_points_to_the_plugins_that_failed_to_load() -> None:
+    with pytest.warns(UserWarning, match="'bad' of posefit-bad 1.0 is left out"):
+        installed = Registry((*registry().plugins, *load([point("bad", ImportError("no module"))], variables={})))
+    for name, hint in (
+        ("sapsso", r"did you mean 'sapso'\? posefit plugins doctor says why bad failed to load"),
+        ("xyzzy", "; posefit plugins doctor says why bad failed to load"),
+    ):
+        with pytest.raises(ValueError, match=f"got '{name}'.*{hint}$"):
+            installed.offer("optimiser", name)
+
+
 def test_an_entry_point_of_a_group_that_is_nearly_right_is_broken() -> None:
     with pytest.warns(UserWarning, match="must be in the group 'posefit', got 'posefit.plugins'"):
         (plugin,) = load([point("mine", offering("mine"), "posefit.plugins")])
@@ -109,7 +120,7 @@ def test_an_entry_point_of_a_group_that_is_nearly_right_is_broken() -> None:
     [
         ("sapos", "; did you mean 'sapso'\\?"),
         ("mixture", "; its kind is segmenter"),
-        ("xyzzy", "; posefit plugins doctor says whether"),
+        ("xyzzy", "; posefit plugins doctor lists what is installed"),
     ],
 )
 def test_an_unknown_name_gets_the_nearest_its_kind_or_the_doctor(name: str, hint: str) -> None:

@@ -3,6 +3,7 @@
 import inspect
 from typing import Any, Literal
 
+import numpy as np
 import pytest
 
 from posefit.fitting.tracker import Prediction
@@ -72,9 +73,15 @@ def test_a_text_that_does_not_fit_is_named() -> None:
 
 def test_values_are_checked_as_texts_are() -> None:
     check("it", factory, {"count": 4, "rate": 1, "kind": "a", "limit": None, "anything": object()})
+    given = {"count": np.int64(4), "rate": np.float32(0.5), "sharp": np.True_, "reach": (np.float64(1.0), np.int8(2))}
+    plain = check("it", factory, given)
+    assert plain == {"count": 4, "rate": 0.5, "sharp": True, "reach": (1.0, 2)}
+    assert [type(value) for value in (*plain.values(), *plain["reach"])] == [int, float, bool, tuple, float, int]
     for given, message in (
         ({"count": True}, "it.count must be int, got True"),
         ({"count": 4.0}, "it.count must be int, got 4.0"),
+        ({"count": np.float64(4.0)}, r"it.count must be int, got np.float64\(4.0\)"),
+        ({"count": np.array([4])}, r"it.count must be int, got array\(\[4\]\)"),
         ({"rate": "0.5"}, "it.rate must be float, got '0.5'"),
         ({"nothing": 1}, "a setting of it must be one of"),
     ):

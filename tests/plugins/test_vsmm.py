@@ -21,6 +21,7 @@ from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
+from posefit_vsmm import tracker
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.search import Search
@@ -236,3 +237,26 @@ def test_a_setting_counts_whatever_the_variant_is() -> None:
     ):
         frames = follow(task, observations, variant=variant, recovery=recovery)
         assert frames[-1].details["lost"] == lost
+
+
+@each("variant", ["default", "patent"])
+def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    task, observations = seen(frames=6)
+    measured: list[np.ndarray] = []
+    marks = np.arange(17)[:, None] + np.array([1000.0, 2000.0])  # where no joint is expected
+    monkeypatch.setattr(tracker.JointFilter, "follow", lambda *_: marks)
+    measure = tracker.JointCameras.measure
+
+    def recorded(self: Any, states: Any, joints: Any, known: Any) -> Any:
+        measured.append(joints[0].points[joints[0].confidence > 0.0])
+        return measure(self, states, joints, known)
+
+    monkeypatch.setattr(tracker.JointCameras, "measure", recorded)
+    hidden_joints = 0
+    for frame in follow(task, observations, variant=variant):  # VSMM 2.7, Interpretation V9
+        hidden = frame.details["confidence"][0] == 0.0
+        np.testing.assert_array_equal(frame.details["joints"][0][hidden], marks[hidden])
+        assert (frame.details["joints"][0][~hidden] < 1000.0).all()
+        hidden_joints += int(hidden.sum())
+    assert hidden_joints
+    assert any((points >= 1000.0).any() for points in measured) is (variant == "patent")

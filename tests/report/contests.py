@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from posefit.report.contest import Contest, baseline_rows, contest_of, leaderboard
+from posefit.report.contest import Contest, contest_of, leaderboard
 from posefit.report.runs import runs_of
 from posefit.report.summary import leader_sentences
 from posefit.sweep.cell import CellResult
@@ -50,4 +51,9 @@ def three_methods() -> Errors:
 
 def sentences(contest: Contest) -> list[str]:
     """Return the sentences of a report."""
-    return leader_sentences(contest, leaderboard(contest), baseline_rows(contest))
+    return leader_sentences(contest, leaderboard(contest), baselines(contest))
+
+
+def baselines(contest: Contest) -> list[dict[str, Any]]:
+    """Return the rows of its baselines."""
+    return contest.runs.kind.baseline_rows(contest)

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.report.contest import baseline_rows, contest_of, leaderboard, paired_tests
-from posefit.report.curves import certainty, convergence, grid, joint_errors, reached
+from posefit.report.charts import certainty, convergence, grid, joint_errors, reached
+from posefit.report.contest import contest_of, leaderboard, paired_tests
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result, sure
-from tests.report.contests import FIRST, contest_of_errors, contest_of_results, full, three_methods
+from tests.report.contests import FIRST, baselines, contest_of_errors, contest_of_results, full, three_methods
 
 
 def test_runs_are_paired_by_instance_and_seed(tmp_path: Path) -> None:
@@ -38,26 +38,34 @@ def test_methods_share_a_letter_where_no_test_shows_a_difference(tmp_path: Path)
     assert {row["name"]: row["letters"] for row in board} == {"a": "a", "c": "a", "b": "b"}
 
 
+def test_letters_are_by_what_holds_for_all_comparisons_together(tmp_path: Path) -> None:
+    # of 6 blocks each method is better in all: p = 2 / 2^6 = 0.031 each, and 0.094 after Holm
+    board = leaderboard(contest_of_errors(tmp_path, full({"a": 1.0, "b": 2.0, "c": 3.0}, instances=3)))
+    assert [(row["name"], row["letters"]) for row in board] == [("a", "a"), ("b", "a"), ("c", "a")]
+    (p,) = {row["p"] for row in board if row["p"] is not None}
+    assert p == pytest.approx(3 * 2 / 2**6)
+
+
 def test_the_leaderboard_has_interquartile_means_and_baselines_have_skills_too(tmp_path: Path) -> None:
     contest = contest_of_errors(tmp_path, {("a", i, 0): error for i, error in enumerate([1.0, 2.0, 3.0, 50.0])})
     (row,) = leaderboard(contest)
     assert row["error"] == pytest.approx(2.5)  # of four runs the first and the last are left out
     assert row["skill_mean_pose"] == pytest.approx(1.0 - 2.5 / 4.0)
     assert np.isnan(row["low"])  # one seed gives no interval
-    assert [(base["error"], base["skill_nearest"]) for base in baseline_rows(contest)] == [(4.0, 0.0)] * 3
+    assert [(base["error"], base["skill_nearest"]) for base in baselines(contest)] == [(4.0, 0.0)] * 3
 
 
 def test_a_skill_is_that_of_the_errors_that_are_shown(tmp_path: Path) -> None:
     # the middle halves are of instances 1 and 2 for the method, and 0 and 3 for the baselines
-    errors, baselines = [1.0, 2.0, 3.0, 9.0], [4.0, 1.0, 16.0, 8.0]
+    errors, trivial = [1.0, 2.0, 3.0, 9.0], [4.0, 1.0, 16.0, 8.0]
     made = [
-        result(replace(FIRST, method=method, instance=i), scale * error, baselines_degrees={"mean_pose": baselines[i]})
+        result(replace(FIRST, method=method, instance=i), scale * error, baselines_degrees={"mean_pose": trivial[i]})
         for method, scale in (("a", 1.0), ("b", 2.0))
         for i, error in enumerate(errors)
     ]
     late = result(replace(FIRST, method="late", instance=7), 3.0, baselines_degrees={"mean_pose": 4.0})
     contest = contest_of_results(tmp_path, [*made, late])
-    shown = {row["baseline"]: row["error"] for row in baseline_rows(contest)}
+    shown = {row["baseline"]: row["error"] for row in baselines(contest)}
     assert shown == {"mean_pose": 6.0, "persistence": None, "nearest": None}
     board = {row["name"]: row for row in leaderboard(contest)}
     assert [board[name]["skill_mean_pose"] for name in "ab"] == pytest.approx([1.0 - 2.5 / 6.0, 1.0 - 5.0 / 6.0])
@@ -96,7 +104,8 @@ def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:
     curve = convergence(contest, evaluations)[0]
     assert curve is not None
     # of 1, 1.01, 1.1, 1.11 the middle two, times 4 at the start
-    assert (curve.values[0], curve.values[-1]) == pytest.approx((4.0 * 1.055, 1.055), rel=1e-6)
+    assert (curve.y[0], curve.y[-1]) == pytest.approx((4.0 * 1.055, 1.055), rel=1e-6)
+    assert curve.low is not None
     assert np.isnan(curve.low).all()  # of four runs
     shares = reached(contest, evaluations)
     assert (np.diff(shares) >= 0.0).all()

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from posefit.report import figures
+from posefit.report.charts import Chart, Line
 from posefit.statistics.intervals import Intervals
 from posefit.statistics.ranks import Ranking, friedman
 
 pytest.importorskip("matplotlib")
 
 METHODS = ("sapso@pca", "cma_$x$@full", "vsmm")
-BINS = [[30, 0.55, 0.4], [90, 0.95, 0.9]]
-WIDTHS = [[20.0, 40.0, 80.0], [10.0, 20.0, 30.0], [50.0, 90.0, 160.0]]
 SHARES = np.array([[0.1, 0.5, 1.0], [0.0, 0.3, 0.9], [0.0, 0.0, 0.2]])
 GRID = np.array([40.0, 400.0, 2440.0])
 
@@ -27,15 +26,20 @@ def ranking(means, cliques):
     return Ranking(np.array(means), 5.0, 0.04, 0.8, cliques)
 
 
+def chart(lines, **more):
+    return figures.chart_figure(METHODS, Chart(name="a", title="A", x_label="x", y_label="y", lines=lines, **more))
+
+
 def every():
     """Return one figure of each kind."""
     joints = ["head", "l_foot"]
     return {
-        "convergence": figures.curves_figure(METHODS, GRID, bands([9, 5, 3], [9, 8, 7], [9, 9, 9])),
-        "attainment": figures.shares_figure(METHODS, GRID, SHARES, "evaluations", "share", log=True),
+        "curves": chart(
+            [Line(GRID, b.values, b.low, b.high) for b in bands([9, 5, 3], [9, 8, 7], [9, 9, 9])], log=True
+        ),
+        "shares": chart([Line(GRID, share) for share in SHARES], stepped=True, most=1.0),
         "joint_errors": figures.joint_errors_figure(METHODS, joints, bands([30, 60], [40, 50], [9, 9])),
-        "reliability": figures.reliability_figure(METHODS, [BINS, BINS[:1], BINS[1:]]),
-        "coverage": figures.coverage_figure(METHODS, (0.5, 0.8, 0.95), WIDTHS, SHARES),
+        "dots": chart([Line(GRID, share, dots=["few", "more", "most"]) for share in SHARES], guides=[(0, 0.5, 9, 0.8)]),
         "critical_difference": figures.critical_difference_figure(METHODS, ranking([1.2, 1.8, 3.0], ((0, 1),))),
     }
 
@@ -44,7 +48,7 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
     starts = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
     once, again = every(), every()
     for name, figure in once.items():
-        for suffix in starts if name in ("coverage", "critical_difference") else (".png",):
+        for suffix in starts if name in ("dots", "critical_difference") else (".png",):
             paths = [tmp_path / f"{name}{k}{suffix}" for k in range(2)]
             for path, drawn in zip(paths, (figure, again[name]), strict=True):
                 figures.save(drawn, path)
@@ -59,17 +63,15 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
 
 def test_lines_bands_dots_and_bars_have_their_values():
     axes = {name: figure.axes[0] for name, figure in every().items()}
-    assert axes["convergence"].lines[0].get_ydata().tolist() == [9, 5, 3]
-    band = axes["convergence"].collections[0].get_paths()[0].vertices
+    assert axes["curves"].lines[0].get_ydata().tolist() == [9, 5, 3]
+    band = axes["curves"].collections[0].get_paths()[0].vertices
     assert (band[:, 1].min(), band[:, 1].max()) == (2.5, 10.0)
-    diagonal, line, *_ = axes["reliability"].lines
-    assert diagonal.get_xdata().tolist() == diagonal.get_ydata().tolist() == [0, 1]
-    assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == ([0.55, 0.95], [0.4, 0.9])
-    # the area of a dot is the number of frames
-    assert axes["reliability"].collections[0].get_sizes().tolist() == pytest.approx([8 + 20, 8 + 60])
-    lines = axes["coverage"].lines
-    assert [level.get_ydata()[0] for level in lines[:3]] == [0.5, 0.8, 0.95]
-    assert (lines[4].get_xdata().tolist(), lines[4].get_ydata().tolist()) == (WIDTHS[1], [0.0, 0.3, 0.9])
+    assert axes["curves"].get_xscale() == "log"
+    guide, line, *_ = axes["dots"].lines
+    assert (guide.get_xdata().tolist(), guide.get_ydata().tolist()) == ([0, 9], [0.5, 0.8])
+    assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (GRID.tolist(), [0.1, 0.5, 1.0])
+    assert line.get_marker() == "o"
+    assert axes["shares"].lines[0].get_drawstyle() == "steps-post"
     without = Intervals(np.array([3.0]), np.array([np.nan]), np.array([np.nan]))  # one seed
     bars = figures.joint_errors_figure(("a", "b"), ["head"], [*bands([30]), without]).axes[0]
     assert [bar.get_width() for bar in bars.patches] == [30, 3]
@@ -94,13 +96,15 @@ def test_28_methods_are_drawn_and_no_two_lines_are_equal(tmp_path):
     names = [f"method-{k}-with-a-rather-long-name-for-a-figure" for k in range(28)]
     ranks = friedman(np.random.default_rng(0).gamma(2.0, size=(28, 5, 5)))
     figures.save(figures.critical_difference_figure(names, ranks), tmp_path / "cd.png")
-    drawn = figures.shares_figure(names, np.array([0.0, 1.0]), np.tile([0.0, 1.0], (28, 1)), "x", "y")
+    line = Line(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    shown = Chart(name="a", title="A", x_label="x", y_label="y", lines=[line] * 28)
+    drawn = figures.chart_figure(names, shown)
     assert len({(line.get_color(), line.get_linestyle()) for line in drawn.axes[0].lines}) == 28
 
 
 def test_another_format_is_refused_and_nothing_is_written(tmp_path):
     with pytest.raises(ValueError, match=r"a.bmp: expected a figure that ends in .png, .pdf, .svg, got '.bmp'"):
-        figures.save(every()["attainment"], tmp_path / "a.bmp")
+        figures.save(every()["shares"], tmp_path / "a.bmp")
     assert list(tmp_path.iterdir()) == []
 
 

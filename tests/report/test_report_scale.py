@@ -14,6 +14,7 @@ import pytest
 from posefit.report.animations import MAX_CHARACTERS
 from posefit.report.write import write_report
 from posefit.sweep.cell import CellResult
+from posefit.sweep.ledger import FILE
 from tests.effort import effort
 from tests.report.browser import ledger, result, row_of
 from tests.sweep.fake import cells
@@ -53,7 +54,7 @@ def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(t
         made = ledger(tmp_path / f"{instances}", rows(instances, seeds))
         page = tmp_path / f"{instances}.html"
         efforts.append(effort(lambda made=made, page=page: write_report(made, page, warn=lambda _: None)))  # type: ignore[misc]
-        size = sum(path.stat().st_size for path in (made / "rows").glob("*.jsonl"))
+        size = (made / FILE).stat().st_size
         assert instances == 3 or efforts[-1].read < 6.0 * size
     calls = [taken.calls for taken in efforts]
     assert calls[3] - calls[2] < 1.2 * 2.0 * (calls[2] - calls[1])

@@ -3,16 +3,17 @@
 import json
 import random
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posefit.report.columns import FIGURES
-from posefit.report.runs import Runs, runs_of
+from posefit.report.runs import Runs, distinct, runs_of
+from posefit.report.tracks import Tracks
 from posefit.sweep.cell import CellResult, TrackCell
 from posefit.sweep.ledger import Ledger
-from tests.report.browser import ledger, result
+from tests.report.browser import EVIL, ledger, result
 from tests.report.contests import FIRST
 
 SAPSO, COOLER = replace(FIRST, method="sapso@pca"), replace(FIRST, method="sapso@pca", settings={"sapso.cooling": 0.9})
@@ -55,6 +56,48 @@ def test_settings_of_one_plain_name_have_their_plugins(tmp_path: Path) -> None:
     )
 
 
+def test_a_grid_of_settings_has_no_two_labels_alike(tmp_path: Path) -> None:
+    plan = product(
+        [f"{name}@pca" for name in ("sapso", "pso", "cma", "random", "scipy")],
+        (0.5, 0.6, 0.7, 0.8, 0.9),
+        range(10, 60, 10),
+    )
+    variants = [
+        replace(FIRST, method=method, settings={f"{method[:-4]}.inertia": inertia, f"{method[:-4]}.particles": count})
+        for method, inertia, count in plan
+    ]
+    motions = ("walk", "run", "jacks")
+    runs = read(
+        tmp_path, *(result(replace(v, motion=m, seed=s), 1.0) for v in variants for m in motions for s in range(5))
+    )
+    assert len(runs) == 1875
+    assert len(set(runs.methods)) == 125
+    assert "pso@pca (inertia 0.6, particles 40)" in runs.methods
+
+
+def test_names_are_distinct_and_printable_whatever_they_hold() -> None:
+    details = [{"version": "1", "evaluations": "2"}, {"version": "1", "evaluations": "3"}, {}, {}]
+    assert distinct(["cold", "cold", "a", "a (2)"], details) == (
+        "cold (evaluations 2)", "cold (evaluations 3)", "a", "a (2)",
+    )  # fmt: skip
+    assert distinct(["a", "a", "a (2)"], [{}] * 3) == ("a", "a (2)", "a (2) (2)")
+    names = distinct(["\x1b[31mred\nb", "\\x1b[31mred\\nb", "\u202e"], [{}] * 3)
+    assert len(set(names)) == 3
+    assert all(map(str.isprintable, names))
+
+
+def test_methods_of_one_given_name_are_told_apart_by_what_differs(tmp_path: Path) -> None:
+    cells = [
+        replace(FIRST, name="cold", method=m, evaluations=n) for m in ("a@pca", "b@pca") for n in (2440000, 2440001)
+    ]
+    runs = read(
+        tmp_path, *(result(cell, 1.0 + k) for k, cell in enumerate(cells)), lost=[(replace(cells[0], seed=3), [EVIL])]
+    )
+    assert runs.methods == tuple(f"cold (method {m}@pca, evaluations 244000{n})" for m in "ab" for n in (0, 1))
+    assert runs.failures[0]["method"] == runs.methods[0]
+    assert runs.failures[0]["reasons"][0].isprintable()
+
+
 def test_instances_differ_in_all_that_a_method_does_not_choose(tmp_path: Path) -> None:
     changes: list[dict[str, Any]] = [{"corruption": {"holes": 0.5}}, {"instance": 2}, {"frames": 30}, {}, {"seed": 1}]
     runs = read(tmp_path, *(result(replace(FIRST, **change), 1.0) for change in changes))
@@ -82,13 +125,13 @@ def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
     skill = {"mean_pose": None, "persistence": 0.5, "nearest": 0.25}
     empty = {"evaluations": [], "cost": []}
     runs = read(tmp_path, result(FIRST, 1.0, error_degrees=None, skill=skill, baselines_degrees=None, trace=empty))
-    assert {name for name in FIGURES if np.isnan(runs.figures[name][0])} == {
+    assert {name for name in Tracks.columns if np.isnan(runs.figures[name][0])} == {
         "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest", "unknown",
         *(f"{kind}_{level}" for kind in ("coverage", "interval") for level in (50, 80, 95)),
     }  # fmt: skip
     figures = [runs.figures[name].item() for name in ("skill_nearest", "evaluations", "ms")]
     assert figures == [0.25, FIRST.evaluations, 10.0]
-    assert len(runs.traces[0][0]) == 0
+    assert len(runs.data["traces"][0][0]) == 0
 
 
 def test_optional_figures_are_in_tables_if_a_row_has_them(tmp_path: Path) -> None:
@@ -100,7 +143,7 @@ def test_optional_figures_are_in_tables_if_a_row_has_them(tmp_path: Path) -> Non
 
 
 def test_modes_are_binned_by_their_probability(tmp_path: Path) -> None:
-    (bins,) = read(tmp_path, result(FIRST, 1.0, mode_reliability=[[4, 0.55, 0.25], [2, 1.0, 0.5]])).modes
+    (bins,) = read(tmp_path, result(FIRST, 1.0, mode_reliability=[[4, 0.55, 0.25], [2, 1.0, 0.5]])).data["modes"]
     np.testing.assert_allclose(bins[[5, 9]], [[4, 2.2, 1], [2, 2, 1]], rtol=1e-6)
     assert not np.delete(bins, [5, 9], axis=0).any()
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit.tracking.measures import BASELINES
+from posefit.evaluation.measures import BASELINES
 from posefit_reproduce.sapso.claims import PaperClaim, paper_claims
 from posefit_reproduce.sapso.experiment import PaperResults, PaperTrack, Run
 from posefit_reproduce.sapso.motions import paper_motions

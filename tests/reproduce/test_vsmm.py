@@ -130,7 +130,7 @@ def test_errors_against_detected_joints_leave_hidden_ones_out(film: activities.F
     truth = film.truth.skeleton.joints(film.truth.poses[:1], film.truth.translations[:1])
     pixels, depths = film.camera.project(truth)
     nothing = np.zeros((1, 3), dtype=np.int64)
-    frame = Frame(film.truth.poses[0], film.truth.translations[0], 0.0, nothing, 1, 0.0, np.zeros(1))
+    frame = Frame(film.truth.poses[0], film.truth.translations[0], 0.0, nothing, 1)
     joints, confidence = np.zeros((1, 17, 2)), np.zeros((1, 17))
     point = AT["right hand"]
     joints[0, point] = pixels[0, HAND] + [3.0, 4.0]

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, Skeleton
-from posefit.silhouette.cost import areas, project
+from posefit.silhouette.cost import areas, drawing_of, mismatch, project
 from posefit.silhouette.drawn import PoseCount, count_poses
+from posefit.silhouette.kernels import count_areas
 from posefit.silhouette.mask import Silhouette
 from posefit.silhouette.rasteriser import FAR, NEAR
 from posefit.silhouette.sharing import parts_of, work_through
@@ -160,7 +162,7 @@ def test_what_is_no_number_spoils_no_other_pose_and_without_a_place_nothing_is_d
     rng = np.random.default_rng(15)
     poses, translations = random_poses(rng, 5), rng.uniform(-0.3, 0.3, (5, 3))
     silhouette = Silhouette.of(project(body, camera, poses[0], translations[0]))
-    expected = areas(body, camera, silhouette, poses, translations)
+    expected, drawing = areas(body, camera, silhouette, poses, translations), drawing_of(body, camera, silhouette)
     for bad in [np.nan, np.inf, -np.inf, 1e300, 1e20]:
         for angle in [0, 9, slice(None), None]:
             odd, places = poses.copy(), translations.copy()
@@ -168,11 +170,29 @@ def test_what_is_no_number_spoils_no_other_pose_and_without_a_place_nothing_is_d
                 places[2] = bad
             else:
                 odd[2, angle] = bad
-            counted = areas(body, camera, silhouette, odd, places)
+            counted = np.empty((5, 3), dtype=np.int64)
+            count_areas(*drawing, odd, places, counted)
             np.testing.assert_array_equal(np.delete(counted, 2, axis=0), np.delete(expected, 2, axis=0))
             assert counted[2, 0] + counted[2, 2] == silhouette.mask.sum()
             assert (counted[2] >= 0).all()
             assert angle is not None or counted[2].tolist() == [silhouette.mask.sum(), 0, 0]
+
+
+def test_poses_that_are_no_numbers_and_areas_that_are_none_are_refused(body: Body, camera: Camera) -> None:
+    silhouette, pose, place = Silhouette.of(np.eye(camera.height, camera.width)), np.zeros(ANGLES), np.zeros(3)
+    for bad in (np.nan, np.inf):
+        odd = np.where(np.arange(ANGLES) == 9, bad, pose)
+        for poses, places, name in ((odd, place, "pose"), (pose, np.array([bad, bad, 0.0]), "translation")):
+            count = 1 if name == "pose" else 2
+            with pytest.raises(InputError, match=f"^{name}s must be finite, got {count} numbers that are not$"):
+                areas(body, camera, silhouette, poses[None], places[None])
+            with pytest.raises(InputError, match=f"^{name} must be finite, got {count} numbers that are not$"):
+                project(body, camera, poses, places)
+    for counts in (np.zeros((4, 2, 3)), np.zeros(3), np.zeros((4, 2)), [["1", "2", "3"]], [[None] * 3]):
+        with pytest.raises(InputError, match=r"^areas must be numbers of shape \(n, 3\), got .* of shape \(") as caught:
+            mismatch(counts)  # type: ignore[arg-type]
+        assert len(str(caught.value)) < 100
+    assert mismatch([[1, 1, 1]]).tolist() == [50.0]  # type: ignore[arg-type]
 
 
 @pytest.mark.pure
@@ -181,8 +201,8 @@ def test_small_images_equal_the_twin_even_uncompiled(body: Body) -> None:
     camera = Camera.around(np.zeros(3), 0.4, 4.0, (40, 30))
     towards = camera.rotation.T @ np.array([0.0, 0.0, -1.0])
     poses = random_poses(np.random.default_rng(16), 5)
-    # in the middle, cut by the image's edge, across the near plane, behind the camera, nowhere
-    places = [0.0 * towards, np.array([0.9, 0.5, 0.0]), 3.9 * towards, 9.0 * towards, np.full(3, np.nan)]
+    # in the middle, cut by the image's edge, across the near plane, behind the camera, far away
+    places = [0.0 * towards, np.array([0.9, 0.5, 0.0]), 3.9 * towards, 9.0 * towards, -1e4 * towards]
     for pose, place in zip(poses, places, strict=True):
         assert_equals_the_twin(body, camera, pose, place)
 

@@ -10,17 +10,13 @@ import pytest
 
 from posefit.arrays import Array
 from posefit.fitting.box import draw_population
-from posefit.fitting.prior import Tilt
-from posefit.fitting.space import Translation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
-from posefit.motion import built_in
-from posefit.registry import registry
 from posefit.silhouette.cost import areas, project
 from posefit.silhouette.cuda.device import moved_to
 from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
-from posefit.testing.problem import pose_problem, walking_angles
+from posefit.testing.problem import pose_problem
 from tests.cases import each
 from tests.silhouette.twin import random_poses
 
@@ -61,13 +57,6 @@ def test_a_body_off_the_image_across_the_near_plane_or_behind_the_camera_has_the
     assert_equals_the_cpu(body, camera, random_poses(np.random.default_rng(3), len(places)), np.array(places))
 
 
-def test_a_pose_that_is_no_number_draws_nothing_and_spoils_no_other(body: Body, camera: Camera) -> None:
-    for bad in [np.nan, np.inf]:
-        poses, places = random_poses(np.random.default_rng(4), 3), np.zeros((3, 3))
-        places[1] = bad
-        assert_equals_the_cpu(body, camera, poses, places)
-
-
 def test_parts_on_their_way_are_put_together_in_order(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("posefit.silhouette.cuda.areas.PART", 3)
     rng = np.random.default_rng(6)
@@ -87,21 +76,3 @@ def test_a_problem_of_several_views_costs_the_same_bits_on_a_device() -> None:
     assert count.poses == 2 * (6 + 6 / 16)  # of each view on the device and on the CPU, in one a quarter as large
     half = on_device.coarser(2), problem.coarser(2)
     np.testing.assert_array_equal(*(size.evaluate(proposals) for size in half))
-
-
-@pytest.mark.parametrize("translation", ["known", "searched", "aligned"])
-@pytest.mark.parametrize("name", ["pca", "loose"])
-def test_proposals_that_a_device_decodes_cost_what_they_cost_on_a_cpu(
-    name: str, translation: Translation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("posefit.fitting.cuda.PART", 3)
-    one = pose_problem().coarser(4)
-    prior = registry().prior(name)().fit(walking_angles(), one.body.skeleton)
-    walks = [built_in.motion(style) for style in built_in.other_styles("walk")]
-    space = replace(one.space, prior=prior, translation=translation, tilt=Tilt.of(prior, walks, 0.99, 0.1))
-    problem = replace(one, space=space)
-    on_device = replace(problem, silhouettes=[moved_to(view, "cuda") for view in problem.silhouettes])
-    proposals = np.random.default_rng(8).uniform(-1.0, 1.0, (4, space.dimensions))
-    np.testing.assert_array_equal(on_device.evaluate(proposals), problem.evaluate(proposals))
-    with pytest.raises(ValueError, match="proposals must be finite, got nan or infinity"):
-        on_device.evaluate(np.full((2, space.dimensions), np.nan))

@@ -7,10 +7,11 @@ import pytest
 
 from posefit import Start
 from posefit.arrays import Array
+from posefit.fitting.weights import weigh
 from posefit.testing.toy import Toy, ball
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
-from posefit_filters.weighting import sharpness, survival, systematic_rows, weigh
+from posefit_filters.weighting import sharpness, survival, systematic_rows
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)
@@ -103,7 +104,7 @@ def test_noise_is_a_multiple_of_the_particles_own_spread() -> None:  # DEUTSCHER
     scale = np.array([0.01, 0.05])
     particles = scale * np.random.default_rng(1).standard_normal((20_000, 2))
     made = annealed(particles.copy(), diffusion=0.5)
-    made.tell(particles, np.zeros(len(particles)))  # equal costs: all survive, once each
+    made.tell(made.ask(), np.zeros(len(particles)))  # equal costs: all survive, once each
     step = made.ask() - particles
     np.testing.assert_allclose(step.std(axis=0), 0.5 * particles.std(axis=0), rtol=0.02)
 
@@ -127,7 +128,7 @@ def test_crossover_trades_a_run_of_coordinates() -> None:  # DEUTSCHER2005 (cros
 def test_survivors_enter_the_next_frame_with_the_noise_of_a_motion() -> None:  # DEUTSCHER2005 (next frame)
     particles = np.zeros((20_000, 2))
     made = annealed(particles, noise=0.07, layers=1)
-    made.tell(particles, np.zeros(len(particles)))
+    made.tell(made.ask(), np.zeros(len(particles)))
     assert not len(made.ask())
     made.advance(Toy(2))
     np.testing.assert_allclose(made.ask().std(axis=0), 0.07, rtol=0.02)

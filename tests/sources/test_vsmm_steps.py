@@ -16,7 +16,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit_vsmm.groups import Topology, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter, detect, rule_errors
+from posefit_vsmm.joints import JointFilter, _knees, detect, rule_errors
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import MotionModels, library, lifted, ridge, without_heading
 from posefit_vsmm.preprocess import Lines, lines_of
@@ -190,6 +190,19 @@ def test_knees_are_where_the_parallel_to_the_feet_crosses_the_legs() -> None:  #
         assert abs(points[name][1] - height) < 2.0
         leg = 160.5 + side * (8.0 + (height - 135.5) * 24.0 / 80.0)  # from the hip (8, 135) to the foot (32, 215)
         assert abs(points[name][0] - leg) < 2.5
+
+
+def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM 2.5
+    expected = np.zeros((len(POINTS), 2))
+    for name, place in (("root", (50, 90)), ("left foot", (0, 210)), ("right foot", (100, 190)),
+                        ("left knee", (20, 150)), ("right knee", (80, 150))):  # fmt: skip
+        expected[AT[name]] = place
+    legs = np.array([[x, y] for x in (20.0, 80.0) for y in range(100, 201)])  # two upright legs around (50, 150)
+    shape = Lines(legs, legs, legs, legs[:0])
+    knees = _knees(shape, expected, np.ones(len(POINTS)), expected, np.full(len(POINTS), 40.0))
+    # the feet's line falls by a fifth from left to right in the picture, and so does the parallel through (50, 150)
+    np.testing.assert_allclose(knees["left knee"], [20.0, 156.0], atol=1.1)
+    np.testing.assert_allclose(knees["right knee"], [80.0, 144.0], atol=1.1)
 
 
 def test_an_elbow_is_as_far_from_the_hand_as_from_the_shoulder() -> None:  # VSMM 2.6
@@ -403,6 +416,12 @@ def test_most_limbs_that_turn_half_as_fast_ask_for_the_first_group() -> None:  #
     assert requested_group(swinging([[4.0, 4.0, 4.0, 4.0], [1.9, 3.0, 3.0, 1.9]])) is None
 
 
+def test_a_limb_that_stops_turns_at_most_half_as_fast() -> None:  # VSMM 7c
+    assert requested_group(swinging([[4.0, 4.0, 4.0, 4.0], [0.0, 3.0, 0.0, 1.9]])) == 0
+    assert requested_group(swinging([[4.0, 4.0, 4.0, 4.0], [0.0, 0.0, 0.0, 0.0]])) == 0
+    assert requested_group(swinging([[4.0, 4.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])) is None  # two of them stood before
+
+
 def test_no_change_asks_for_nothing() -> None:
     assert requested_group(swinging([[0.0] * 4, [0.0] * 4])) is None
     assert requested_group(swinging([[2.0] * 4])) is None  # too few frames
@@ -446,6 +465,31 @@ def test_the_cycle_over_both_groups_is_run_again_and_judged_in_the_frame_of_the_
             assert (switching.group, switching.newcomer) == ("G1", None)
             after = switching.cycle(belief, measure, points)
         assert (switching.group, len(after.probabilities)) == (group, count)
+
+
+@pytest.mark.parametrize("variant", ["default", "patent"])
+def test_the_cycle_that_is_run_again_starts_from_the_frame_before(variant: str) -> None:  # VSMM 9
+    switching, twin = in_first_group(variant=variant), in_first_group(variant=variant)
+    walk = built_in.motion("walk")
+    belief = switching.start(encode(walk.poses[5:6], walk.translations[5:6])[0], 0.01 * np.eye(ERROR))
+    for points in swinging([[2.0, 2.0, 3.0, 3.0], [4.1, 4.1, 3.0, 3.0]]):
+        after = switching.cycle(belief, nothing, points)
+    if variant == "patent":
+        expected = twin.decided(twin.imm.cycle(twin.joined(belief, "G3"), twin._lifting(nothing)))
+    else:
+        old, fused = twin.active, twin.imm.fused(belief)
+        twin.bring_in("G3")
+        both = regrouped(belief, old, twin.active, dict.fromkeys(twin.active, (*fused, -np.inf)))
+        expected = twin.imm.cycle(both, nothing)
+    assert switching.active == twin.active
+    np.testing.assert_allclose(after.states, expected.states, atol=1e-9)
+    assert np.abs(after.states - twin.imm.cycle(after, nothing).states).max() > 1e-3  # a step is one that shows
+
+
+def nothing(states: Array) -> Measurement:
+    """Return a measurement of nothing, by which all models are equally likely."""
+    count = len(states)
+    return Measurement(np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0)), np.zeros(count))
 
 
 def test_a_new_model_is_as_probable_as_the_most_probable_one() -> None:  # VSMM 8.1

@@ -54,6 +54,20 @@ def test_the_interval_is_near_that_of_students_t_for_many_normal_runs():
     assert interval.high[0] == pytest.approx(mean[0] + 1.96 * error[0], abs=0.1 * error[0])
 
 
+def test_each_instance_has_a_resample_of_its_own():
+    # the same runs in each of 16 instances: with one resample for all of them the mean would vary four times as much
+    runs = np.tile(np.random.default_rng(4).normal(size=40), (1, 16, 1))
+    interval = iqm_intervals(runs, np.random.default_rng(2))
+    error = intervals._estimate(runs)[1][0]
+    assert 2 * 1.6 * error < interval.high[0] - interval.low[0] < 2 * 2.6 * error
+
+
+def test_most_intervals_hold_the_truth():
+    # of 200 studies 190 are expected, with a standard deviation of 3.1
+    for kind, seeds in (("normal", 5), ("with lost runs", 10)):
+        assert coverage(kind, seeds, 200) >= 0.9
+
+
 def test_differences_between_instances_do_not_widen_the_interval():
     noise = np.random.default_rng(1).normal(size=(1, 8, 10))
     apart = noise + 1000.0 * np.arange(8)[:, None]

@@ -23,7 +23,7 @@ def areas_of(function: int, instance: int, dimension: int) -> list[list[list[int
     """Return R, B, Y of each of the fixed proposals, repaired, in each frame and view: whole numbers of pixels."""
     made = suite_instance(function, instance, dimension)
     proposals = made.repaired(fixed_proposals(dimension))
-    return [view.tolist() for frame in made.frames for view in frame.areas(*frame.decode(proposals))]
+    return [view.tolist() for frame in made.frames for view in frame.cost_and_areas(*frame.decode(proposals))[1]]
 
 
 def mask_of(function: int, instance: int, dimension: int) -> str:

@@ -228,17 +228,14 @@ def test_a_mistake_is_one_line_and_status_2(
 @each(
     ("change", "message"),
     [
-        ({"motions": ["walk"]}, "a plan of a suite must hold suite, methods, .*, got 'motions'"),
-        ({"methods": []}, r"methods must be a list of at least one, got \[\]"),
+        ({"motions": ["walk"]}, "a plan of a suite must hold suite, .*, methods, .*, got 'motions'"),
+        ({"methods": []}, "methods must hold at least one, got none"),
         ({"methods": ["sapso@pca"]}, "optimiser must be one of .*, got 'sapso@pca'"),
-        (
-            {"methods": [{"method": "pso", "seed": 1}]},
-            "an entry of methods must hold method, name, settings, got 'seed'",
-        ),
+        ({"methods": [{"method": "pso", "colour": 1}]}, "a cell must say suite, .*, got 'colour'"),
         ({"methods": [{"method": "pso", "settings": {"particle": 2}}]}, "a setting of pso must be one of"),
         ({"budgets": [4]}, "evaluations must hold one population of 40, got 36 of sapso"),
         ({"seeds": [1, 1]}, "the cells of a plan must differ, got sapso on f1"),
-        ({"dimensions": [66]}, r"a plan must hold at least one cell, got none in \[66\] dimensions"),
+        ({"dimensions": [66]}, "a plan must hold at least one cell, got none"),
     ],
 )
 def test_a_mistake_in_a_plan_is_named_before_anything_runs(change: dict[str, Any], message: str) -> None:

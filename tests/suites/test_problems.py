@@ -20,6 +20,7 @@ from posefit.suites.boxes import HELD_OUT_PEOPLE, TRAINING_PEOPLE, learned_witho
 from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import suite_instance
 from posefit.suites.problem import BudgetSpentError, Problem
+from posefit.suites.running import run_on
 from posefit_bridges import ioh_problem
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
@@ -388,3 +389,13 @@ def test_cocos_own_solver_and_printer_run_on_a_suite(capsys) -> None:
         assert problem.evaluations == 30
         assert problem.best_observed_fvalue1 < 60.0
     assert "9D" in capsys.readouterr().out
+
+
+def test_each_search_has_random_numbers_of_its_own() -> None:
+    searches = [(1, 17, 9, 0), (1, 18, 9, 0), (2, 17, 9, 0), (1, 17, 9, 1)]
+    first = []
+    for function, instance, dimension, seed in searches:
+        posed = problem(function, instance, dimension)
+        run_on(posed, "random", evaluations=40, seed=seed)
+        first.append(tuple(posed.points[0]))
+    assert len(set(first)) == len(searches)

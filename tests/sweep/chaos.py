@@ -1,6 +1,6 @@
 """A sweep under sabotage: `python -m tests.sweep.chaos --engine pool|dask --cells 300 --events 60 --seed 1`.
 
-Cells take half a second; five are bad: they raise, exit, end their process, want all memory, or never end. While they
+Cells take half a second, or `--seconds`, so that there is time for all events; five are bad: they raise, exit, end their process, want all memory, or never end. While they
 run, events come at random moments: a process that runs a cell is killed, or the driver, or the driver with its whole
 group; one is stopped and goes on; a second driver comes. Whenever the driver has ended, it is started again, by the same
 command. All the while copies of the ledger's files are taken, as a power failure would leave them. At the end every cell
@@ -26,10 +26,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from posefit.sweep.ledger import Ledger
-from tests.sweep.fake import SLOW, STARTS, bad, cells, result, starts
+from tests.sweep.fake import SLOW, SLOW_SECONDS, STARTS, bad, cells, result, starts
 
 ROOT = Path(__file__).parents[2]
 EVENTS = ("kill a worker", "kill the driver", "kill the group", "stop and go on", "start a second driver")
+DASK = ("kill a Dask worker",)  # whose processes run the cells
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.3, 1.5  # seconds between two events, at least and at most
 PATIENCE = 60.0  # seconds for a driver to begin cells, or to end
@@ -46,6 +47,7 @@ class Chaos:
     count: int
     events: int
     seed: int
+    seconds: float = 0.5  # that a cell takes
     happened: Counter[str] = field(default_factory=Counter)
     refused: int = 0
     copies: list[int] = field(default_factory=list)  # the rows of each copy, -1 where it does not open
@@ -102,7 +104,12 @@ class Chaos:
 
     def _begun(self) -> subprocess.Popen[bytes]:
         words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), self.engine, str(self.count), str(LIMIT)]
-        environment = {**os.environ, STARTS: str(self._starts), "PYTHONPATH": str(ROOT)}
+        environment = {
+            **os.environ,
+            STARTS: str(self._starts),
+            SLOW_SECONDS: str(self.seconds),
+            "PYTHONPATH": str(ROOT),
+        }
         with (self.folder / "output.txt").open("ab") as output:
             return subprocess.Popen(
                 words, cwd=ROOT, env=environment, start_new_session=True, stdout=output, stderr=subprocess.STDOUT
@@ -110,10 +117,14 @@ class Chaos:
 
     def _event(self) -> None:
         assert self._driver is not None
-        event, driver = self._random.choice(EVENTS), self._driver.pid
+        events = EVENTS + DASK * (self.engine == "dask")
+        event, driver = self._random.choice(events), self._driver.pid
         with suppress(ProcessLookupError, FileNotFoundError):
             if event == "kill a worker":
                 done = self._signalled(self._running(), signal.SIGKILL, signal.SIGTERM)
+            elif event in DASK:
+                parents = [ancestors[0] for process in self._running() if (ancestors := _ancestors(process))]
+                done = self._signalled(parents, signal.SIGKILL, signal.SIGTERM)
             elif event == "kill the driver":
                 done = self._signalled([driver], signal.SIGKILL)
             elif event == "kill the group":
@@ -202,9 +213,10 @@ def main() -> None:
     parser.add_argument("--engine", choices=("pool", "dask"), default="pool")
     for name, default in (("cells", 300), ("events", 60), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--seconds", type=float, default=0.5)
     asked = parser.parse_args()
     with TemporaryDirectory() as folder:
-        outcome = Chaos(Path(folder), asked.engine, asked.cells, asked.events, asked.seed).run()
+        outcome = Chaos(Path(folder), asked.engine, asked.cells, asked.events, asked.seed, asked.seconds).run()
         output = (Path(folder) / "output.txt").read_text(errors="replace")
     print(json.dumps(outcome, indent=1))
     if any(outcome[name] for name in LOST):

@@ -1,6 +1,6 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR pool|dask CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
+`python -m tests.sweep.fake DIR pool|dask|ADDRESS CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from posefit.sweep.engine import Engine
 
 STARTS = "POSEFIT_STARTS"
+SLOW_SECONDS = "POSEFIT_SLOW_SECONDS"
 SEGFAULT, ENDLESS, HOG, RAISE, SLOW, SECOND, TOGETHER = 1001, 1002, 1003, 1004, 1005, 1006, 1007
 LEAVE, KILLED, EXIT, COMPILE = 1008, 1009, 1010, 1011
 LIMITS = Limits(seconds=300.0, gigabytes=1.0)
@@ -65,7 +66,7 @@ def behave(cell: TrackCell) -> CellResult:
         case n if n == SECOND:
             time.sleep(1.0)
         case n if n == SLOW:
-            time.sleep(0.5)
+            time.sleep(float(os.environ.get(SLOW_SECONDS, "0.5")))
         case _:
             time.sleep(0.05)
     return result(cell)
@@ -101,14 +102,14 @@ def result(cell: TrackCell) -> CellResult:
     return CellResult(row, packed_joints(estimate=joints, truth=joints))
 
 
-def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
-    """Return how a sweep ended."""
+def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine | Callable[[], Engine]") -> "Tally":
+    """Return how a sweep ended, of an engine or of one that is started once the ledger is open."""
     from posefit.sweep.drive import drive
     from posefit.sweep.ledger import FILE, Writer
 
     with Writer(out / FILE) as ledger:
         ledger.plan(chosen)
-        return drive(ledger, engine, print)
+        return drive(ledger, engine() if callable(engine) else engine, print)
 
 
 class Instant:
@@ -157,11 +158,14 @@ def main() -> int:
     where, kind, many, seconds = sys.argv[1:5]
     limits = Limits(float(seconds), 1.0)
     chosen = cells(int(many), SLOW)
-    made: Engine = Pool(2, limits, behave)
-    if kind == "dask":
-        made.close()
-        made = Cluster(workers=2, limits=limits, run=behave, patience=300.0)
-    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], made)
+
+    def start() -> "Engine":
+        if kind == "pool":
+            return Pool(2, limits, behave)
+        here = {"workers": 2} if kind == "dask" else {"scheduler": kind}
+        return Cluster(**here, limits=limits, run=behave, patience=300.0)  # type: ignore[arg-type]
+
+    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], start)
     return 1 if tally.quarantined else 130 if tally.stopped else 0
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.registry import registry
 from posefit.report.runs import runs_of
 from posefit.sweep.command import swept
 from posefit.sweep.ledger import ATTEMPTS, FILE, LOSSES, Ledger, Writer
@@ -299,6 +300,17 @@ def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again_
     ledger = Ledger(folder)
     assert (len(ledger), ledger.outdated()) == (5, {"posefit 0.0.9 a1": 2})
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"
+
+
+def test_a_row_is_outdated_where_any_part_of_its_version_is_not_the_installed_one(tmp_path: Path) -> None:
+    swarm = registry().offer("optimiser", "sapso").origin
+    versions = [f"{posefit_build()}, {swarm}", f"{posefit_build()}, posefit_swarm 0ld", f"posefit 0.0.9 a1, {swarm}"]
+    versions += [f"{posefit_build()}, posefit_elsewhere 1.0"]  # a plugin that is not installed here
+    with Writer(tmp_path / "results" / FILE) as ledger:
+        ledger.plan(old := [replace(cell, version=v) for cell, v in zip(cells(4), versions, strict=True)])
+        for cell in old:
+            ledger.finish(cell.key, result(cell))
+    assert Ledger(tmp_path / "results").outdated() == {versions[1]: 1, versions[2]: 1}
 
 
 def test_a_ledger_is_read_while_its_driver_writes(tmp_path: Path) -> None:

@@ -14,13 +14,14 @@ from typing import Any
 import pytest
 
 import posefit
+from posefit.evaluation.errors import anytime_trace
 from posefit.motion import built_in
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.registry import Offer, Plugin, Registry
 from posefit.suites.functions import SUITE
 from posefit.sweep import check
-from posefit.sweep.cell import TrackCell, anytime_trace, cell_from, cell_scene, digest_of, run_cell
+from posefit.sweep.cell import TrackCell, cell_from, cell_scene, digest_of, run_cell
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
 from posefit.tracking import method
@@ -274,15 +275,15 @@ def test_a_trace_is_the_mean_over_the_frames_of_the_best_cost_after_so_many_eval
 
     from posefit.fitting.tracker import Frame
 
-    def frame(history: list[float], spent: list[int] | None, used: int) -> Frame:
-        counts = None if spent is None else np.array(spent)
-        return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), used, 0.0, np.array(history), None, counts)
+    def frame(costs: list[float], step: int) -> Frame:
+        trace = np.column_stack([step * np.arange(1, len(costs) + 1), costs])
+        return Frame(np.zeros(66), np.zeros(3), 1.0, np.zeros((1, 3)), step * len(costs), trace)
 
     # by hand: after 20 evaluations the frames have 6 and 9, after 30: 4 and 9, after 40: 4 and 1
-    frames = [frame([8.0, 6.0, 4.0], [10, 20, 30], 30), frame([9.0, 1.0], None, 40), frame([], None, 0)]
+    frames = [frame([8.0, 6.0, 4.0], 10), frame([9.0, 1.0], 20), frame([], 1)]
     assert anytime_trace(frames) == {"evaluations": [20, 30, 40], "cost": [7.5, 6.5, 2.5]}
-    assert anytime_trace([frame([], None, 0)]) == {"evaluations": [], "cost": []}
-    long = anytime_trace([frame(list(range(500, 0, -1)), None, 500)])
+    assert anytime_trace([frame([], 1)]) == {"evaluations": [], "cost": []}
+    long = anytime_trace([frame(list(range(500, 0, -1)), 1)])
     assert len(long["cost"]) <= 64
     assert long["evaluations"][-1] == 500
     assert long["cost"][-1] == 1.0

@@ -351,7 +351,7 @@ class Holds:
         where = observation.translation
         counts = areas(self.task.body, self.task.cameras[0], observation.silhouettes[0], self.pose[None], where[None])
         cost = float(mismatch(counts)[0])
-        return Frame(self.pose, where, cost, counts, 1, 0.0, np.array([cost]))
+        return Frame(self.pose, where, cost, counts, 1)
 
     def draw(self, observation: Any, poses: int) -> None:
         """Draw so many poses, for nothing."""

@@ -147,6 +147,17 @@ def test_one_cause_ends_the_checks() -> None:
     assert run_checks("nothing", [])
 
 
+def test_settings_by_position_are_named() -> None:
+    def by_position(space: Any, rng: Any, population_size: int = 40, spread: float = 1.0) -> Any: ...
+
+    def too_few(space: Any) -> Any: ...
+
+    wanted = r"a factory must take \(space, rng\) and keyword-only settings, got "
+    for factory, came in ((by_position, r"population_size, spread before the \*"), (too_few, r"\(space\)")):
+        check = next(check for check in optimiser_checks(factory) if check.name == "construction")
+        assert re.fullmatch(f"{wanted}{came}", check.run().detail)
+
+
 def test_a_traceback_begins_in_the_plugins_own_code_and_is_there_once_a_cause() -> None:
     check = next(check for check in optimiser_checks(planted.DividesByTheRange) if check.name == "costs")
     trace = check.run().traceback

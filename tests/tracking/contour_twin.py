@@ -26,7 +26,9 @@ def pulled(numbers: Array, mask: tuple, scale: float) -> tuple[Array, Array]:
     """Return half the second derivatives (106, 106) and half the gradient (106,) by the numbers of a drawn body."""
     centres, radii = numbers[: 2 * len(JOINTS)].reshape(-1, 2), numbers[2 * len(JOINTS) :].reshape(-1, 2)
     blocks, forces = np.zeros((len(BONES), 6, 6)), np.zeros((len(BONES), 6))
-    kernels.pull(BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), mask, scale, blocks, forces)
+    kernels.add_pulls(
+        BONE_STARTS, np.ascontiguousarray(centres), np.ascontiguousarray(radii), mask, scale, blocks, forces
+    )
     curves, slopes = np.zeros((COUNT, COUNT)), np.zeros(COUNT)
     for b, parent in enumerate(BONE_STARTS):
         rows = [2 * parent, 2 * parent + 1, 2 * b + 2, 2 * b + 3, *(2 * (len(JOINTS) + b) + np.arange(2))]
@@ -35,16 +37,14 @@ def pulled(numbers: Array, mask: tuple, scale: float) -> tuple[Array, Array]:
     return curves, slopes
 
 
-def pull_of_view(
-    view: MaskContours, k: int, here: Array, there: Array, reach: float, every: int = 1
-) -> tuple[Array, Array]:
+def pull_of_view(view: MaskContours, k: int, here: Array, there: Array, reach: float) -> tuple[Array, Array]:
     """Return half the second derivatives (n, n) and half the gradient (n,) by n parameters, in frame k.
 
     The drawn body's numbers are `here` (106,), and `there` (n, 106) where each parameter is off by `STEP`.
     """
     root = view.metres[k]
-    points = view.points[view.starts[k] : view.starts[k + 1]][::every]
-    mask = view.fields[k], view.corners[k], view.sizes[k], np.ascontiguousarray(points), every * view.step
+    points = view.points[view.starts[k] : view.starts[k + 1]]
+    mask = view.fields[k], view.corners[k], view.sizes[k], np.ascontiguousarray(points), view.step
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
     worth = 1.0 / (root**3 * kernels.CORRELATION_LENGTH * deviation)

@@ -15,10 +15,10 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
+from posefit.output.folder import OutputFolder, Recorder
 from posefit.progress import Progress
 from posefit.silhouette.cost import areas
 from posefit.tracking import method
-from posefit.tracking.outputs import OutputFolder
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track
 from posefit.uncertainty.calibration import Recalibration
@@ -42,7 +42,7 @@ def frame_of(scene: Scene, pose: Array, translation: Array, observation: Observa
     """Return the frame of a tracker that estimates a pose."""
     views = zip(scene.cameras, observation.silhouettes, strict=True)
     counts = [areas(scene.body, camera, mask, pose[None], translation[None])[0] for camera, mask in views]
-    return Frame(pose, translation, 0.0, np.array(counts), 1, 1.0, np.zeros(1))
+    return Frame(pose, translation, 0.0, np.array(counts), 1)
 
 
 def exact_frames(scene: Scene, **values: Any) -> list[Frame]:
@@ -78,22 +78,25 @@ class FixedTracker:
             yield self.frames[k]
 
 
-def tracked(scene: Scene, frames: Sequence[Frame], **how: Any) -> Track:
-    """Return the track of a scene whose tracker yields just these frames."""
+def tracked(scene: Scene, frames: Sequence[Frame], recorder: Recorder | None = None) -> Track:
+    """Return the track of a scene whose tracker yields just these frames, with its files where there is a folder."""
 
-    def tracker(_: object, task: Task, *_patience: object) -> FixedTracker:
+    def follow(_: object, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         resumed = len(task.before) if len(task.before) > 1 else 0  # a single one is what a track is begun with
-        return FixedTracker(frames, resumed)
+        return FixedTracker(frames, resumed).track(observations, rng)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(method.Method, "tracker", tracker)
-        return track_scene(scene, [built_in.motion("walk-b", frames=20)], **how)
+        patch.setattr(method.Method, "follow", follow)
+        track = track_scene(scene, [built_in.motion("walk-b", frames=20)], recorder=recorder)
+    if recorder is not None:
+        recorder.finish(track.scene, track.frames, track.table, track.gait, track.summary)
+    return track
 
 
 def viewed(folder: Path, scene: Scene, frames: Sequence[Frame]) -> Path:
     """Return the page of a track that consists of just these frames."""
     with OutputFolder(folder, False, False, {}, print) as output:
-        tracked(scene, frames, output=output)
+        tracked(scene, frames, output)
     return folder / "track.html"
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.fitting.validation import Audit, AuditedTracker, BrokenRuleError
+from posefit.fitting.driving import Audit, drive
+from posefit.fitting.validation import BrokenRuleError
 from posefit.progress import Progress
 from posefit.testing.tracker_rules import scene
 from tests.cases import each
@@ -18,9 +19,8 @@ QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 244
 
 def audited(kind: Any, observations: Any = None) -> tuple[list[Any], list[str]]:
     """Return the frames of a tracker of a plugin, and what they are warned of."""
-    audit, (task, _, all_of_them) = Audit(), scene()
-    tracker = AuditedTracker(kind(task), task, "tracker 'bad' of posefit-bad 1.0", 0.5, audit)
-    frames = list(tracker.track(observations or all_of_them, np.random.default_rng(0)))
+    audit, (task, _, all_of_them) = Audit("tracker 'bad' of posefit-bad 1.0", 0.5), scene()
+    frames = list(drive(kind(task), task, observations or all_of_them, np.random.default_rng(0), audit))
     return frames, audit.warnings
 
 
@@ -54,7 +54,7 @@ def test_an_honest_tracker_is_left_as_it_is() -> None:
     [
         (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
         (planted.SpendsInSecret, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
-        (reporting(cost=0.0, history=np.zeros(1)), ", got 0 (12 such frames)"),
+        (reporting(cost=0.0, trace=np.zeros((1, 2))), ", got 0 (12 such frames)"),
         (reporting(areas=np.array([[0, 0, 100]])), ", got [[0, 0, 100]] (12 such frames)"),
         (ChangesTheBits, "(12 such frames)"),
     ],
@@ -88,7 +88,7 @@ def test_a_track_has_the_warnings_and_the_corrected_figures() -> None:
         (planted.DropsFrames, "track must yield a frame for each observation, got 6 and then no more$"),
         (planted.ChangesTheMask, "it must not fail, got ValueError: assignment destination is read-only"),
         (reporting(evaluations=1.5), ".*evaluations must be a whole number, 0 or more, got 1.5"),
-        (reporting(seconds=float("nan")), ".*seconds must be a number, 0 or more, got nan"),
+        (reporting(trace=np.zeros(3)), r".*a trace must be \(n, 2\), evaluations and costs, got shape \(3,\)"),
     ],
 )
 def test_a_tracker_that_breaks_a_rule_is_named(kind: Any, rule: str) -> None:

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from posefit.evaluation.errors import Table, evaluated
+from posefit.evaluation.measures import Measures
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
-from posefit.tracking.evaluation import evaluated
-from posefit.tracking.measures import Measures
-from posefit.tracking.outputs import OutputFolder
-from posefit.tracking.table import table
+from posefit.output.folder import OutputFolder
+from posefit.output.text import table
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.files import arrays
@@ -29,15 +29,15 @@ def scene() -> Scene:
     return walk(FRAMES, size=(160, 120))
 
 
-def measured(scene: Scene, frames: list[Frame]) -> tuple[list[dict[str, float]], Measures]:
-    return evaluated(scene, frames, None, truth_of(scene).poses[:, 3:], 0.5)
+def measured(scene: Scene, frames: list[Frame]) -> tuple[Table, Measures]:
+    return evaluated(scene, frames, None, truth_of(scene).poses[:, 3:], 0.5, np.ones(2))
 
 
 def test_nothing_is_reported_of_a_method_that_reports_no_certainty(scene: Scene) -> None:
-    rows, measures = measured(scene, exact_frames(scene))
+    columns, measures = measured(scene, exact_frames(scene))
     names = ("coverage", "interval_mm", "unknown_rate", "swapped_known_rate", "lost_said_rate")
     assert [getattr(measures, name) for name in names] == [None] * 5
-    assert np.isnan([[row[name] for name in ("unknown_sides", "lost", "interval_mm")] for row in rows]).all()
+    assert np.isnan([columns[name] for name in ("unknown_sides", "lost", "interval_mm")]).all()
 
 
 def test_frames_that_are_swapped_count_among_those_that_are_known(scene: Scene) -> None:
@@ -46,9 +46,9 @@ def test_frames_that_are_swapped_count_among_those_that_are_known(scene: Scene) 
         frames[k] = replace(frames[k], pose=mirrored_poses(scene.body.skeleton, frames[k].pose[None])[0])
     # the posterior of frame 1 has nothing else: known, and swapped. Frame 2 is swapped, and half of it says so
     frames[1] = replace(frames[1], posterior=Posterior(frames[1].pose[None], np.zeros((1, 3)), np.ones(1)))
-    rows, measures = measured(scene, frames)
-    assert [row["swapped"] for row in rows] == [0, 1, 1, 0, 0, 0]
-    assert [row["unknown_sides"] for row in rows] == [0, 0, 1, 1, 0, 0]
+    columns, measures = measured(scene, frames)
+    assert columns["swapped"].tolist() == [0, 1, 1, 0, 0, 0]
+    assert columns["unknown_sides"].tolist() == [0, 0, 1, 1, 0, 0]
     assert measures.unknown_rate == pytest.approx(2 / 6)
     assert measures.swap_rate == pytest.approx(2 / 6)
     assert measures.swapped_known_rate == pytest.approx(1 / 4)
@@ -70,13 +70,13 @@ def test_coverage_is_the_share_of_joints_that_are_near_enough(scene: Scene) -> N
 def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) -> None:
     frames = uncertain_frames(scene, CERTAIN)
     frames[2] = replace(frames[2], posterior=None)
-    rows, measures = measured(scene, frames)
+    columns, measures = measured(scene, frames)
     # nothing but the pose itself, blurred by 2 cm
     assert measures.interval_mm == {name: pytest.approx(20.0 * r, abs=0.5) for name, r in MAXWELL.items()}
-    widths = [row["interval_mm"] for row in rows]
+    widths = columns["interval_mm"].tolist()
     assert np.isnan(widths[2])
     assert widths[:2] + widths[3:] == [pytest.approx(20.0 * MAXWELL["80"], abs=0.5)] * (FRAMES - 1)
-    without_truth = evaluated(replace(scene, truth=None), frames, None, np.zeros((1, 63)), 0.5)[1]
+    without_truth = evaluated(replace(scene, truth=None), frames, None, np.zeros((1, 63)), 0.5, np.ones(2))[1]
     assert without_truth.interval_mm == measures.interval_mm
     assert without_truth.coverage is None
 
@@ -84,10 +84,10 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) 
 def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:
     probabilities = [0.0, 0.25, 0.5, 0.75, 1.0, None]
     frames = [replace(frame, lost=p) for frame, p in zip(exact_frames(scene), probabilities, strict=True)]
-    rows, measures = measured(scene, frames)
+    columns, measures = measured(scene, frames)
     assert measures.lost_said_rate == pytest.approx(3 / 5)
-    assert [row["lost"] for row in rows[:5]] == probabilities[:5]
-    assert np.isnan(rows[5]["lost"])
+    assert columns["lost"][:5].tolist() == probabilities[:5]
+    assert np.isnan(columns["lost"][5])
     for lost in (-0.1, 1.5, float("nan")):
         with pytest.raises(ValueError, match=f"lost of a frame must lie in 0 to 1, got {lost}"):
             replace(frames[0], lost=lost)
@@ -102,7 +102,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
     frames = [replace(frame, lost=0.9 if k == 4 else 0.1) for k, frame in enumerate(frames)]
     folder = tmp_path / "out"
     with OutputFolder(folder, False, False, {}, print) as output:
-        result = tracked(replace(scene, observations=observations), frames, output=output)
+        result = tracked(replace(scene, observations=observations), frames, output)
     markers = [line.split("\t") for line in (folder / "track.trc").read_text().splitlines()[6:]]
     assert [len(marker) for marker in markers] == [2 + 81] * FRAMES
     assert [k for k, marker in enumerate(markers) if set(marker[2:]) == {""}] == [1, 4]
@@ -128,7 +128,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
 def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(scene: Scene) -> None:
     frames = uncertain_frames(scene, CERTAIN, turned=0.25, coherent=True)
     track = tracked(scene, frames)
-    for estimate, frame in zip(track.estimates, frames, strict=True):
+    for estimate, frame in zip(track.frames, frames, strict=True):
         assert [mode.weight for mode in estimate.modes] == pytest.approx([0.75, 0.25])
         np.testing.assert_array_equal(estimate.modes[0].pose, frame.pose)
     assert track.summary["modes"] == pytest.approx([0.75, 0.25])
@@ -137,26 +137,26 @@ def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(sce
     assert "left and right: unknown in 6 of 6 frames" in table(track.summary)
     assert "frames lost" not in table(track.summary)
     apart = tracked(scene, uncertain_frames(scene, CERTAIN, turned=0.25))  # whose posteriors are no trajectories
-    assert len(apart.estimates[0].modes) == 2
+    assert len(apart.frames[0].modes) == 2
     assert (apart.modes, apart.summary["modes"]) == ([], None)
     for k, frame in enumerate(frames):
         assert frame.posterior is not None
         frames[k] = replace(frame, posterior=replace(frame.posterior, recalibration=Recalibration(none=0.1 * k)))
     doubtful = tracked(scene, frames)
     assert doubtful.summary["none_of_modes"] == pytest.approx(0.25)
-    assert [mode.weight for mode in doubtful.estimates[5].modes] == pytest.approx([0.375, 0.125])
+    assert [mode.weight for mode in doubtful.frames[5].modes] == pytest.approx([0.375, 0.125])
 
 
 def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp_path: Path) -> None:
     frames = [replace(f, lost=0.75) for f in uncertain_frames(scene, np.full(FRAMES, 0.3), coherent=True)]
     stopped = [*frames[:3], None]  # which cannot be recorded
     with pytest.raises(AttributeError), OutputFolder(tmp_path / "out", False, False, {}, print) as output:
-        tracked(scene, stopped, output=output)  # type: ignore[arg-type]
+        tracked(scene, stopped, output)  # type: ignore[arg-type]
     with OutputFolder(tmp_path / "out", False, True, {}, print) as output:
-        track = tracked(scene, frames, output=output)
+        track = tracked(scene, frames, output)
     assert track.summary["unknown_sides"] == track.summary["lost_frames"] == list(range(FRAMES))
     assert track.summary["modes"] is None  # it is unknown which new trajectory continues which old one
-    for frame, estimate in zip(frames, track.estimates, strict=True):
+    for frame, estimate in zip(frames, track.frames, strict=True):
         assert frame.posterior is not None
         assert estimate.posterior is not None
         np.testing.assert_allclose(estimate.posterior.poses, frame.posterior.poses, atol=1e-6)

@@ -19,12 +19,13 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.smoothing import contours, kernels
 from posefit.tracking.smoothing.contours import (
     MaskContours,
+    contour_squares,
     distances_outside,
     fit_contours,
     growth,
 )
 from posefit.tracking.smoothing.path import Visibility
-from posefit.tracking.smoothing.smooth import smoothed
+from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
@@ -108,21 +109,9 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
     scene, motion = footage(3, (60.0, 150.0))
     body, skeleton = scene.body, scene.body.skeleton
     poses = estimate_of(motion).poses
-    moving = replace(motion, poses=poses)
-    changes = growth(body, body.stature, moving)
-    frames, sines, cosines = skeleton.frames(poses, motion.translations)
-    by_factors = np.zeros((1 + len(NAMES), 1 + len(NAMES)))
-    bones = np.zeros((3, 27, 6, 6)), np.zeros((3, 27, 6, 1 + len(NAMES)))
-    views = [
-        MaskContours.of(camera, k, scene.observations, motion.translations) for k, camera in enumerate(scene.cameras)
-    ]
-    for view in views:
-        camera = tuple(np.array(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
-        borders = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        drawn = skeleton.chain.parents, body.radii, camera, frames
-        kernels.add_frames(*drawn, borders, 0.09, (*changes, by_factors), bones)
-    matrices, slopes = np.empty((3, 69, 69)), np.empty((3, 69, 1 + len(NAMES)))
-    kernels.add_all_bones(skeleton.chain, frames, sines, cosines, *bones, matrices, slopes)
+    changes, places = growth(body, body.stature, replace(motion, poses=poses)), motion.translations
+    views = [MaskContours.of(camera, k, scene.observations, places) for k, camera in enumerate(scene.cameras)]
+    curves, slopes, mixed, factor_curve, factor_slope = contour_squares(body, views, poses, places, 0.09, changes)
     expected = np.zeros((3, 69 + len(NAMES), 69 + len(NAMES))), np.zeros((3, 69 + len(NAMES)))
     grown = [shaped(body, np.exp(STEP * row), body.stature) for row in np.eye(len(NAMES))]
     for k in range(3):
@@ -135,14 +124,12 @@ def test_what_borders_pull_a_window_of_frames_to_is_that_of_a_slow_twin() -> Non
                 whole[k] += part
     free = np.append([True] * 3, skeleton.free)
     scale = np.abs(expected[0]).max()
-    np.testing.assert_allclose(
-        matrices[:, free][:, :, free], expected[0][:, :69, :69][:, free][:, :, free], atol=1e-3 * scale
-    )
-    np.testing.assert_allclose(slopes[:, free, 1:], expected[0][:, :69, 69:][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(by_factors[1:, 1:], expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(curves, expected[0][:, :69, :69][:, free][:, :, free], atol=1e-3 * scale)
+    np.testing.assert_allclose(mixed, expected[0][:, :69, 69:][:, free], atol=1e-3 * scale)
+    np.testing.assert_allclose(factor_curve, expected[0][:, 69:, 69:].sum(axis=0), atol=3e-3 * scale)
     scale = np.abs(expected[1]).max()
-    np.testing.assert_allclose(slopes[:, free, 0], expected[1][:, :69][:, free], atol=1e-3 * scale)
-    np.testing.assert_allclose(by_factors[1:, 0], expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
+    np.testing.assert_allclose(slopes, expected[1][:, :69][:, free], atol=1e-3 * scale)
+    np.testing.assert_allclose(factor_slope, expected[1][:, 69:].sum(axis=0), atol=3e-3 * scale)
 
 
 def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
@@ -195,7 +182,7 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
     def pulled(joints: np.ndarray, parents: list[int], radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, forces = np.zeros((len(parents), 6, 6)), np.zeros((len(parents), 6))
         mask = field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
-        kernels.pull(np.array(parents), joints, radii, mask, scale, blocks, forces)
+        kernels.add_pulls(np.array(parents), joints, radii, mask, scale, blocks, forces)
         return blocks[0], forces[0]
 
     for mine, expected in zip(pulled(joints, [0], radii), (curves, slopes), strict=True):
@@ -284,16 +271,16 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     posterior = Posterior(estimate.poses[:2], estimate.translations[:2], np.ones(2), recalibration=sure)
     nothing = np.zeros((1, 3), np.int64)
     frames = [
-        Frame(pose, place, 0.0, nothing, 0, 0.0, np.empty(0), posterior=posterior)
+        Frame(pose, place, 0.0, nothing, 0, posterior=posterior)
         for pose, place in zip(estimate.poses, estimate.translations, strict=True)
     ]
-    alone, both = (smoothed(scene, frames, shape, 0.5) for shape in (None, average_shape(scene)))
-    assert alone.shape is None
-    assert both.shape is not None
-    costs = [np.mean([frame.cost for frame in each.frames]) for each in (both, alone)]
+    (_, alone, none), (_, both, shape) = (smooth(scene, frames, each, 0.5) for each in (None, average_shape(scene)))
+    assert none is None
+    assert shape is not None
+    costs = [np.mean([frame.cost for frame in each]) for each in (both, alone)]
     assert costs[0] < 0.7 * costs[1]
-    assert both.shape.cost == pytest.approx(costs[0])
-    moved, pose, known = both.frames[0].posterior, both.frames[0].pose, alone.frames[0].posterior
+    assert shape.cost == pytest.approx(costs[0])
+    moved, pose, known = both[0].posterior, both[0].pose, alone[0].posterior
     assert moved is not None
     assert known is not None
     assert known.recalibration is sure
@@ -303,4 +290,4 @@ def test_smoothed_frames_have_the_cost_of_the_fitted_build_and_their_posteriors_
     np.testing.assert_allclose(wider.joint_spreads[1:], 0.010)  # 8 mm more, by squares
     np.testing.assert_allclose(moved.poses - posterior.poses, np.tile(pose - frames[0].pose, (2, 1)), atol=1e-12)
     apart = estimate.translations[1] - estimate.translations[0]
-    np.testing.assert_allclose(moved.translations[1] - both.frames[0].translation, apart)
+    np.testing.assert_allclose(moved.translations[1] - both[0].translation, apart)

@@ -35,7 +35,7 @@ QUICK: dict[str, Any] = {"frames": (0, 3), "size": (120, 90), "evaluations": 400
 def frames_of(poses: Array, costs: Sequence[float]) -> list[Frame]:
     nothing = np.zeros((1, 3), dtype=np.int64)
     return [
-        Frame(pose, np.zeros(3), cost, nothing, 10, 0.5, np.array([cost]), spent=np.array([10]), cpu_seconds=0.25)
+        Frame(pose, np.zeros(3), cost, nothing, 10, np.array([[10, cost]]), seconds=0.5, cpu_seconds=0.25)
         for pose, cost in zip(poses, costs, strict=True)
     ]
 
@@ -151,7 +151,7 @@ def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -
     single = posefit.track("walk", view_degrees=90.0, **method, **QUICK)
     summary, hypotheses = track.summary, track.summary["hypotheses"]
     assert summary["warnings"] == []
-    assert summary["evaluations"] == sum(row["evaluations"] for row in track.frames) <= drawn.poses
+    assert summary["evaluations"] == track.table["evaluations"].sum() <= drawn.poses
     assert summary["evaluations"] > 2 * single.summary["evaluations"]
     assert summary["evaluations_per_frame"] == 400
     totals = [hypothesis["cost"] + hypothesis["motion"] for hypothesis in hypotheses]

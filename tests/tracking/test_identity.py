@@ -10,8 +10,8 @@ import pytest
 
 import posefit
 from posefit.motion import built_in
-from posefit.tracking.identity import digest_of
-from posefit.tracking.outputs import OutputFolder
+from posefit.output.folder import OutputFolder
+from posefit.output.identity import digest_of
 from tests.cases import each
 from tests.fuzz.written import SPEC, mended, written
 from tests.tracking.scenes import stopping
@@ -35,10 +35,10 @@ def test_a_track_goes_on_as_if_it_had_not_ended_too_early(method: str, tmp_path:
     whole = posefit.track("walk", camera=camera(0.5), **{**options, "out": None})
     if method == "sapso":  # vsmm begins with new particles
         np.testing.assert_array_equal(resumed.motion.poses, whole.motion.poses)
-    for before, after in zip(whole.estimates, resumed.estimates, strict=True):
+    for before, after in zip(whole.frames, resumed.frames, strict=True):
         assert after.cpu_seconds is not None
         assert after.details.keys() == before.details.keys()
-    first, again = (track.estimates[0].details.get("probabilities", 0.0) for track in (whole, resumed))
+    first, again = (track.frames[0].details.get("probabilities", 0.0) for track in (whole, resumed))
     np.testing.assert_array_equal(first, again)
     with (tmp_path / "out" / "frames.csv").open(newline="") as file:
         activities = [row["activity"] for row in csv.DictReader(file)]

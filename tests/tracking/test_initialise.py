@@ -98,7 +98,7 @@ def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, bod
     options: dict[str, Any] = {"method": "@loose", "evaluations": 80, "restarts": 1, "body_frames": body_frames}
     track = posefit.track(tmp_path / "a.npz", progress=Progress(log.append), **options)
     assert any(line.startswith(message) for line in log)
-    assert (track.summary["body"] is None) == message.startswith("no build")
+    assert (track.course.build is None) == message.startswith("no build")
 
 
 def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int) -> list[tuple[list[int], float]]:
@@ -110,7 +110,7 @@ def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int
         rows = [next(k for k, other in enumerate(observations) if other is observation) for observation in chosen]
         calls.append((rows, task.fps))
         areas = np.zeros((len(scene.cameras), 3), np.int64)
-        return iter([Frame(truth_of(scene).poses[0], scene.anchor, 0.0, areas, 0, 0.0, np.empty(0))] * len(rows))
+        return iter([Frame(truth_of(scene).poses[0], scene.anchor, 0.0, areas, 0)] * len(rows))
 
     for count in counts:
         fitted_build(task, observations, follow, count, None, 0)

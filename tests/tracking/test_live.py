@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import subprocess
 import sys
 import threading
 import time
@@ -25,7 +26,7 @@ from posefit.silhouette.cost import project
 from posefit.tracking.live import track_live, write_live
 from tests.cases import each
 
-QUICK = {"evaluations": 200, "population_size": 20, "restarts": 2, "view_degrees": 45.0}
+QUICK = {"evaluations": 200, "restarts": 2, "view_degrees": 45.0}
 
 
 def pgm(mask):
@@ -189,3 +190,21 @@ def test_images_of_another_size_are_refused(every_frame, walk):
     assert isinstance(next(masks).source, LiveImage)
     with pytest.raises(InputError, match="expected frames of 160x120, got 160x60"):
         next(masks)
+
+
+def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(walk, tmp_path):
+    out = tmp_path / "out"
+    words = ["track", "--live", "-", "--out", out, "--evaluations", 40, "--population-size", 20, "--restarts", 1]
+    script = "import posefit.footage.live as live; live.STALL_SECONDS = 20.0; from posefit.cli import run; run()"
+    command = [sys.executable, "-c", script, *map(str, words), "--view-degrees", "45"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=False) as process:
+        for mask in walk:
+            process.stdin.write(pgm(mask))
+        process.stdin.flush()  # and the pipe stays open
+        errors = process.stderr.read().decode()
+        status = process.wait()
+    assert status == 2, errors
+    assert errors.splitlines()[-1] == "posefit: -: expected a frame, got none for 20 s"
+    assert "Traceback" not in errors
+    rows = (out / "frames.jsonl").read_text().splitlines()
+    assert len(np.load(out / "poses.npz")["poses"]) == len(rows) > 0

@@ -11,9 +11,9 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses
-from posefit.tracking.drawing import FAINTEST, MISSED, OTHER, draw_body, opacities
-from posefit.tracking.picture import PANEL, Painter
-from posefit.uncertainty.modes import Mode
+from posefit.output.drawing import FAINTEST, MISSED, OTHER, draw_body, opacities
+from posefit.output.picture import PANEL, Painter
+from posefit.uncertainty.modes import Mode, Posterior
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, walk
 
@@ -92,7 +92,8 @@ def test_another_mode_is_drawn_where_it_has_more_than_a_fifth(
 ) -> None:
     mirrored = mirrored_poses(scene.body.skeleton, frame.pose[None])[0]
     modes = [Mode(1.0 - weight, frame.pose, frame.translation), Mode(weight, mirrored, frame.translation)]
-    image, half = painted(scene, replace(frame, modes=modes))
+    posterior = Posterior(frame.pose[None], frame.translation[None], np.ones(1), modes=modes)
+    image, half = painted(scene, replace(frame, posterior=posterior))
     for part in (image[:, :half], image[: PANEL - 60, half:]):  # without the words
         assert (pixels(part, OTHER, close=12) > 100) == drawn
 

@@ -16,7 +16,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.restarts import RelocalisingTracker
+from posefit.tracking.restarts import relocalised
 from tests.cases import each
 
 WALKS, GAP = 30, 12  # frames
@@ -45,7 +45,7 @@ def tracked(folder: Path, comes: str, **options: Any) -> tuple[posefit.Track, Ar
     masks, yaws = footage(comes)
     np.savez(folder / "masks.npz", masks=masks)
     stature = Body.of(MOTION.skeleton).stature
-    defaults = {"camera": SIDE, "method": "@loose", "body_frames": 0, "iterations": 20, "height": stature}
+    defaults = {"camera": SIDE, "method": "@loose", "body_frames": 0, "evaluations": 840, "height": stature}
     track = posefit.track(folder / "masks.npz", **{**defaults, **options})
     return track, np.cos(track.motion.poses[:, 0] - yaws) > 0.0
 
@@ -57,7 +57,7 @@ def test_a_relocalised_frame_has_the_effort_of_all_restarts(tmp_path: Path, opti
     assert right[AFTER].mean() > 0.95
     assert track.summary["relocalised"] == [WALKS + GAP]
     assert track.summary["backwards_share"] == 0.0
-    evaluations = [frame.evaluations for frame in track.estimates]
+    evaluations = [frame.evaluations for frame in track.frames]
     # eight starts and the track as it was, ten frames each, and the frame itself
     assert 80 * 840 < evaluations.pop(WALKS + GAP) <= 91 * 840
     assert max(evaluations) <= 840
@@ -90,12 +90,12 @@ class PlannedCosts:
             trial = task.yaw is None or task.fps != TASK.fps
             cost = (self._restart if task.yaw is None else 10.0) if trial else next(self._costs)
             pose, evaluations = np.full(66, rng.random()), int(observation.usable)
-            yield Frame(pose, MIDDLE, cost, np.zeros((1, 3), np.int64), evaluations, 1.0, np.empty(0))
+            yield Frame(pose, MIDDLE, cost, np.zeros((1, 3), np.int64), evaluations)
 
 
-def relocalised(follow: PlannedCosts, observations: Sequence[Observation], task: Task = TASK) -> list[tuple[int, bool]]:
+def restarts_of(follow: PlannedCosts, observations: Sequence[Observation], task: Task = TASK) -> list[tuple[int, bool]]:
     """Return in which frames a tracker made restarts, and whether one of them was better."""
-    frames = list(RelocalisingTracker(task, follow).track(observations, np.random.default_rng(0)))
+    frames = list(relocalised(task, follow, observations, np.random.default_rng(0)))
     assert len(frames) == len(observations)
     return [(k, frame.details["relocalised"]) for k, frame in enumerate(frames) if frame.details]
 
@@ -104,16 +104,16 @@ def relocalised(follow: PlannedCosts, observations: Sequence[Observation], task:
 def test_a_gap_is_of_five_frames_after_one_that_shows_the_person(
     before: int, gap: int, expected: list[tuple[int, bool]]
 ) -> None:
-    assert relocalised(PlannedCosts([1.0] * 30, 5.0), [VISIBLE] * before + [GONE] * gap + [VISIBLE] * 10) == expected
+    assert restarts_of(PlannedCosts([1.0] * 30, 5.0), [VISIBLE] * before + [GONE] * gap + [VISIBLE] * 10) == expected
 
 
 def test_restarts_that_are_not_better_change_nothing() -> None:
     clip = [VISIBLE] * 3 + [GONE] * 5 + [VISIBLE] * 10
     follow = PlannedCosts([1.0] * 30, 20.0)
-    assert relocalised(follow, clip) == [(8, False)]
+    assert restarts_of(follow, clip) == [(8, False)]
     assert len(follow.tasks) == 1 + 8 + 1  # the track itself is not begun again
     plain = list(PlannedCosts([1.0] * 30, 20.0)(TASK, clip, np.random.default_rng(0)))
-    again = RelocalisingTracker(TASK, PlannedCosts([1.0] * 30, 20.0)).track(clip, np.random.default_rng(0))
+    again = relocalised(TASK, PlannedCosts([1.0] * 30, 20.0), clip, np.random.default_rng(0))
     np.testing.assert_array_equal([frame.pose for frame in again], [frame.pose for frame in plain])
 
 
@@ -133,11 +133,11 @@ TYPICAL, HIGH, LOWER = [2.0] * 10, [3.1] * 5, [2.9] * 5
 def test_costs_that_stay_high_for_half_a_second_lead_to_restarts(
     costs: list[float], expected: list[tuple[int, bool]]
 ) -> None:
-    assert relocalised(PlannedCosts(costs, 5.0), [VISIBLE] * len(costs)) == expected
+    assert restarts_of(PlannedCosts(costs, 5.0), [VISIBLE] * len(costs)) == expected
 
 
 @each(("earlier", "expected"), [(8, [(0, True)]), (7, [])])
 def test_a_resumed_track_remembers_its_gap(earlier: int, expected: list[tuple[int, bool]]) -> None:
     clip = ([VISIBLE] * 3 + [GONE] * 5)[:earlier]
     before = tuple(PlannedCosts([1.0] * 9, 5.0)(TASK, clip, np.random.default_rng(0)))
-    assert relocalised(PlannedCosts([1.0] * 9, 5.0), [VISIBLE] * 4, replace(TASK, before=before)) == expected
+    assert restarts_of(PlannedCosts([1.0] * 9, 5.0), [VISIBLE] * 4, replace(TASK, before=before)) == expected

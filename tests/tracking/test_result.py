@@ -79,7 +79,7 @@ def test_a_frame_is_a_fit_with_a_picture(track: posefit.Track) -> None:
     with pytest.raises(InputError, match="frame must lie in 0 to 2, got 3"):
         track.frame(3)
     assert not track.unknown_sides.any()  # the method does not say
-    assert (frame.cost, frame.iou) == (track.frames[1]["cost"], track.frames[1]["iou"])
+    assert (frame.cost, frame.iou) == (track.table["cost"][1], track.table["iou"][1])
     np.testing.assert_array_equal(frame.joints, track.joints[1])
     picture = np.asarray(frame.overlay())
     assert picture.shape == (480, 640, 3)

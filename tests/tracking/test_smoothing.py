@@ -15,11 +15,11 @@ from posefit.tracking.smoothing import path
 from posefit.tracking.smoothing.path import Squares, Visibility, smooth_path
 from posefit.tracking.smoothing.smooth import steadied
 
-EYE = np.array([0.0, 1.0, 6.0])
+VIEWPOINT = np.array([0.0, 1.0, 6.0])
 
 
 def walk() -> Motion:
-    """Return a walk of a recorded person, three metres or more in front of a camera at `EYE`, across its sight."""
+    """Return a walk of a recorded person, three metres or more in front of a camera at `VIEWPOINT`, across its sight."""
     motion = recorded.clip("02_01").motion().resampled(30.0)
     places = motion.translations - motion.translations.mean(axis=0) * [1.0, 0.0, 1.0]
     ways = np.diff(places[:, [0, 2]], axis=0).sum(axis=0)
@@ -42,11 +42,11 @@ def shaken(motion: Motion, seed: int = 0) -> Motion:
     return replace(motion, poses=poses, translations=places)
 
 
-def smoothed(motion: Motion, eyes: Array = EYE, usable: Array | None = None) -> Motion:
-    """Return a motion smoothed that is seen from `eyes`, in all frames or those that are usable."""
+def smoothed(motion: Motion, viewpoints: Array = VIEWPOINT, usable: Array | None = None) -> Motion:
+    """Return a motion smoothed filmed from `viewpoints`, in all frames or those that are usable."""
     count = len(motion)
     visible = np.ones(count, dtype=bool) if usable is None else usable
-    return smooth_path(motion, Visibility(visible, np.broadcast_to(eyes, (count, 3))))
+    return smooth_path(motion, Visibility(visible, np.broadcast_to(viewpoints, (count, 3))))
 
 
 def test_the_least_of_the_squares_is_that_of_a_dense_solution() -> None:
@@ -92,12 +92,14 @@ def test_a_track_that_shakes_becomes_smooth_and_its_feet_stand() -> None:
 
 def test_angles_that_one_camera_sees_are_filtered_over_a_thirtieth_of_a_second() -> None:
     motion = walk()
-    poses, eyes = np.zeros((40, 66)), np.full((40, 3), np.nan)
+    poses, viewpoints = np.zeros((40, 66)), np.full((40, 3), np.nan)
     poses[10, 5] = poses[30, 5] = 1.0
     poses[:, 0] = [np.pi - 0.01, 0.01 - np.pi] * 20  # to either side of half a turn
-    eyes[:20] = EYE
+    viewpoints[:20] = VIEWPOINT
     for fps in (30.0, 60.0):
-        steady = steadied(Motion("", motion.skeleton, poses, np.zeros((40, 3)), fps), Visibility(eyes[:, 0] > 1, eyes))
+        steady = steadied(
+            Motion("", motion.skeleton, poses, np.zeros((40, 3)), fps), Visibility(viewpoints[:, 0] > 1, viewpoints)
+        )
         weights = np.exp(-0.5 * (np.arange(-9, 10) * 30.0 / fps) ** 2)
         np.testing.assert_allclose(steady.poses[8:13, 5], (weights / weights.sum())[7:12], atol=2e-4)
         np.testing.assert_array_equal(steady.poses[20:], poses[20:])  # several cameras see it
@@ -107,11 +109,11 @@ def test_angles_that_one_camera_sees_are_filtered_over_a_thirtieth_of_a_second()
 def test_depth_counts_much_where_several_cameras_see_and_little_where_one_does() -> None:
     # one camera, then several: a person who comes in is 10 cm too far at first, and then in place
     motion, alone = walk(), 15
-    places, eyes = motion.translations.copy(), np.full((len(motion), 3), np.nan)
+    places, viewpoints = motion.translations.copy(), np.full((len(motion), 3), np.nan)
     places[:alone, 2] -= 0.1
-    several = smoothed(replace(motion, translations=places), eyes.copy())
-    eyes[:alone] = EYE
-    single = smoothed(replace(motion, translations=places), eyes)
+    several = smoothed(replace(motion, translations=places), viewpoints.copy())
+    viewpoints[:alone] = VIEWPOINT
+    single = smoothed(replace(motion, translations=places), viewpoints)
     off, was = (np.abs(each.translations - motion.translations)[:, 2] for each in (single, several))
     assert off[alone - 5 : alone].mean() < 0.7 * was[alone - 5 : alone].mean()
     assert off[alone + 5 :].max() < 0.02
@@ -147,6 +149,6 @@ def test_a_track_is_smoothed_on_demand_and_has_the_cost_of_its_smooth_poses() ->
     assert (rough.summary["smooth"], smooth.summary["smooth"]) == (False, True)
     assert smooth.summary["acceleration"] < rough.summary["acceleration"]
     assert smooth.summary["cost"] != rough.summary["cost"]
-    assert [frame.evaluations for frame in smooth.estimates] == [frame.evaluations for frame in rough.estimates]
+    assert [frame.evaluations for frame in smooth.frames] == [frame.evaluations for frame in rough.frames]
     with pytest.raises(ValueError, match="smooth must be given where the translation is .* aligned, got known"):
         posefit.track("walk", frames=(0, 3), smooth=True)

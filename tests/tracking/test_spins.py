@@ -12,10 +12,10 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
+from posefit.output.folder import Recorder
 from posefit.progress import Progress
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.outputs import Output
 from posefit.tracking.pipeline import follow
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
@@ -25,6 +25,7 @@ from posefit.tracking.restarts import (
     spin_mask,
     surest_ends,
 )
+from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
 from tests.tracking.scenes import walk
@@ -43,7 +44,7 @@ def frame(degrees: float, cost: float = 1.0, cameras: int = 1, **more: Any) -> F
     pose = WALK.poses[0].copy()
     pose[0] = np.radians(degrees)
     areas = np.array([[5, 5, 5]] * cameras + [[0, 0, 0]] * (2 - cameras))
-    return Frame(pose, PLACE, cost, areas, 10, 0.1, np.array([cost]), **more)
+    return Frame(pose, PLACE, cost, areas, 10, **more)
 
 
 def frames_facing(degrees: Sequence[float], cameras: int = 1) -> list[Frame]:
@@ -138,7 +139,7 @@ def test_a_track_that_spins_is_tracked_again_outside_its_longest_run_without_spi
         for row in rows:
             yield frame(30.0 + 0.1 * row, posterior=posterior(0.2 if rows[-1] else -0.2))
 
-    retracked, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
+    retracked, _, stay = retrack_spins(TASK, OBSERVATIONS, Tracked(frames, []), follow, 0)
     assert stay == (8, 19)  # frames of a spin have no vote
     new = [30.0 if 8 <= k <= 19 else 30.0 + 0.1 * k for k in range(28)]
     assert [np.degrees(f.pose[0]) for f in retracked] == pytest.approx(new)
@@ -172,7 +173,7 @@ def test_a_track_that_gets_no_better_is_kept(
             yield frame(again[row], cost)
 
     frames = frames_facing(degrees)
-    kept, stay = retrack_spins(TASK, OBSERVATIONS, frames, follow, 0)
+    kept, _, stay = retrack_spins(TASK, OBSERVATIONS, Tracked(frames, []), follow, 0)
     assert stay is None
     assert [f.pose[0] for f in kept] == [f.pose[0] for f in frames]
     assert calls == ([list(range(11, -1, -1))] if tried else [])  # nothing comes after what stays
@@ -187,8 +188,6 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
     scene = replace(walk(10), truth=None, observations=shown, count=10)
 
     class Tracker:
-        lag = 3
-
         def __init__(self, task: Task) -> None:
             self.task = task
 
@@ -198,9 +197,11 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
             yield from (frame(float(row), posterior=posterior(0.1)) for row in rows)
 
     method: Any = SimpleNamespace(
-        tracker=Tracker, looks_ahead=lambda _: True, relocalising=lambda task, _: Tracker(task)
+        looks_ahead=True,
+        relocalise_gap=0,
+        follow=lambda task, observations, rng: Tracker(task).track(observations, rng),
     )
-    (_, frames), _ = follow(scene, TASK, method, TrackOptions(hypotheses=2), Output(), Progress())
+    (_, frames), _ = follow(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())
     (back, behind), (onward, ahead), (again, _), _ = calls
     assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])
     assert back.backwards
@@ -209,5 +210,5 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
     assert [np.degrees(f.pose[0]) for f in frames] == pytest.approx(range(10))
     assert again.yaw == initial_guess(1, TASK, None, False, frames[5])[1].yaw  # a guess is of the frame it is for
     calls.clear()
-    follow(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Output(), Progress())
+    follow(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
     assert [rows for _, rows in calls] == [list(range(10))]  # what is known of the first frame is kept

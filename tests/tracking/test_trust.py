@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from posefit.fitting.tracker import Frame
-from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import JOINTS
-from posefit.geometry.symmetry import mirrored_poses
-from posefit.motion.motion import Motion
-from posefit.motion.steadiness import BALLS
-from posefit.tracking.table import table
-from posefit.tracking.trust import (
+from posefit.evaluation.trust import (
     ONE_CAMERA,
     SIGNS,
+    Trust,
     covered_pixels,
     depth_scatter,
     grade_of,
@@ -32,6 +26,13 @@ from posefit.tracking.trust import (
     trust_line,
     trust_of,
 )
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.symmetry import mirrored_poses
+from posefit.motion.motion import Motion
+from posefit.motion.steadiness import BALLS
+from posefit.output.text import table
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, truth_of, viewed, walk
 
@@ -142,7 +143,9 @@ def test_the_worst_sign_is_named_and_the_others_are_counted(changes: dict[str, A
 
 def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert signs_against(FINE) == []
-    assert sentence(FINE, []).startswith("Trust: good. No sign speaks against it: size 1.80 m, given 1.80 m, ")
+    assert sentence(FINE, []).startswith(
+        "Trust: good. No sign speaks against it: size 1.80 m, the fitted body's 1.80 m, "
+    )
     unknown = FINE | {sign.name: None for sign in SIGNS} | {"size_m": None}
     assert signs_against(unknown) == []
 
@@ -159,31 +162,32 @@ def trusted(
     tracked: list[Frame] | None = None,
     reported: float = 0.0,
     training: Sequence[Motion] = (),
-) -> dict[str, Any]:
+) -> Trust:
     """Return the trust in the true track of a scene that a tracker estimated as `tracked`."""
     frames = exact_frames(scene)
     row = {"usable": 1.0, "lost": reported, "unknown_sides": reported, "interval_mm": 1e3 * reported}
-    return trust_of(scene, tracked or frames, frames, [row] * len(frames), 0.9, training)
+    table = {name: np.full(len(frames), value) for name, value in row.items()}
+    return trust_of(scene, tracked or frames, frames, table, 0.9, training)
 
 
 def test_several_cameras_show_the_size_and_one_cannot() -> None:
     scene = walk(30, (20.0, 110.0))
     trust = trusted(scene)
-    assert (trust["size_ratio"], trust["grade"]) == (1.0, "good")
-    assert trust["unknown_signs"] == {
+    assert (trust.size_ratio, trust.grade) == (1.0, "good")
+    assert trust.unknown_signs == {
         "explained": "there are masks alone",
         **dict.fromkeys(("training_mm", "frontal"), "several cameras see the depth"),
     }
     trust = trusted(replace(scene, body=scene.body.scaled(0.8, 0.8)))
-    assert trust["size_ratio"] == pytest.approx(1.25, abs=0.06)  # by perspective, and poses that rest on their root
-    assert "the person seems to be" in trust["sentence"]
+    assert trust.size_ratio == pytest.approx(1.25, abs=0.06)  # by perspective, and poses that rest on their root
+    assert "the person seems to be" in trust.sentence
     trust = trusted(walk(30), reported=np.nan)
-    assert trust["size_ratio"] is None
-    assert trust["unknown_signs"]["size_ratio"] == ONE_CAMERA
+    assert trust.size_ratio is None
+    assert trust.unknown_signs["size_ratio"] == ONE_CAMERA
     for name in ("lost", "unknown", "interval_mm"):
-        assert trust["unknown_signs"][name] == "the method does not say"
-    assert trust["unknown_signs"]["training_mm"] == "no motion was learned from"
-    assert ONE_CAMERA in trust_line(trust)
+        assert trust.unknown_signs[name] == "the method does not say"
+    assert trust.unknown_signs["training_mm"] == "no motion was learned from"
+    assert ONE_CAMERA in trust_line(asdict(trust))
 
 
 def test_poses_are_as_far_from_motions_as_from_the_nearest_pose_or_its_mirror_image() -> None:
@@ -199,21 +203,21 @@ def test_poses_are_as_far_from_motions_as_from_the_nearest_pose_or_its_mirror_im
 def test_a_track_by_one_camera_is_doubtful_far_from_what_was_learned() -> None:
     scene = walk(30)
     motion = truth_of(scene)
-    assert trusted(scene, training=[motion])["grade"] == "good"
+    assert trusted(scene, training=[motion]).grade == "good"
     bent = replace(motion, poses=motion.poses + 0.1 * (np.arange(66) >= 3))  # radians, at every joint
     trust = trusted(scene, training=[bent])
-    assert trust["training_mm"] > 60.0
-    assert trust["against"][0].startswith("one camera leaves depth to the motions learned from, and the nearest are ")
-    assert trust["grade"] == "doubtful"
-    assert trusted(walk(30, (20.0, 110.0)), training=[bent])["training_mm"] is None
+    assert trust.training_mm > 60.0
+    assert trust.against[0].startswith("one camera leaves depth to the motions learned from, and the nearest are ")
+    assert trust.grade == "doubtful"
+    assert trusted(walk(30, (20.0, 110.0)), training=[bent]).training_mm is None
 
 
 def test_a_track_by_one_camera_is_doubtful_from_the_front_and_the_back() -> None:
     for view, share in ((0.0, 1.0), (180.0, 1.0), (45.0, 0.0), (90.0, 0.0)):
         trust = trusted(walk(30, (view,)))
-        assert trust["frontal"] == share
-        assert trust["grade"] == ("doubtful" if share else "good")
-    assert trusted(walk(30, (0.0, 90.0)))["frontal"] is None
+        assert trust.frontal == share
+        assert trust.grade == ("doubtful" if share else "good")
+    assert trusted(walk(30, (0.0, 90.0))).frontal is None
 
 
 def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
@@ -224,8 +228,8 @@ def test_depth_is_that_of_the_track_before_it_was_smoothed() -> None:
         for k, frame in enumerate(exact_frames(scene))
     ]
     trust = trusted(scene, shaken)
-    assert trust["depth_scatter"] == pytest.approx(0.1, rel=0.3)
-    assert "the distance jumps by 1" in trust["sentence"]
+    assert trust.depth_scatter == pytest.approx(0.1, rel=0.3)
+    assert "the distance jumps by 1" in trust.sentence
 
 
 def test_the_sentence_stands_on_top_of_every_output_where_the_truth_is_unknown(tmp_path: Path) -> None:

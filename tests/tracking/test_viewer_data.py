@@ -13,10 +13,10 @@ import pytest
 
 from posefit.fitting.tracker import Observation
 from posefit.measuring.angles import clinical_angles
+from posefit.output.page import stills
+from posefit.output.page.stills import Stills, Strip
 from posefit.page.document import embedded
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.page import stills
-from posefit.tracking.page.stills import Stills, Strip
 from tests.tracking.scenes import MAXWELL, SIZE, exact_frames, truth_of, uncertain_frames, viewed, walk
 
 

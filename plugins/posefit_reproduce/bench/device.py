@@ -69,7 +69,7 @@ def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
     drawing = drawing_on_device(body, camera, observed)
     moved = cuda.to_device(poses), cuda.to_device(places)
     jobs: dict[str, Callable[[], Any]] = {
-        "cpu": lambda: problem.areas(poses, places),
+        "cpu": lambda: problem.cost_and_areas(poses, places)[1],
         "proposals": lambda: there.evaluate(proposals),
         "poses": lambda: areas(body, camera, observed, poses, places),
         "resident": lambda: launched(drawing, *moved).copy_to_host(),

@@ -9,10 +9,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import INNER, JOINTS
 from posefit.statistics.ranks import LEVEL, holm, wilcoxon
-from posefit.tracking.measures import BASELINES
 from posefit_priors.pca import PCA
 from posefit_reproduce.sapso.experiment import PaperResults
 from posefit_reproduce.sapso.motions import LABELS

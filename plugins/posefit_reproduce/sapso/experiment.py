@@ -12,6 +12,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.errors import nearest
+from posefit.evaluation.measures import BASELINES
 from posefit.fitting import metrics
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation
@@ -19,13 +21,12 @@ from posefit.footage.cameras import place_of
 from posefit.footage.scene import Scene, with_corruption
 from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
-from posefit.tracking.evaluation import nearest
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
-from posefit.tracking.measures import BASELINES
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
+from posefit.uncertainty.modes import nearer_mirrored
 from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.sapso.motions import PaperMotion, paper_scene
 from posefit_reproduce.sapso.paper import (
@@ -39,6 +40,8 @@ from posefit_reproduce.sapso.paper import (
     settings_of,
 )
 from posefit_swarm.sapso import SAPSO
+
+PARTICLES = 40  # N, section 5.2
 
 # a motion tracked; its frames each by itself, and with a part hidden; what needs no search; searches of its first frame
 Kind = Literal["tracked", "images", "hidden", "baselines", "first frame"]
@@ -141,7 +144,7 @@ def follow_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
         train=motion.training,
         method=run.method,
         settings=settings_of(run.method),
-        iterations=scale.iterations,
+        evaluations=PARTICLES * (scale.iterations + 1),
         seed=run.seed,
     )
     summary = results.summary
@@ -162,14 +165,13 @@ def estimate_images(
 
     `images` are observations of the scene by their frames' numbers; a method is run that `METHODS` names.
     """
-    options = TrackOptions(method=name, settings=settings_of(name), iterations=iterations, seed=seed)
+    options = TrackOptions(method=name, settings=settings_of(name), evaluations=PARTICLES * (iterations + 1), seed=seed)
     task = replace(task_of(scene, options, training), yaw=None)  # Interpretation S17
     method, frames = prepare(options, task), list[Frame]()
     for k, image in images.items():
         known = image.translation
         anchor = place_of(image.silhouettes, scene.cameras, scene.body.stature) if known is None else np.asarray(known)
-        tracker = method.tracker(replace(task, anchor=anchor))
-        frames += tracker.track([image], np.random.default_rng([seed, k]))
+        frames += method.follow(replace(task, anchor=anchor), [image], np.random.default_rng([seed, k]))
     return frames
 
 
@@ -187,7 +189,7 @@ def estimate_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
         estimate.poses,
         float(np.mean([frame.seconds for frame in frames])),
         float(np.mean([frame.evaluations for frame in frames])),
-        float(metrics.swapped(truth, joints).mean()),
+        float(nearer_mirrored(truth, joints).mean()),
         float((metrics.mpjpe_mm(truth, joints) > metrics.LOST_MM).mean()),
     )
 
@@ -204,13 +206,18 @@ def baseline_poses(motion: PaperMotion, view: float) -> dict[str, Array]:
 def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array:
     """Return the lowest cost after each iteration (swarms, iterations + 1) in the first frame, for each N."""
     scene = paper_scene(motion, view, (0, 1), scale.first_yaw)
-    return np.array([_first_frame(scene, motion, scale, count, seed, method=OURS).history for count in scale.swarms])
+    return np.array(
+        [_first_frame(scene, motion, scale, count, seed, method=OURS).trace[:, 1] for count in scale.swarms]
+    )
 
 
 def _first_frame(scene: Scene, motion: PaperMotion, scale: Scale, particles: int, seed: int, **method: Any) -> Frame:
     """Return what a method makes of a scene of one frame."""
-    how: dict[str, Any] = {"population_size": particles, "iterations": scale.iterations, "seed": seed}
-    return track(scene, train=motion.training, settings=DRIVEN, **how, **method).estimates[0]
+    chosen = method["method"]
+    name = OURS.partition("@")[0] if isinstance(chosen, str) else chosen[0].__name__
+    settings = {**DRIVEN, f"{name}.population_size": particles}
+    how: dict[str, Any] = {"settings": settings, "evaluations": particles * (scale.iterations + 1), "seed": seed}
+    return track(scene, train=motion.training, **how, **method).frames[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +251,7 @@ def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int =
             super().tell(proposals, costs)
 
     searches: list[Watched] = []
-    frame = _first_frame(scene, motion, scale, particles, seed, optimiser=Watched, method="@pca")
+    frame = _first_frame(scene, motion, scale, particles, seed, method=(Watched, "pca"))
     search = searches[-1]  # the one before it only compiles
     poses, translations = zip(*search.decoded, strict=True)
-    return WatchedSwarm(scene, poses, translations, search.cheapest, frame.history)
+    return WatchedSwarm(scene, poses, translations, search.cheapest, frame.trace[:, 1])

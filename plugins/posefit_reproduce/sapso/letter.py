@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.fitting.space import SearchSpace
-from posefit.plugin import Array, Space, at_least, between, displacement, draw_population, wrap
+from posefit.plugin import Array, Space, at_least, between, check_tell, displacement, draw_population, wrap
 from posefit_swarm.sapso import Rows, first_velocities, inertia_at, redrawn
 
 TEMPERATURE, COOLING = 1.0, 0.95  # T and gamma, section 5.2
@@ -48,7 +48,7 @@ class LetterSAPSO:
         at_least("iterations", iterations, 1)
         at_least("stop_temperature", stop_temperature, 0.0)
         between("inertia", inertia, 0.1, math.inf, ends=False)
-        self.space, self.rng, self.c, self.C = space, rng, 0, iterations
+        self.space, self.rng, self.c, self.C, self.waiting = space, rng, 0, iterations, 0
         self.T, self.T0, self.A = TEMPERATURE, stop_temperature, inertia
         self.low, self.high = velocity_limits(space)
         self.moved = draw_population(space, rng, population_size)
@@ -58,10 +58,12 @@ class LetterSAPSO:
 
     def ask(self) -> Array:
         """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
-        return self.moved.copy() if self.c < self.C and self.T > self.T0 else self.moved[:0]
+        self.waiting = len(self.moved) if self.c < self.C and self.T > self.T0 else 0
+        return self.moved[: self.waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the moves by their costs (N,), cool, remember the bests, and move on."""
+        check_tell(self.waiting, proposals, costs)
         with np.errstate(invalid="ignore", over="ignore"):  # infinity less infinity; nan is never accepted
             chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))
         accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))
@@ -71,7 +73,7 @@ class LetterSAPSO:
         better = self.cost < self.pbest_cost
         self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
         self.v, self.moved = redrawn(self.x, self.step, self.allowed, REDRAWS)
-        self.c += 1
+        self.c, self.waiting = self.c + 1, 0
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move by (1) and (2)."""

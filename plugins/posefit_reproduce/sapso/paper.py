@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.tracking.options import ITERATIONS
 
 
 class Tracked(NamedTuple):
@@ -101,7 +100,7 @@ class Scale:
 
     frames: int = FRAMES
     views: tuple[float, ...] = (0.0, 45.0, 90.0)
-    iterations: int = ITERATIONS
+    iterations: int = 60  # C, section 5.2
     swarms: tuple[int, ...] = (20, 40, 60, 100)  # N of figure 6
     first_yaw: FirstYaw = "known"  # of a track: Interpretation S17
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import BASELINES
 from posefit.fitting import metrics
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import turns_of
-from posefit.tracking.measures import BASELINES
 from posefit.tracking.restarts import RESTARTS
 from posefit.version import __version__
 from posefit_reproduce.jobs import Progress, figures_folder

@@ -19,7 +19,7 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.tracking.method import prepare
-from posefit.tracking.options import TrackOptions
+from posefit.tracking.options import EVALUATIONS, TrackOptions
 from posefit_reproduce.jobs import Progress, check_seeds, each
 from posefit_reproduce.vsmm.activities import ACTIVITIES, TRAINING, Film, film_of
 from posefit_vsmm.motion import library
@@ -68,10 +68,10 @@ def film_task(film: Film, evaluations: int, training: Sequence[str] = TRAINING) 
 def follow_film(options: TrackOptions, seed: int) -> PatentTrack:
     """Follow the film of a seed with a method and return what it is worth; the first pose is not known."""
     film = film_of(seed)
-    task = film_task(film, options.budget)
+    task = film_task(film, options.evaluations or EVALUATIONS)
     with threadpool_limits(1):
         for observations in (film.observations[:WARMING], film.observations):
-            frames = list(prepare(options, task).tracker(task).track(observations, np.random.default_rng(seed)))
+            frames = list(prepare(options, task).follow(task, observations, np.random.default_rng(seed)))
     states, figures = model_states(frames), patent_errors(film, frames)
     if states:
         elbow, hand = np.nanmean(detected_cm(film, frames, states), axis=0)

@@ -13,8 +13,8 @@ from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.fitting.tracker import Frame
 from posefit.geometry.skeleton import PARENTS
+from posefit.output.drawing import draw_body, side_view
 from posefit.silhouette.foreground import Image
-from posefit.tracking.drawing import draw_body, side_view
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film
 from posefit_reproduce.vsmm.experiment import ELBOW, HAND, State, both_joints, detected_cm, model_states, projected_cm
 

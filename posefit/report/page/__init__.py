@@ -4,11 +4,11 @@
 |---|---|
 | the sections, empty, and how they look | report.html, report.css |
 | colours and marks of methods, the legend whose buttons show and hide them | methods.js |
-| charts: curves over evaluations, errors of joints, calibration | curves.js |
-| the first screen: all methods, three tracks of the leader, failures | first.js |
+| charts: lines with bands and dots, errors of joints | charts.js |
+| the first screen: all methods, three tracks of the leader, trouble | first.js |
 | the tables: leaderboard, all runs, running times, failures; the command that runs a cell again | tables.js |
 | paired tests: one method against all others | compare.js |
-| cards and the window that plays a track | gallery.js |
+| small pictures of tracks, and the window that plays one | viewer.js |
 | the order in which everything is drawn | main.js |
 
 The constant `D` is the data that `posefit.report.content` returns.
@@ -19,12 +19,12 @@ so that each has a contrast of at least 4.5 to 1 with its background. Marks dist
 
 from typing import Any
 
+from posefit.output.drawing import OTHER, hexadecimal
+from posefit.output.page import BODY_DARK, BODY_LIGHT
 from posefit.page.document import assembled, colour_style, one_script, part
-from posefit.tracking.drawing import OTHER, hexadecimal
-from posefit.tracking.page import BODY_DARK, BODY_LIGHT
 
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
-SCRIPTS = ("methods", "curves", "first", "tables", "compare", "gallery", "main")  # in this order
+SCRIPTS = ("methods", "charts", "first", "tables", "compare", "viewer", "main")  # in this order
 _LIGHT = ("#00775a", "#a63d80", "#7a5c00", "#6b4cc0", "#111111", "#b0123b", "#3d6b7d")
 _DARK = ("#2cc79a", "#e39cc6", "#d9cf6a", "#b9a3ff", "#f2f2f2", "#ff8095", "#8fb8c9")
 COLOURS = len(_LIGHT)

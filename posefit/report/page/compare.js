@@ -30,14 +30,14 @@ function comparison() {
       about: "Below 0 the chosen method is better",
       down: true,
     }),
-    intervalColumn("Of the median, from six runs on", "difference", 2, () => "–", ["from", "to"]),
+    intervalColumn("Of the median, from six runs on", "difference", 2, ["from", "to"]),
     column("p", "p", probability),
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
     column("probability of improvement", "better", twoDigits, {
       about: "That a run of the chosen method has the lower error",
       down: true,
     }),
-    intervalColumn("Of the probability, from three seeds on, if the runs are not too many", "low", 2, () => "–"),
+    intervalColumn("Of the probability, from three seeds on, if the runs are not too many", "low", 2),
     textColumn("verdict", verdict),
   ];
   const show = (m) => {
@@ -51,48 +51,27 @@ function comparison() {
   show(first);
 }
 
-// The mean error over seeds of each instance and method; null where there is none.
-function meanErrors() {
-  const errors = INSTANCES.map(() => METHODS.map(() => []));
-  D.rows.error.forEach((error, k) => given(error) && errors[D.rows.instance[k]][D.rows.method[k]].push(error));
-  const mean = (values) => (values.length ? values.reduce((sum, value) => sum + value, 0) / values.length : null);
-  return errors.map((row) => row.map(mean));
-}
-
+// Each instance's mean errors over seeds: of a method, and of the best other one.
 function against(m) {
-  const duels = meanErrors()
-    .map((errors, instance) => {
-      const others = errors.map((error, k) => [error, k]).filter(([error, k]) => given(error) && k !== m);
-      const [least, best] = others.sort((a, b) => a[0] - b[0])[0] ?? [null, null];
-      const rank = 1 + others.filter(([error]) => error < errors[m]).length;
-      return { instance, errors, error: errors[m], least, best, rank, of: others.length + 1 };
-    })
-    .filter((row) => given(row.error));
-  const most = usualMost(duels.flatMap((row) => row.errors));
-  const skill = (name) => (row) => {
-    const base = D.instances[row.instance][name];
-    return given(base) && base > 0 ? 1 - row.error / base : null;
-  };
-  const best = (row) => [number(row.least, 2), make("small", {}, METHODS[row.best])];
+  const sums = INSTANCES.map(() => METHODS.map(() => [0, 0]));
+  D.rows.error.forEach((error, k) => {
+    const sum = sums[D.rows.instance[k]][D.rows.method[k]];
+    if (given(error)) [sum[0], sum[1]] = [sum[0] + error, sum[1] + 1];
+  });
+  const duels = sums.flatMap((methods, instance) => {
+    const ranked = methods.flatMap(([sum, count], k) => (count ? [[sum / count, k]] : [])).sort((a, b) => a[0] - b[0]);
+    const place = ranked.findIndex(([, k]) => k === m);
+    if (place < 0) return [];
+    const [least, best] = ranked[place ? 0 : 1] ?? [null, null];
+    return [{ instance, error: ranked[place][0], least, best, rank: place + 1, of: ranked.length }];
+  });
+  const best = (least, row) => [number(least, 2), make("small", {}, METHODS[row.best])];
   const columns = [
-    namedColumn("instance", INSTANCES, (row) => row.instance),
-    { title: "all methods", text: true, show: (row) => errorDots(row.errors, m, most) },
+    textColumn("instance", "instance", (k) => INSTANCES[k]),
     figure("error"),
-    { title: "rank", value: (row) => row.rank, show: (row) => `${row.rank} of ${row.of}` },
-    { title: "best other °", value: (row) => row.least, show: (row) => (given(row.least) ? best(row) : "–") },
+    column("rank", "rank", (rank, row) => `${rank} of ${row.of}`),
+    column("best other °", "least", best),
     column("behind it by °", (row) => (given(row.least) ? row.error - row.least : null), twoDigits, { down: true }),
-    ...Object.keys(D.baseline_names).map((name) => figure(`skill_${name}`, skill(name))),
   ];
-  table($("duels"), columns, duels, { name: "Instance by instance", by: 5, down: true });
-}
-
-// The errors of all methods on a line, that of one method larger.
-function errorDots(errors, chosen, most) {
-  const at = (value) => 6 + (248 * Math.min(value, most)) / most;
-  const svg = draw("svg", { width: 260, height: 18, role: "img", "aria-label": "errors of all methods" });
-  svg.append(drawLine(6, 9, 254, 9, { class: "rule" }));
-  const others = range(METHODS.length).filter((m) => m !== chosen && given(errors[m]));
-  for (const m of [...others, chosen])
-    svg.append(mark(m, at(errors[m]), 9, m === chosen ? 6 : 3, `${METHODS[m]}: ${number(errors[m], 2)}°`));
-  return svg;
+  table($("duels"), columns, duels, { name: "Instance by instance", by: 4, down: true });
 }

@@ -1,6 +1,6 @@
 // Names, colours and marks of methods, and the legend whose buttons show and hide them in every chart.
-const METHODS = D.methods.map((one) => one.name);
-const INSTANCES = D.instances.map((one) => one.name);
+const METHODS = D.methods.map((method) => method.name);
+const INSTANCES = D.instances.map((instance) => instance.name);
 const DASHES = ["", "7 3", "2 3", "8 3 2 3"];
 const FIRST_CURVES = 4; // methods in the charts at first
 const hidden = new Set();
@@ -11,32 +11,27 @@ const scored = (value) => `${number(value, D.score.digits)}${D.score.unit}`;
 
 const numbered = (names) => names.map((name, k) => [String(k), name]);
 const button = (text, click, about) => make("button", { type: "button", on: { click }, ...about }, ...[text].flat());
-const percents = (value) => `${whole(100 * value)} %`;
 
-// Corners of marks around 0, 0 with the area of a disc: seven colours and eight marks make 56 pairs.
-const polygon = (count, radii, turn = 0) =>
-  range(count).map((k) => {
-    const angle = 2 * Math.PI * (k / count + turn) - Math.PI / 2;
-    return [radii[k % radii.length] * Math.cos(angle), radii[k % radii.length] * Math.sin(angle)];
-  });
+// Marks around 0, 0 with about the area of a disc: seven colours and eight marks make 56 pairs.
 const SHAPES = [
-  polygon(24, [1]),
-  polygon(4, [1.25], 0.125),
-  polygon(3, [1.5]),
-  polygon(4, [1.35]),
-  polygon(3, [1.5], 0.5),
-  polygon(8, [1.7, 0.6], 0.125),
-  polygon(10, [1.6, 0.7]),
-  polygon(6, [1.15]),
+  "M-1,0a1,1 0 1 0 2,0a1,1 0 1 0 -2,0",
+  "M-.9,-.9H.9V.9H-.9Z",
+  "M0,-1.5L1.3,.75H-1.3Z",
+  "M0,-1.35L1.35,0L0,1.35L-1.35,0Z",
+  "M0,1.5L1.3,-.75H-1.3Z",
+  "M0,-.55L1.2,-1.2L.55,0L1.2,1.2L0,.55L-1.2,1.2L-.55,0L-1.2,-1.2Z",
+  "M0,-1.6L.5,-.5H1.5L.7,.2L1,1.3L0,.7L-1,1.3L-.7,.2L-1.5,-.5H-.5Z",
+  "M0,-1.15L1,-.6V.6L0,1.15L-1,.6V-.6Z",
 ];
 
 // A method's mark at a place, with the text that it shows where it is pointed at.
 const mark = (m, x, y, radius, title) =>
   draw(
-    "polygon",
+    "path",
     {
       class: "mark",
-      points: corners(SHAPES[m % SHAPES.length].map(([a, b]) => [x + radius * a, y + radius * b])).join(" "),
+      d: SHAPES[m % SHAPES.length],
+      transform: `translate(${x} ${y}) scale(${radius})`,
       style: `fill: ${colour(m)}`,
     },
     title ? draw("title", {}, title) : null,
@@ -65,22 +60,14 @@ function legend() {
   order.slice(FIRST_CURVES).forEach((m) => hidden.add(m));
   const set = (methods, on) => {
     methods.forEach((m) => (on ? hidden.delete(m) : hidden.add(m)));
-    buttons.forEach((one) => one.setAttribute("aria-pressed", String(!hidden.has(+one.dataset.method))));
+    buttons.forEach((one, k) => one.setAttribute("aria-pressed", String(!hidden.has(order[k]))));
     redraw();
   };
-  const buttons = order.map((m) => {
-    const one = button([swatch(m), METHODS[m]], () => set([m], hidden.has(m)), { "data-method": m });
-    for (const [event, on] of Object.entries({ pointerenter: true, pointerleave: false, focus: true, blur: false }))
-      one.addEventListener(event, () =>
-        document
-          .querySelectorAll(`.series[data-method="${m}"]`)
-          .forEach((series) => series.classList.toggle("lit", on)),
-      );
-    return one;
-  });
+  const buttons = order.map((m) =>
+    button([swatch(m), METHODS[m]], () => set([m], hidden.has(m)), { "data-method": m }),
+  );
   $("toggles").replaceChildren(...buttons);
   $("all").onclick = () => set(order, true);
   $("none").onclick = () => set(order, false);
-  $("bands").onchange = () => document.querySelector("main").classList.toggle("banded", $("bands").checked);
   set([], true);
 }

@@ -1,35 +1,30 @@
 // Tables that any column sorts; leaderboard, all runs, running times, failures; the command that runs a cell again.
-const PAGE = 50; // rows
+const PAGE = 25; // rows
+const FEW = ["error", "lost", "ms"]; // figures of a run that need no button
 
-// A column: its title, or one for screen readers alone, `of` to sort by, and what is shown of it. `of` is a name in a
-// row, or a function of the row.
+// A column: its title, `of` to sort by, a name in a row or a function of the row, and how a value is shown.
 const pick = (of) => (typeof of === "string" ? (row) => row[of] : of);
-const column = (title, of, show, more) => {
+const column = (title, of, show = String, more = {}) => {
   const value = pick(of);
-  return { title, value, show: (row) => (given(value(row)) ? show(value(row)) : "–"), ...more };
+  return { title, value, show: (row) => (given(value(row)) ? show(value(row), row) : "–"), ...more };
 };
-const textColumn = (title, of, show = pick(of), more = {}) => ({ title, text: true, value: pick(of), show, ...more });
-const namedColumn = (title, names, of) => textColumn(title, of, (row) => names[of(row)]);
+const textColumn = (title, of, show, more) => column(title, of, show, { text: true, ...more });
+const further = (one) => ({ ...one, more: true });
 const methodColumn = (of) => {
   const name = (row) => METHODS[pick(of)(row)];
-  return textColumn("method", name, (row) => [swatch(pick(of)(row)), name(row)]);
+  return textColumn("method", name, (text, row) => [swatch(pick(of)(row)), text]);
 };
-const seedColumn = (of) => column("seed", of, (seed) => String(D.seeds[seed]));
 const buttonColumn = (unseen, show) => ({ unseen, text: true, show });
-const intervalColumn = (about, of, digits, none, [low, high] = ["low", "high"]) => {
+const intervalColumn = (about, of, digits, [low, high] = ["low", "high"]) => {
   const ends = (row) => `${number(row[low], digits)} – ${number(row[high], digits)}`;
-  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : none(row)) };
+  return { title: "95 % interval", about, value: pick(of), show: (row) => (given(row[low]) ? ends(row) : "–") };
 };
-const badColumn = (title, value, about) => {
-  const show = (row) => (row.base ? "" : make("span", { class: value(row) ? "bad" : null }, String(value(row))));
-  return { title, about, value, show };
-};
+const bad = (count) => make("span", { class: count ? "bad" : null }, whole(count));
 // A figure of D.columns; `of` gives it of a row.
-const figure = (name, of = name) => ({
-  ...D.columns[name],
-  value: pick(of),
-  show: (row) => shownAs(name, pick(of)(row)),
-});
+const figure = (name, of = name) => {
+  const { title, ...about } = D.columns[name];
+  return column(title, of, (value) => shownAs(name, value), about);
+};
 
 function table(box, columns, rows, { name, by = null, down = false, kind = () => null }) {
   let [sorted, falling, start] = [by, down, 0];
@@ -39,23 +34,17 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
     [sorted, start] = [k, 0];
     show();
   };
-  const kinds = ({ text, more }) => [text && "text", more && "more"].filter(Boolean).join(" ") || null;
+  const kinds = (one) => ["text", "more"].filter((word) => one[word]).join(" ") || null;
   const heads = columns.map((one, k) => {
-    const { title, unseen, value, about } = one;
-    const content = title ?? make("span", { class: "unseen" }, unseen);
-    const head = value ? button(title, () => sort(k), { title: about }) : content;
+    const content = one.title ?? make("span", { class: "unseen" }, one.unseen);
+    const head = one.value ? button(one.title, () => sort(k), { title: one.about }) : content;
     return make("th", { scope: "col", class: kinds(one) }, head);
   });
   const pager = make("div", { class: "row pager" });
-  const leaf = (text, count, disabled) =>
-    button(
-      text,
-      () => {
-        start += count;
-        show();
-      },
-      { disabled },
-    );
+  const turn = (count) => () => {
+    start += count;
+    show();
+  };
 
   function ordered() {
     if (!given(sorted)) return rows;
@@ -67,75 +56,64 @@ function table(box, columns, rows, { name, by = null, down = false, kind = () =>
       .map((pair) => pair[1]);
   }
 
-  function cell(one, row) {
-    const content = one.show(row);
-    return make("td", { class: kinds(one), "data-title": one.title }, ...[content].flat());
-  }
-
   function show() {
     heads.forEach((head, k) => {
       const order = k !== sorted ? "none" : falling ? "descending" : "ascending";
       if (columns[k].value) head.setAttribute("aria-sort", order);
     });
-    const end = Math.min(start + PAGE, rows.length);
+    const cell = (one, row) => make("td", { class: kinds(one), "data-title": one.title }, ...[one.show(row)].flat());
     const line = (row) => make("tr", { class: kind(row) }, ...columns.map((one) => cell(one, row)));
+    const end = Math.min(start + PAGE, rows.length);
     body.replaceChildren(...ordered().slice(start, end).map(line));
-    const places = rows.length ? `${whole(start + 1)} to ${whole(end)} of ${whole(rows.length)}` : "none";
     pager.replaceChildren(
-      leaf("earlier", -PAGE, start === 0),
-      make("span", {}, places),
-      leaf("later", PAGE, end >= rows.length),
+      button("earlier", turn(-PAGE), { disabled: start === 0 }),
+      make("span", {}, `${whole(start + 1)} to ${whole(end)} of ${whole(rows.length)}`),
+      button("later", turn(PAGE), { disabled: end >= rows.length }),
     );
   }
 
   const grid = make("table", {}, make("thead", {}, make("tr", {}, ...heads)), body);
   box.replaceChildren(make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": name }, grid));
   if (rows.length > PAGE) box.append(pager);
+  if (columns.some((one) => one.more)) {
+    const toggle = button("more columns", () => {
+      toggle.textContent = box.classList.toggle("few") ? "more columns" : "fewer columns";
+    });
+    box.classList.add("few");
+    box.prepend(toggle);
+  }
   show();
 }
 
 function leaderboard() {
   $("leaderboard-note").textContent = `${D.score.leaderboard}A column's title sorts by it.`;
-  const [score, ...figures] = Object.keys(D.columns);
-  const { digits, points, paired } = D.score;
-  const warned = METHODS.map(() => 0);
-  for (const row of Object.keys(D.warned)) warned[D.rows.method[row]] += 1;
-  const bases = score === "error" ? D.baselines.map((row) => ({ ...row, base: true })) : [];
-  const name = (row) => (row.base ? `baseline: ${D.baseline_names[row.baseline]}` : row.name);
+  const { name: score, digits, points, paired, down } = D.score;
+  const bases = D.leaderboard[0].lost_tracks >= 0 ? D.baselines : [];
+  const name = (row) => row.name ?? `baseline: ${D.baseline_names[row.baseline]}`;
   const settings = (row) => make("small", {}, D.methods[row.method].settings || "default settings");
-  const method = (row) => (row.base ? name(row) : [swatch(row.method), row.name, settings(row)]);
+  const method = (text, row) => (row.baseline ? text : [swatch(row.method), text, settings(row)]);
   const width = (row) => (given(row.low) ? row.high - row.low : null);
-  const about = "Methods that share a letter do not differ significantly";
-  const letters = (row) => row.letters ?? "";
-  const more = (one) => ({ ...one, more: true });
-  const lost = (row) => (row.base ? "" : `${row.lost_tracks} of ${row.runs}`);
-  const columns = [
+  const about = `The median of the differences from the leader in paired ${paired}`;
+  const first = [
     textColumn("method", name, method),
     figure(score),
-    intervalColumn("Sorts by its width", width, digits, (row) => (row.base ? "" : "–")),
-    column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), {
-      about: `The median of the differences from the leader in paired ${paired}`,
-    }),
+    intervalColumn("Sorts by its width", width, digits),
+    column(`behind ${points.trim()}`, "behind", (value) => number(value, digits), { about }),
     column("p", "p", probability, { about: "Of that difference: Wilcoxon's signed ranks, after Holm over all pairs" }),
-    ...(D.columns.lost
-      ? [{ title: "lost in", about: "Tracks that lost frames", value: (row) => row.lost_tracks, show: lost }]
-      : []),
-    badColumn("failed", (row) => row.failed),
-    ...(D.warnings.length ? [badColumn("warned", (row) => warned[row.method], "Runs with a warning")] : []),
-    ...(D.columns.above ? [figure("above")] : []),
-    more(textColumn("group", letters, letters, { about })),
-    ...figures.filter((one) => one !== "above").map((one) => more(figure(one))),
-    more({ title: "runs", down: true, value: (row) => row.runs, show: (row) => (row.base ? "" : whole(row.runs)) }),
+    column("lost in", "lost_tracks", (count, row) => `${count} of ${row.runs}`, { about: "Tracks that lost frames" }),
+    column("failed", "failed", bad),
+    ...(D.warnings.length ? [column("warned", "warned", bad, { about: "Runs with a warning" })] : []),
   ];
-  const box = $("leaders");
-  box.classList.add("few");
-  const toggle = button("more columns", () => {
-    toggle.textContent = box.classList.toggle("few") ? "more columns" : "fewer columns";
-  });
-  box.before(toggle);
-  const order = { by: 1, down: D.score.better === "more" };
-  const kind = (row) => (row.base ? "base" : null);
-  table(box, columns, [...D.leaderboard, ...bases], { name: "Leaderboard", ...order, kind });
+  const columns = [
+    ...first.filter(({ value }) => D.leaderboard.some((row) => given(value(row)))),
+    further(
+      textColumn("group", "letters", String, { about: "Methods that share a letter do not differ significantly" }),
+    ),
+    ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [further(figure(one))])),
+    further(column("runs", "runs", whole, { down: true })),
+  ];
+  const kind = (row) => (row.baseline ? "base" : null);
+  table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
 }
 
 // Buttons to watch a run, if it has an animation, and for the command that runs it again.
@@ -157,59 +135,52 @@ function warningSign(k) {
 // Fills selects of [value, name] pairs by their ids, and shows the rows that have the chosen values of `of`.
 function filtered(selects, rows, show) {
   const fill = () => {
-    const fits = (row) => selects.every(([id, , , of]) => ["", String(of(row))].includes($(id).value));
+    const fits = (row) => selects.every(([id, , of]) => ["", String(of(row))].includes($(id).value));
     show(rows.filter(fits));
   };
-  for (const [id, all, names] of selects) choose($(id), [["", all], ...names], "", fill);
+  for (const [id, names] of selects) choose($(id), [["", "all"], ...names], "", fill);
   fill();
 }
 
 function allRows() {
   const R = D.rows;
   const of = (name) => (k) => R[name][k];
-  const settings = (k) => D.methods[R.method[k]].settings;
   const columns = [
     buttonColumn("watch, or run again", runButtons),
-    textColumn("method", of("method"), (k) => [METHODS[R.method[k]], D.warned[k] ? warningSign(k) : null]),
-    textColumn("settings", settings, (k) => settings(k) || "default"),
-    namedColumn("instance", INSTANCES, of("instance")),
-    seedColumn(of("seed")),
-    ...Object.keys(D.columns).map((name) => figure(name, of(name))),
-    textColumn("key", of("key")),
+    textColumn("method", of("method"), (m, k) => [METHODS[m], D.warned[k] ? warningSign(k) : null]),
+    further(textColumn("settings", (k) => D.methods[R.method[k]].settings || "default")),
+    textColumn("instance", of("instance"), (instance) => INSTANCES[instance]),
+    column("seed", of("seed"), (seed) => String(D.seeds[seed])),
+    ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !FEW.includes(name) })),
+    further(textColumn("key", of("key"))),
   ];
+  const some = Object.keys(D.animations.tracks).length;
+  if (some < R.key.length)
+    $("rows-note").textContent =
+      `${whole(some)} of ${whole(R.key.length)} runs can be watched, so that this file stays small: ` +
+      "a report of the ledger that a row's command makes shows that row.";
   const selects = [
-    ["of-method", "all", numbered(METHODS), of("method")],
-    ["of-instance", "all", numbered(INSTANCES), of("instance")],
+    ["of-method", numbered(METHODS), of("method")],
+    ["of-instance", numbered(INSTANCES), of("instance")],
   ];
   const show = (rows) => table($("all-rows"), columns, rows, { name: "All runs", by: 5 });
   filtered(selects, range(R.key.length), show);
 }
 
-// Expected running times of single searches, by function and dimension; the least is bold.
+// Expected running times of single searches, by function and dimension.
 function runningTimes() {
-  const least = new Map();
-  const place = (row, k) => `${row.dimension} ${row.function} ${k}`;
-  for (const row of D.times)
-    row.times.forEach((time, k) =>
-      least.set(place(row, k), Math.min(least.get(place(row, k)) ?? Infinity, time ?? Infinity)),
-    );
   const functions = new Map(D.times.map((row) => [row.function, `${row.function} ${row.name}`]));
   const dimensions = [...new Set(D.times.map((row) => row.dimension))].sort((a, b) => a - b);
-  const time = (above, k) => ({
-    title: `ERT +${above}`,
-    about: `Expected evaluations to ${above} above the best known cost`,
-    value: (row) => row.times[k],
-    show: (row) => {
-      if (!given(row.times[k])) return "–";
-      const shown = make(row.times[k] === least.get(place(row, k)) ? "strong" : "span", {}, whole(row.times[k]));
-      const [low, high] = row.ends[k].map((end) => (given(end) ? whole(end) : "∞"));
-      return given(row.ends[k][0]) ? [shown, make("small", {}, `${low} – ${high}`)] : shown;
-    },
-  });
+  const time = (above, k) => {
+    const ends = (row) => row.ends[k].map((end) => (given(end) ? whole(end) : "∞")).join(" – ");
+    const show = (value, row) => [whole(value), given(row.ends[k][0]) ? make("small", {}, ends(row)) : null];
+    const about = `Expected evaluations to ${above} above the best known cost`;
+    return column(`ERT +${above}`, (row) => row.times[k], show, { about });
+  };
   const columns = [
     methodColumn("method"),
-    textColumn("function", "function", (row) => functions.get(row.function)),
-    column("dimension", "dimension", String),
+    textColumn("function", "function", (one) => functions.get(one)),
+    column("dimension", "dimension"),
     ...D.above.map(time),
     figure("reached"),
     figure("above"),
@@ -217,18 +188,20 @@ function runningTimes() {
   ];
   const names = [...functions].sort(([a], [b]) => a - b).map(([one, name]) => [String(one), name]);
   const selects = [
-    ["of-function", "each", names, (row) => row.function],
-    ["of-dimension", "each", dimensions.map((one) => [String(one), String(one)]), (row) => row.dimension],
+    ["of-function", names, (row) => row.function],
+    ["of-dimension", dimensions.map((one) => [String(one), String(one)]), (row) => row.dimension],
   ];
   const rows = D.times.sort((a, b) => a.dimension - b.dimension || a.function - b.function || b.reached - a.reached);
   filtered(selects, rows, (shown) => table($("ert"), columns, shown, { name: "Running times" }));
 }
 
 function failures() {
-  const reasons = (row) => row.reasons.join("; ");
-  const command = (row) => button("command", () => showCommand(row.name, row.command));
-  const columns = [textColumn("cell", "name"), textColumn("why its attempts failed", reasons)];
-  table($("lost"), [...columns, buttonColumn("run again", command)], D.failures, { name: "Failures" });
+  const columns = [
+    textColumn("cell", "name"),
+    textColumn("why its attempts failed", (row) => row.reasons.join("; ")),
+    buttonColumn("run again", (row) => button("command", () => showCommand(row.name, row.command))),
+  ];
+  table($("lost"), columns, D.failures, { name: "Failures" });
 }
 
 function showCommand(title, text) {

@@ -2,7 +2,7 @@
 
 | looking for | file |
 |---|---|
-| the step of the pipeline: path, contours, path; and several passes | smooth.py |
+| the step of the pipeline: path, contours, path | smooth.py |
 | the likeliest path of a root and two legs; which foot stands | path.py |
 | poses, path and build fitted to the contours of the masks | contours.py, kernels.py |
 """

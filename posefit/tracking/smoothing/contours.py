@@ -1,12 +1,12 @@
 """Poses, path and build whose contours are those of the masks, by least squares over all frames at once.
 
-A tracker's estimate is a pose among those that it knows, and a search of each frame shakes. Here every angle gives way
-a little, and smoothly, to where the contours of the masks are, and the build, the same in all frames, with them.
+A tracker's estimate is one of the poses that it knows, and a search in each frame makes it shake. Here every angle
+gives way a little, and smoothly, to the contours of the masks; so does the build, which is the same in all frames.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -26,17 +26,17 @@ from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
 from posefit.tracking.smoothing import kernels
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
 
-FINE_PIXELS = 80.0  # pixels of a metre; of finer masks every second pixel, third, ... is looked at
-FIELD_MARGIN = 48  # pixels around a mask that know how far they are from it
-POINT_SPACING = 12.0  # millimetres, about, of the border between two points of it
+FINE_PIXELS = 80.0  # pixels of a metre; of finer masks only every second pixel, third, ... is used
+FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
 
+BoneSums = tuple[Array, Array]  # (T, 27, 6, 6) and (T, 27, 6, 1 + F)
 Distances = NDArray[np.float32]
 Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class MaskContours:
-    """What one camera knows of the border in T frames; a frame that shows too little has no points."""
+    """What one camera shows of the border in T frames; a frame that shows too little has no points."""
 
     camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
     metres: Array  # (T,) pixels of a metre where the person is
@@ -48,14 +48,19 @@ class MaskContours:
     starts: Integers = field(repr=False)  # (T + 1,) where the points of each frame begin
 
     @classmethod
-    def of(cls, camera: Camera, view: int, observations: Sequence[Observation], places: Array) -> Self:
-        """Return the borders that a camera, number `view`, saw of a person whose root is about at `places` (T, 3)."""
+    def of(
+        cls, camera: Camera, view: int, observations: Sequence[Observation], places: Array, spacing: float = 0.0
+    ) -> Self:
+        """Return the borders of a person whose root is about at `places` (T, 3), from a camera, number `view`.
+
+        Points are about `spacing` metres apart, but at least a pixel.
+        """
         far = np.maximum(camera.project(places)[1], 0.1)
         metres = np.sqrt(camera.focal.prod()) / far
         factor = max(int(np.median(metres) / FINE_PIXELS), 1)
         factor = min(factor, camera.width, camera.height)
         camera, metres = coarser_camera(camera, factor), metres / factor
-        step = max(int(np.median(metres) * POINT_SPACING / 1e3), 1)
+        step = max(round(float(np.median(metres)) * spacing), 1)
         traced = [_border(observation, view, factor, step) for observation in observations]
         points, corners, distances = zip(*traced, strict=True)
         sizes = np.array([part.shape for part in distances])
@@ -65,6 +70,12 @@ class MaskContours:
         starts = np.cumsum([0, *map(len, points)])
         return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
 
+    def add(self, body: Body, frames: Array, scale: float, grown: tuple[Array, Array, Array], out: BoneSums) -> None:
+        """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
+        camera = tuple(writeable(getattr(self.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
+        contours = self.fields, self.corners, self.sizes, self.points, self.starts, self.step
+        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, out)
+
 
 def _border(observation: Observation, view: int, factor: int, step: int) -> tuple[Array, tuple[int, int], Distances]:
     """Return every `step`th point of a mask's border (n, 2), and the corner and the distances about it."""
@@ -72,9 +83,8 @@ def _border(observation: Observation, view: int, factor: int, step: int) -> tupl
     if not observation.usable:
         return nothing
     silhouette, first = observation.silhouettes[view], factor // 2
-    mask, valid = (
-        np.ascontiguousarray(one[first::factor, first::factor]) for one in (silhouette.mask, silhouette.valid)
-    )
+    pictures = silhouette.mask, silhouette.valid
+    mask, valid = (np.ascontiguousarray(picture[first::factor, first::factor]) for picture in pictures)
     mask = without_small_pieces(mask)
     left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
     right, bottom = left + width + FIELD_MARGIN, top + height + FIELD_MARGIN
@@ -100,6 +110,46 @@ def _between(mask: Mask, around: Mask) -> Array:
     return np.column_stack([columns + 1.0, rows + 0.5])
 
 
+class ContourSquares(NamedTuple):
+    """Half the second derivatives and half the gradients of the squared distances between borders.
+
+    They are by n numbers of each frame, the root's place and the free angles, and by F factors of the build.
+    """
+
+    curves: Array  # (T, n, n)
+    slopes: Array  # (T, n)
+    mixed: Array  # (T, n, F) second derivatives by numbers and factors
+    factor_curve: Array  # (F, F) over all frames
+    factor_slope: Array  # (F,)
+
+
+def contour_squares(
+    body: Body,
+    views: Sequence[MaskContours],
+    poses: Array,
+    places: Array,
+    scale: float,
+    grown: tuple[Array, Array] | None = None,
+) -> ContourSquares:
+    """Return the squares of the distances between the borders of masks and those of a body in T poses at places.
+
+    Views have T frames, or one that all poses belong to. Distances beyond `scale` metres count less. `grown` is the
+    `growth` of the body; without it there are no factors.
+    """
+    skeleton, count = body.skeleton, len(poses)
+    wider, larger = grown or (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
+    factors = len(larger)
+    placed = skeleton.frames(poses, places)
+    by_factors = np.zeros((1 + factors, 1 + factors))
+    bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
+    for view in views:
+        view.add(body, placed[0], scale, (wider, larger, by_factors), bones)
+    free = np.flatnonzero(np.append([True] * 3, skeleton.free))
+    curves, slopes = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
+    kernels.add_all_bones(skeleton.chain, placed, bones, free, (curves, slopes))
+    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], by_factors[1:, 1:], by_factors[1:, 0])
+
+
 DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
 
 
@@ -107,23 +157,23 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     """Return how joints (T, 17, 27, 3) and radii (17, 26, 2), metres, change with the logarithms of factors."""
     bodies = [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
     here = motion.joints
-    joints = [one.skeleton.joints(motion.poses, motion.translations) - here for one in bodies]
-    return np.stack(joints, axis=1) / DIFFERENCE, np.stack([one.radii - body.radii for one in bodies]) / DIFFERENCE
+    joints = [grown.skeleton.joints(motion.poses, motion.translations) - here for grown in bodies]
+    return np.stack(joints, axis=1) / DIFFERENCE, np.stack([grown.radii - body.radii for grown in bodies]) / DIFFERENCE
 
 
-# metres, step by step: what is farther off counts less, and at last is another person's, or a bag's
+# metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
 ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
 ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
 MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
-BUILD_FRAMES = 2.0  # for each of which the build is held once more: errors of contours are correlated, and add up
+BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
 WINDOW_FRAMES, OVERLAP_FRAMES = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A window of a track, as far as it is fitted."""
+    """A window of a track, before its fit or after some of its steps."""
 
     estimate: Motion  # before it is fitted
     fitted: Motion
@@ -140,7 +190,7 @@ def fit_contours(
     """Return a steady motion fitted to the borders of a scene's masks, and the build fitted with it.
 
     The build stays as it is where it was not fitted before (`shape` is None): it is then known. That of a long
-    track is fitted in the window with most usable frames. A result that costs more than its start is not kept. A
+    track is fitted in the window with most usable frames. A result that costs more than its start is discarded. A
     motion of fewer than 3 frames is returned as it is.
     """
     if len(motion) < 3 or not visibility.usable.any():
@@ -155,9 +205,9 @@ def fit_contours(
             fitted[best] = part
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for k, (rows, kept) in enumerate(parts):
+    for k, (rows, inner) in enumerate(parts):
         part = fitted.get(k) or _fitted(scene, motion, visibility, rows, body, None, beta)
-        poses[rows[kept]], places[rows[kept]] = part.fitted.poses[kept], part.fitted.translations[kept]
+        poses[rows[inner]], places[rows[inner]] = part.fitted.poses[inner], part.fitted.translations[inner]
     return replace(motion, skeleton=body.skeleton, poses=poses, translations=places), shape
 
 
@@ -170,7 +220,7 @@ def _fitted(
     shape: Shape | None,
     beta: float,
 ) -> _Part:
-    """Return some frames of a motion as the best step fits them; the build too where there is a shape to begin with."""
+    """Return some frames of a motion as the best step fits them, with the build where there is a shape to fit."""
     estimate = replace(motion, skeleton=body.skeleton, poses=motion.poses[rows], translations=motion.translations[rows])
     observations = [scene.observations[k] for k in rows.tolist()]
     places = estimate.translations
@@ -195,49 +245,34 @@ def _mean_cost(scene: Scene, part: _Part, observations: Sequence[Observation], b
 
 
 def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Part:
-    """Return a window one step of Gauss and Newton farther, towards the borders of all views."""
-    count, factors, skeleton = len(part.fitted), len(part.factors), part.fitted.skeleton
-    angles = np.flatnonzero(skeleton.free).tolist()
-    numbers, poses, places = 3 + len(angles), part.fitted.poses, part.fitted.translations
-    grown = np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2))
-    if factors:
-        grown = growth(part.body, part.height, part.fitted)
-    frames, sines, cosines = skeleton.frames(poses, places)
-    by_factors = np.zeros((1 + factors, 1 + factors))
-    bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
-    for view in borders:
-        camera = tuple(writeable(getattr(view.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
-        contours = view.fields, view.corners, view.sizes, view.points, view.starts, view.step
-        drawn = skeleton.chain.parents, part.body.radii, camera, frames
-        kernels.add_frames(*drawn, contours, scale, (*grown, by_factors), bones)
-    sums = np.empty((count, kernels.NUMBERS, kernels.NUMBERS)), np.empty((count, kernels.NUMBERS, 1 + factors))
-    kernels.add_all_bones(skeleton.chain, frames, sines, cosines, *bones, *sums)
-    slope, curve = by_factors[1:, 0], by_factors[1:, 1:]
-    free = [0, 1, 2, *(3 + angle for angle in angles)]
-    curves, slopes, mixed = sums[0][:, free][:, :, free], sums[1][:, free, 0], sums[1][:, free, 1:]
-    fitted, estimate, turns, spread = part.fitted, part.estimate, np.zeros(factors), part.spread
-    squares, some = Squares(count, numbers), slice(3, numbers)
+    """Return a window after a step of Gauss and Newton to the borders of all views."""
+    fitted, estimate, factors, spread = part.fitted, part.estimate, len(part.factors), part.spread
+    angles = np.flatnonzero(fitted.skeleton.free).tolist()
+    poses, places, numbers = fitted.poses, fitted.translations, 3 + len(angles)
+    grown = growth(part.body, part.height, fitted) if factors else None
+    curves, slopes, mixed, curve, slope = contour_squares(part.body, borders, poses, places, scale, grown)
+    squares, some, changes = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
     squares.add(slice(None), curves, slopes)
     add_root(squares, estimate, part.visibility, ROOT_DEVIATION, places - estimate.translations)
     change = wrapped(poses - estimate.poses)[:, angles]
     squares.add(some, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
     squares.add_bends(some, change, fitted.fps**2 / ANGLE_ACCELERATION)
-    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.eyes), angles)
+    add_standing(squares, fitted, standing_feet(fitted.joints, fitted.fps, part.visibility.viewpoints), angles)
     if not factors:
-        way = squares.least()
+        steps = squares.least()
     else:
         solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
-        way, answers = solved[..., 0], solved[..., 1:]
+        steps, by_factor = solved[..., 0], solved[..., 1:]
         held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
         known = held / SPREAD**2
-        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, answers)
-        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, way)
-        turns = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
-        turns = part.factors - np.clip(part.factors - turns, -REACH * SPREAD, REACH * SPREAD)
-        way = way - answers @ turns
+        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, by_factor)
+        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, steps)
+        changes = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
+        changes = part.factors - np.clip(part.factors - changes, -REACH * SPREAD, REACH * SPREAD)
+        steps = steps - by_factor @ changes
         spread = np.sqrt(held * np.diag(np.linalg.inv(curve)))
     poses = poses.copy()
-    poses[:, angles] -= np.clip(way[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    body = shaped(part.body, np.exp(-turns), part.height) if factors else part.body
-    fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - way[:, :3])
-    return replace(part, fitted=fitted, body=body, factors=part.factors - turns, spread=spread)
+    poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
+    body = shaped(part.body, np.exp(-changes), part.height) if factors else part.body
+    fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3])
+    return replace(part, fitted=fitted, body=body, factors=part.factors - changes, spread=spread)

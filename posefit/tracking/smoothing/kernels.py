@@ -100,21 +100,21 @@ def _nearest_bone(x, y, first, cones, discs):
 
 
 @jit
-def _write_beside(bone, discs, beside):
-    """Write the other bones whose discs meet that of a bone, and return how many there are."""
+def _write_neighbours(bone, discs, neighbours):
+    """Write the other bones whose discs meet that of a bone, and return how many they are."""
     count = 0
     for b in range(discs.shape[0]):
         reach = discs[b, 2] + discs[bone, 2]
         off = (discs[b, 0] - discs[bone, 0]) ** 2 + (discs[b, 1] - discs[bone, 1]) ** 2
         if b != bone and off < reach * reach:
-            beside[count] = b
+            neighbours[count] = b
             count += 1
     return count
 
 
 @jit
-def _covered(x, y, beside, cones, discs):
-    for b in beside:
+def _covered(x, y, neighbours, cones, discs):
+    for b in neighbours:
         if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[b, 2]:
             ox, oy, radius = _from_cone(x, y, cones[b])
             if radius > COVERED and ox * ox + oy * oy < (radius - COVERED) ** 2:
@@ -123,16 +123,16 @@ def _covered(x, y, beside, cones, discs):
 
 
 @jit
-def pull(parents, centres, radii, contour, scale, blocks, slopes):
-    """Add the squares of what points (n, 2) of the mask's border are off the body's, and the body's off the mask's.
+def add_pulls(parents, centres, radii, contour, scale, blocks, slopes):
+    """Add the squares of the distances of the mask's border from the body's, and of the body's from the mask's.
 
-    `contour` is as in `add_view`. Those of a bone go to its own 6 x 6 half of a second derivative, and half of a
-    gradient: of where its two joints are, column and row, and of both radii.
+    `contour` is as in `add_view`. Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient:
+    by the column and row of its two joints, and by both radii.
     """
     field, corner, size, points, step = contour
     cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
     _write_cones(parents, centres, radii, cones, discs)
-    bone, beside = 0, np.empty(parents.size, np.int64)
+    bone, neighbours = 0, np.empty(parents.size, np.int64)
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         bone = _nearest_bone(x, y, bone, cones, discs)
@@ -151,7 +151,7 @@ def pull(parents, centres, radii, contour, scale, blocks, slopes):
         if length <= abs(r0 - r1) + TINY:
             continue
         dx, dy = dx / length, dy / length
-        others = beside[: _write_beside(b, discs, beside)]
+        others = neighbours[: _write_neighbours(b, discs, neighbours)]
         cosine = (r0 - r1) / length
         sine = math.sqrt(1.0 - cosine * cosine)
         tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
@@ -181,10 +181,10 @@ def pull(parents, centres, radii, contour, scale, blocks, slopes):
                 continue
             u, v = column - left, row - top
             upper, lower = field[top], field[top + 1]
-            one, two, three, four = upper[left], upper[left + 1], lower[left], lower[left + 1]
-            off = (one * (1.0 - u) + two * u) * (1.0 - v) + (three * (1.0 - u) + four * u) * v
-            across = (two - one) * (1.0 - v) + (four - three) * v
-            down = (three - one) * (1.0 - u) + (four - two) * u
+            f00, f01, f10, f11 = upper[left], upper[left + 1], lower[left], lower[left + 1]
+            off = (f00 * (1.0 - u) + f01 * u) * (1.0 - v) + (f10 * (1.0 - u) + f11 * u) * v
+            across = (f01 - f00) * (1.0 - v) + (f11 - f10) * v
+            down = (f10 - f00) * (1.0 - u) + (f11 - f01) * u
             weight = stands / (1.0 + (off / scale) ** 2)
             _add(blocks[b], slopes[b], share, across, down, across * nx + down * ny, off, weight)
 
@@ -219,7 +219,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
     for b in range(bones):
         wide[b, 0], wide[b, 1] = depth[parents[b]] * radii[b, 0], depth[b + 1] * radii[b, 1]
     blocks, slopes = np.zeros((bones, 6, 6)), np.zeros((bones, 6))
-    pull(parents, centres, wide, contour, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes)
+    add_pulls(parents, centres, wide, contour, max(reach * metres, MIN_ROBUST_SCALE), blocks, slopes)
     deviation = BORDER_DEVIATION**2 + (PIXEL_DEVIATION / metres) ** 2
     worth = 1.0 / (metres**3 * CORRELATION_LENGTH * deviation)
     rows, turned = np.empty((6, 6)), np.empty((6, 6))
@@ -372,29 +372,38 @@ def add_frames(parents, radii, camera, frames, contours, reach, grown, out):
     """Add the squares of one view of T frames, with joints (T, 27, 4, 3), to those of the bones, see `add_view`.
 
     `contours` are the fields (T, h, w), corners and sizes (T, 2), points and starts (T + 1,) of `MaskContours`, and the
-    pixels that a point stands for; `grown` is as in `add_view`, its joints (T, F, 27, 3). `out` is curves
-    (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
+    pixels that a point stands for, or those of one frame that all T meet; `grown` is as in `add_view`, its joints
+    (T, F, 27, 3). `out` is curves (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
     """
     fields, corners, sizes, points, starts, step = contours
     wider, larger, growth = grown
     curves, forces = out
-    for k in range(len(frames)):
+    for i in range(len(frames)):
+        k = min(i, len(starts) - 2)
         if starts[k] < starts[k + 1]:
             contour = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step
-            grows, sums = (wider[k], larger, growth), (curves[k], forces[k])
-            add_view(parents, radii, camera, frames[k], contour, reach, grows, sums)
+            grows, sums = (wider[i], larger, growth), (curves[i], forces[i])
+            add_view(parents, radii, camera, frames[i], contour, reach, grows, sums)
 
 
 @jit
-def add_all_bones(chain, frames, sines, cosines, curves, forces, matrices, slopes):
-    """Write `add_bones` of T frames, which `place_frames` wrote.
+def add_all_bones(chain, placed, bones, free, out):
+    """Write what `add_bones` sums up in T frames, of those numbers of a frame, `free` (m,), that may change.
 
-    They go to matrices (T, 69, 69) and slopes (T, 69, 1 + F).
+    `placed` are frames, sines and cosines of `place_frames`, and `bones` curves and forces. `out` are second
+    derivatives (T, m, m) and gradients with derivatives by factors (T, m, 1 + F).
     """
-    screws = np.empty((NUMBERS, 6))
+    frames, sines, cosines = placed
+    curves, forces = bones
+    matrices, slopes = out
+    all_screws, screws = np.empty((NUMBERS, 6)), np.zeros((NUMBERS, 6))
+    matrix, slope = np.empty((NUMBERS, NUMBERS)), np.empty((NUMBERS, slopes.shape[2]))
     for k in range(len(frames)):
-        write_screws(chain, frames[k], sines[k], cosines[k], screws)
-        add_bones(chain, screws, curves[k], forces[k], matrices[k], slopes[k])
-        for a in range(NUMBERS):
-            for c in range(a):
-                matrices[k, c, a] = matrices[k, a, c]
+        write_screws(chain, frames[k], sines[k], cosines[k], all_screws)
+        for a in free:
+            screws[a] = all_screws[a]
+        add_bones(chain, screws, curves[k], forces[k], matrix, slope)
+        for i in range(len(free)):
+            slopes[k, i] = slope[free[i]]
+            for j in range(i + 1):
+                matrices[k, i, j] = matrices[k, j, i] = matrix[free[i], free[j]]

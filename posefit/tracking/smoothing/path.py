@@ -1,7 +1,7 @@
 """The likeliest path of a root and two legs, by least squares over all frames at once.
 
 Each frame pulls the root to its estimate, weighted by how well that is known; accelerations cost; and standing feet
-do not move. The legs give way a little, so that they do not.
+should not move, for which the legs give way a little.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ from posefit.arrays import Array
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import turns_of
 from posefit.motion.motion import Motion
-from posefit.motion.steadiness import BALLS, runs
+from posefit.motion.steadiness import BALLS, low, runs
 from posefit.silhouette.cost import only_camera
 
-BAND_REACH = 2  # frames to either side that a frame meets
+BAND_REACH = 2  # frames to either side that a frame has terms with
 BEND = np.array([1.0, -2.0, 1.0])
 
 
@@ -46,9 +46,9 @@ class Squares:
                 self.curves[second - first, frames, some, some] += weight**2 * BEND[first] * BEND[second]
 
     def add_steps(self, frames: NDArray[np.int64], series: Array, derivatives: Array, weight: float) -> None:
-        """Add the squares of `weight` times what `series` (T, m) goes from some frames to the next ones.
+        """Add the squares of `weight` times the changes of `series` (T, m) from some frames to the next ones.
 
-        `derivatives` (T, m, n) are those of the series, by the numbers of its own frame.
+        `derivatives` (T, m, n) are those of the series by the numbers of the same frame.
         """
         if not len(frames):
             return
@@ -61,11 +61,11 @@ class Squares:
         self.curves[1, frames] -= weight**2 * np.einsum("kmi,kmj->kij", here, there)
 
     def least(self) -> Array:
-        """Return the step (T, n) that is to be taken away from the numbers, so that the sum is least."""
+        """Return the step (T, n) to subtract from the numbers, so that the sum is least."""
         return self.steps_for(self.slopes[..., None])[..., 0]
 
     def steps_for(self, slopes: Array) -> Array:
-        """Return the steps (T, n, m) that would be the least ones, were the slopes each of m others (T, n, m)."""
+        """Return the steps (T, n, m) for each of m other gradients (T, n, m)."""
         from scipy.linalg import solveh_banded
 
         _, count, numbers, _ = self.curves.shape
@@ -84,25 +84,22 @@ class Squares:
 
 STANDING_SPEED = 0.25  # metres a second that a standing foot may seem to move
 STANDING_SPEED_SHARE = 0.45  # of the root's speed, which it may seem to move where that is more
-STANDING_HEIGHT = 0.07  # metres above the lowest place of either foot within a stride, up to which a foot may stand
+STANDING_HEIGHT = 0.07  # metres above the lowest place of either foot within a stride
 STRIDE_SECONDS = 1.2
-MIN_STANCE_SECONDS = 0.12  # seconds that a foot stands at least
-MAX_STANCE_GAP_SECONDS = 0.07  # seconds that it may seem not to, in between
+MIN_STANCE_SECONDS = 0.12
+MAX_STANCE_GAP_SECONDS = 0.07  # in which a foot seems not to stand
 
 
-def standing_feet(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
+def standing_feet(joints: Array, fps: float, viewpoints: Array) -> NDArray[np.bool_]:
     """Return whether the left and the right foot stand (T, 2), of joints (T, 27, 3) whose root moves smoothly.
 
-    A foot that stands is low, and slow beside the root: who walks leaves it behind. y is up. A single camera, at
-    `eyes` (T, 3), sees how slow it is across the line of sight alone; these are NaN where several see it.
+    A foot that stands is low, and slow compared with the root, which a walk moves on. y is up. A single camera, at
+    `viewpoints` (T, 3), shows how slow it is only across the line of sight; these are NaN where several show it.
     """
-    feet, sights = joints[:, BALLS], (joints[:, 0] - eyes)[:, [0, 2]]
+    feet, sights = joints[:, BALLS], (joints[:, 0] - viewpoints)[:, [0, 2]]
     speed, root = (_speeds(places, sights, fps) for places in (feet, joints[:, :1]))
-    reach = max(round(0.5 * STRIDE_SECONDS * fps), 1)
-    heights = feet[..., 1].min(axis=1)
-    lowest = np.array([heights[max(k - reach, 0) : k + reach + 1].min() for k in range(len(joints))])
     slow = speed < np.maximum(STANDING_SPEED, STANDING_SPEED_SHARE * root)
-    stands = slow & (feet[..., 1] < lowest[:, None] + STANDING_HEIGHT)
+    stands = slow & low(feet, fps, STRIDE_SECONDS, STANDING_HEIGHT)
     for side in range(2):
         bridged = ~_without_short(~stands[:, side], MAX_STANCE_GAP_SECONDS * fps)
         stands[:, side] = _without_short(bridged, MIN_STANCE_SECONDS * fps)
@@ -110,28 +107,28 @@ def standing_feet(joints: Array, fps: float, eyes: Array) -> NDArray[np.bool_]:
 
 
 def _speeds(places: Array, sights: Array, fps: float) -> Array:
-    """Return how fast places (T, n, 3) go along the ground (T, n), but for what is along the lines of sight (T, 2).
+    """Return how fast places (T, n, 3) move along the ground (T, n), except along the lines of sight (T, 2).
 
-    A line of NaN takes nothing away.
+    A line of NaN excludes nothing.
     """
-    ways = np.gradient(places[..., [0, 2]], 1.0 / fps, axis=0)
+    velocities = np.gradient(places[..., [0, 2]], 1.0 / fps, axis=0)
     sights = np.nan_to_num(sights / np.maximum(np.linalg.norm(sights, axis=1, keepdims=True), 1e-9))
-    ways = ways - np.einsum("tni,ti->tn", ways, sights)[..., None] * sights[:, None]
-    return np.asarray(np.linalg.norm(ways, axis=2))
+    velocities = velocities - np.einsum("tni,ti->tn", velocities, sights)[..., None] * sights[:, None]
+    return np.asarray(np.linalg.norm(velocities, axis=2))
 
 
 def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
-    """Return flags (T,) of which runs shorter than `least` frames are taken back; those at an end stay."""
-    kept = flags.copy()
+    """Return flags (T,) without runs of fewer than `least` frames, except at either end."""
+    longer = flags.copy()
     for start, stop in runs(flags):
         if stop - start < least and start > 0 and stop < len(flags):
-            kept[start:stop] = False
-    return kept
+            longer[start:stop] = False
+    return longer
 
 
 ROOT_DEVIATION = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
 DEPTH_DEVIATION = 0.004  # of the distance, towards or away from a single camera
-UNSEEN_DEVIATION = 1.0  # metres, in frames that show too little
+UNUSABLE_DEVIATION = 1.0  # metres, in frames that show too little
 ROOT_ACCELERATION = 3.0  # metres a second squared, of the root on each axis
 LEG_DEVIATION = np.radians(3.0)  # that an angle of a leg may be off the estimate
 LEG_ACCELERATION = np.radians(400.0)  # a second squared, of that difference
@@ -150,49 +147,48 @@ class Visibility:
     """Which frames of a motion are usable, and by which camera."""
 
     usable: NDArray[np.bool_]  # (T,)
-    eyes: Array = field(repr=False)  # (T, 3) metres: where the only camera stands that sees it; NaN where several do
+    viewpoints: Array = field(repr=False)  # (T, 3) metres: of the only camera that shows it; NaN where several do
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
         """Return the visibility of the frames of a scene."""
-        usable, eyes = [], []
+        usable, viewpoints = [], []
         for observation in scene.observations:
             only = only_camera(scene.cameras, observation.silhouettes)
             usable.append(observation.usable)
-            eyes.append(np.full(3, np.nan) if only is None else only.position)
-        return cls(np.array(usable), np.array(eyes))
+            viewpoints.append(np.full(3, np.nan) if only is None else only.position)
+        return cls(np.array(usable), np.array(viewpoints))
 
     def at(self, rows: NDArray[np.int64]) -> Self:
         """Return the visibility of some frames."""
-        return replace(self, usable=self.usable[rows], eyes=self.eyes[rows])
+        return replace(self, usable=self.usable[rows], viewpoints=self.viewpoints[rows])
 
 
 def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
-    """Return a motion whose root goes smoothly and whose feet do not slide where they stand.
+    """Return a motion whose root moves smoothly and whose feet do not slide where they stand.
 
-    Only the root's way and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
+    Only the root's path and the angles of the legs change. A motion of fewer than 3 frames is returned as it is.
     """
     if len(motion) < 3:
         return motion
     frames, known = np.arange(len(motion)), np.flatnonzero(visibility.usable)
-    if len(known):  # the root goes straight on where frames show too little
+    if len(known):  # the root moves straight on where frames show too little
         lines = [np.interp(frames, known, line) for line in motion.translations[known].T]
         motion = replace(motion, translations=np.column_stack(lines))
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for rows, kept in windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES):
+    for rows, inner in windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
-        stands, seen = np.zeros((len(part), 2), dtype=bool), visibility.at(rows)
-        smooth = _solved(part, seen, stands)  # of the root alone, which shows which foot stands
-        smooth = _solved(part, seen, standing_feet(smooth.joints, smooth.fps, seen.eyes))
-        poses[rows[kept]], places[rows[kept]] = smooth.poses[kept], smooth.translations[kept]
+        stands, visible = np.zeros((len(part), 2), dtype=bool), visibility.at(rows)
+        smooth = _solved(part, visible, stands)  # of the root alone, which shows which foot stands
+        smooth = _solved(part, visible, standing_feet(smooth.joints, smooth.fps, visible.viewpoints))
+        poses[rows[inner]], places[rows[inner]] = smooth.poses[inner], smooth.translations[inner]
     return replace(motion, poses=poses, translations=places)
 
 
 def windows_over(count: int, size: int, overlap: int) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
-    """Return the frames (n,) of windows over `count` frames, and which of them (n,) are a window's own.
+    """Return the frames (n,) of windows over `count` frames, and which of them (n,) are no neighbour's.
 
-    Each has `size` frames of its own, the last one what is left, and before and after them up to `overlap` that are
-    those of its neighbours.
+    Each has `size` such frames, the last one the rest, and up to `overlap` of its neighbours' before and after them.
     """
     parts = []
     for start in range(0, count, size):
@@ -220,15 +216,15 @@ def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -
 
 
 def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation: float, moved: Array) -> None:
-    """Add the squares of a root `moved` (T, 3) from where a motion has it, which is to be there and to go smoothly.
+    """Add the squares of a root `moved` (T, 3) from its places in a motion, and of its accelerations.
 
-    `deviation` is how many metres it may be off across the line of sight, and where no camera is alone in depth. The
-    root's place is the first three numbers of each frame.
+    `deviation` is how many metres it may be off across the line of sight, and in depth where there are several cameras.
+    The root's place is the first three numbers of each frame.
     """
-    root, across = slice(0, 3), np.where(visibility.usable, deviation, UNSEEN_DEVIATION)
+    root, across = slice(0, 3), np.where(visibility.usable, deviation, UNUSABLE_DEVIATION)
     precision = np.eye(3) / across[:, None, None] ** 2  # (T, 3, 3) the inverse of the covariance
-    alone = np.isfinite(visibility.eyes).all(axis=1)
-    sights = motion.translations[alone] - visibility.eyes[alone]
+    alone = np.isfinite(visibility.viewpoints).all(axis=1)
+    sights = motion.translations[alone] - visibility.viewpoints[alone]
     far = np.maximum(np.linalg.norm(sights, axis=1), 1e-9)
     sights = sights / far[:, None]
     less = 1.0 / np.maximum(DEPTH_DEVIATION * far, across[alone]) ** 2 - 1.0 / across[alone] ** 2
@@ -240,9 +236,9 @@ def add_root(squares: Squares, motion: Motion, visibility: Visibility, deviation
 
 
 def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], angles: Sequence[int]) -> None:
-    """Add the squares of what feet move that stand (T, 2), as a motion goes now.
+    """Add the squares of the steps of feet that stand (T, 2) in a motion.
 
-    The numbers of each frame are the root's place and these angles of it.
+    The numbers of each frame are the root's place and some `angles`.
     """
     legs = [angle for angle in LEGS if angle in angles]
     columns = [3 + angles.index(angle) for angle in legs]
@@ -253,8 +249,8 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
     joints = motion.joints
     for side, ball in enumerate(BALLS):
         feet = joints[:, ball]
-        ways = np.zeros((*feet.shape, 3 + len(angles)))
-        ways[..., :3] = np.eye(3)
-        ways[..., columns] = np.moveaxis((there[:, :, ball] - feet) / DIFFERENCE, 0, 2)
+        derivatives = np.zeros((*feet.shape, 3 + len(angles)))
+        derivatives[..., :3] = np.eye(3)
+        derivatives[..., columns] = np.moveaxis((there[:, :, ball] - feet) / DIFFERENCE, 0, 2)
         both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
-        squares.add_steps(both, feet, ways, motion.fps / (30.0 * STANDING_SLIDE))
+        squares.add_steps(both, feet, derivatives, motion.fps / (30.0 * STANDING_SLIDE))

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from posefit.errors import printable
+from posefit.evaluation.measures import BASELINES, MEASURES
+from posefit.evaluation.trust import trust_line
 from posefit.reading import counted
-from posefit.tracking.measures import BASELINES, MEASURES
-from posefit.tracking.trust import trust_line
 
 MIN_BUILD_CHANGE = 0.05  # a part of the build that is off the average by less is not worth a word
 WIDTH = 30  # of the names
@@ -50,14 +50,14 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(f"{', '.join(shown)} of frames")
     lines += filter(None, [held_frames(summary), undetermined(summary)])
     lines += [gait_line(summary["gait"])] if summary["frames"] > 1 else []
-    if (body := summary["body"]) is not None:
+    if (build := summary["build"]) is not None:
         parts = [
-            f"{name} {factor:.2f} +- {body['spread'][name]:.2f}"
-            for name, factor in body["factors"].items()
+            f"{name} {factor:.2f} +- {build['spread'][name]:.2f}"
+            for name, factor in build["factors"].items()
             if abs(factor - 1.0) >= MIN_BUILD_CHANGE
         ]
         lines.append(
-            f"build: {body['stature']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
+            f"build: {build['stature_m']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
         )
     if summary["camera"] == "guessed":
         lines.append(

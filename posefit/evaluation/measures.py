@@ -1,15 +1,12 @@
 """The figures that say what a track is worth, each defined once: its name, label, unit, digits and meaning.
 
 `Measures` are those of a whole track: summary.json, `--json`, the rows of a sweep, its CSV and the report's columns
-have them under these names. `FRAME` are the columns of frames.csv, one value a frame; all are numbers, and in the rows
-of a track, but the activity. Where the truth is unknown, a figure that needs it is None.
+have them under these names. Where the truth is unknown, a figure that needs it is None.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any
-
-Rows = Sequence[Mapping[str, float]]  # one a frame, by the names of `FRAME`
 
 # Trivial methods that a track is held against, and how a table calls them. All have the true root and translation.
 BASELINES = {
@@ -132,42 +129,14 @@ class Measures:
     prior_floor_degrees: float | None = _figure(
         "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
     )
-    seconds_per_frame: float = _figure("time", "ms a frame", 1, "wall time a frame", 1e3)
-    cpu_seconds_per_frame: float | None = _figure(
-        "CPU time",
-        "ms a frame",
-        1,
-        "of all threads, where a tracker reports it; a busy machine does not add to it",
-        1e3,
+    seconds_per_frame: float = _figure(
+        "time", "ms a frame", 1, "wall time from the first mask read to the last pose smoothed, over the frames", 1e3
+    )
+    cpu_seconds_per_frame: float = _figure(
+        "CPU time", "ms a frame", 1, "the same in CPU time of all threads; a busy machine does not add to it", 1e3
     )
     evaluations: int = _figure("evaluations", "", 0, "poses whose cost was computed, in all frames together")
-    evaluations_per_second: float = _figure("speed", "poses a second", 0, "evaluations over the time they took")
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the figures by name, as JSON holds them."""
-        return asdict(self)
+    evaluations_per_second: float = _figure("speed", "poses a second", 0, "evaluations over that time")
 
 
 MEASURES = {figure.name: Measure(figure.name, *figure.metadata["measure"]) for figure in fields(Measures)}
-FRAME = {
-    measure.name: measure
-    for measure in (
-        Measure("frame", "frame", "", 0, "number of the frame, from 0"),
-        Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
-        Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
-        Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
-        Measure("error_degrees", "error", "degrees", 2, "mean absolute difference of the 66 angles. SAPSO (8)"),
-        Measure("geodesic_degrees", "geodesic", "degrees", 2, "mean angle between true and estimated rotations"),
-        Measure("mpjpe_mm", "MPJPE", "mm", 0, "mean distance of the 27 joints, both roots at one point"),
-        Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
-        Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
-        Measure(
-            "unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where not estimated"
-        ),
-        Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
-        Measure("interval_mm", "80 % interval", "mm", 0, "its radius, the mean over joints; blank where not estimated"),
-        Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
-        Measure("seconds", "time", "ms", 1, "wall time", 1e3),
-        Measure("activity", "activity", "", 0, "what the person does, a word; blank where not estimated"),
-    )
-}

@@ -1,67 +1,95 @@
-"""What a track is worth: its errors, beside those of trivial baselines."""
+"""What a track is worth: its errors beside those of trivial baselines, frame by frame and as a whole.
 
-from collections.abc import Mapping, Sequence
+`FRAME` are the columns of frames.csv: a column is a line there, and its values in `evaluated`.
+"""
+
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.evaluation.measures import Measure, Measures, Spread
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import Skeleton
 from posefit.motion.steadiness import acceleration, slides, standing
 from posefit.silhouette.cost import BETA, areas, mismatch
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.measures import Measures, Spread
-from posefit.tracking.trajectory import effort_of, motion_of
-from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL
+from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, reliability
 from posefit.uncertainty.intervals import joint_intervals
-from posefit.uncertainty.modes import unknown_sides
+from posefit.uncertainty.modes import likeliest_is_right, nearer_mirrored, unknown_sides
 
 MAX_FULL_SIZE_POSES = 8_000  # training poses, more than which are not all drawn at full size in every frame
 SMALL_STRIDE = 4  # of so many poses each is drawn in a small picture
 FULL_SIZE_CANDIDATES = 200  # of these are drawn at full size, with their neighbours in the clip
 MIN_SMALL_SIDE, MAX_SMALL_FACTOR = 60, 4  # pixels of a small picture's side, and by how much it is smaller
 LOST = 0.5  # the probability of a frame to be lost from which on it is called so
+MAX_TRACE_POINTS = 64
 
 
-def unseen(rows: Sequence[Mapping[str, float]]) -> set[int]:
-    """Return the numbers of the frames that were held or are called lost, whose places no table has."""
-    return {k for k, row in enumerate(rows) if not row["usable"] or row["lost"] >= LOST}
+FRAME = {
+    measure.name: measure
+    for measure in (
+        Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
+        Measure("seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"),
+        Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
+        Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
+        Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
+        Measure("error_degrees", "error", "degrees", 2, "mean absolute difference of the 66 angles. SAPSO (8)"),
+        Measure("geodesic_degrees", "geodesic", "degrees", 2, "mean angle between true and estimated rotations"),
+        Measure("mpjpe_mm", "MPJPE", "mm", 0, "mean distance of the 27 joints, both roots at one point"),
+        Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
+        Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
+        Measure(
+            "unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where not estimated"
+        ),
+        Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
+        Measure("interval_mm", "80 % interval", "mm", 0, "its radius, the mean over joints; blank where not estimated"),
+        Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
+        Measure("wall_seconds", "time", "ms", 1, "that the estimate took, since that of the frame before", 1e3),
+        Measure("activity", "activity", "", 0, "what the person does, a word; blank where not estimated"),
+    )
+}
+Table = dict[str, Array]  # (T,) a column, by the names of `FRAME`; NaN where a value is unknown
+
+
+def unseen(table: Table) -> set[int]:
+    """Return the numbers of the frames that were held or are called lost, whose places no file has."""
+    return set(np.flatnonzero((table["usable"] == 0.0) | (table["lost"] >= LOST)).tolist())
 
 
 def evaluated(
-    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float
-) -> tuple[list[dict[str, float]], Measures]:
-    """Return a row for each frame, as `measures.FRAME` names its columns, and what the whole track is worth.
+    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float, clock: Array
+) -> tuple[Table, Measures]:
+    """Return a column for each figure of a frame, and what the whole track is worth.
 
     Baselines have the true root and translation, which a tracker has not: `mean_pose`, the mean of the training poses
     (n, 63); `persistence`, the true pose of the first frame; `nearest`, the training pose of least cost in each frame.
-    `prior_floor` is the truth's own projection into the prior, which is no floor where a prior is not linear.
+    `prior_floor` is the truth's own projection into the prior, which is no floor where a prior is not linear. `clock`
+    (2,) is how many seconds and CPU seconds the track took.
     """
-    frames_held, ious, nearest_poses = [], [], []
-    for k, (frame, observation) in enumerate(zip(frames, scene.observations, strict=True)):
-        frames_held.append(not observation.usable)
-        known = [silhouette.known for silhouette in observation.silhouettes]  # by a camera that saw something
-        ious.append(float(metrics.iou(frame.areas)[known if any(known) else slice(None)].mean()))
-        if scene.truth is not None:
-            nearest_poses.append(nearest(scene, training, k, observation, beta))
-    held, iou, cost = np.array(frames_held), np.array(ious), np.array([frame.cost for frame in frames])
+    held = np.array([not observation.usable for observation in scene.observations])
+    cost, iou = np.array([frame.cost for frame in frames]), _iou(scene, frames)
     usable = np.ones(len(frames), dtype=bool) if held.all() else ~held
-    errors, error_measures = _errors(scene, frames, prior, training, np.array(nearest_poses))
+    errors, error_measures = _errors(scene, frames, prior, training, beta)
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
-    columns: dict[str, Any] = {
+    evaluations = np.array([float(frame.evaluations) for frame in frames])
+    table = {
+        "frame": scene.first + np.arange(len(frames)),
+        "seconds": (scene.first + np.arange(len(frames))) / scene.fps,
         "cost": cost,
         "iou": iou,
-        "usable": ~held,
+        "usable": 1.0 - held,
         **errors,
         **certainty,
-        "evaluations": [frame.evaluations for frame in frames],
-        "seconds": [frame.seconds for frame in frames],
+        "evaluations": evaluations,
+        "wall_seconds": np.array([frame.seconds for frame in frames]),
     }
-    effort = effort_of(frames)
+    seconds, cpu_seconds = clock.tolist()
     measures = Measures(
         **error_measures,
         **certainty_measures,
@@ -69,32 +97,38 @@ def evaluated(
         iou=float(iou[usable].mean()),
         cost=float(cost[usable].mean()),
         held_frames=int(held.sum()),
-        seconds_per_frame=effort["seconds"] / len(frames),
-        cpu_seconds_per_frame=None if effort["cpu_seconds"] is None else effort["cpu_seconds"] / len(frames),
-        evaluations=effort["evaluations"],
-        evaluations_per_second=effort["evaluations"] / max(effort["seconds"], 1e-9),  # a plugin may report 0
+        seconds_per_frame=seconds / len(frames),
+        cpu_seconds_per_frame=cpu_seconds / len(frames),
+        evaluations=int(evaluations.sum()),
+        evaluations_per_second=float(evaluations.sum()) / seconds,
     )
-    rows = [
-        {"frame": scene.first + k, **{name: float(v[k]) for name, v in columns.items()}} for k in range(len(frames))
-    ]
-    return rows, measures
+    return table, measures
+
+
+def _iou(scene: Scene, frames: Sequence[Frame]) -> Array:
+    """Return the overlaps (T,) of body and mask: the means over the cameras that saw something."""
+    overlaps = []
+    for frame, observation in zip(frames, scene.observations, strict=True):
+        known = [silhouette.known for silhouette in observation.silhouettes]
+        overlaps.append(float(metrics.iou(frame.areas)[known if any(known) else slice(None)].mean()))
+    return np.array(overlaps)
 
 
 def _errors(
-    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, nearest_poses: Array
-) -> tuple[dict[str, Array], dict[str, Any]]:
+    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float
+) -> tuple[Table, dict[str, Any]]:
     """Return the columns and the measures that need a truth; none where it is unknown."""
     if scene.truth is None:
         return {}, {}
     truth, places, skeleton = scene.truth.poses, scene.truth.translations, scene.body.skeleton
-    estimate = motion_of(scene, frames)
+    estimate = scene.motion(frames)
     poses, joints, true_joints = estimate.poses, estimate.joints, scene.truth.joints  # the given body may be another
     columns = {
         "error_degrees": metrics.pose_error_degrees(truth, poses),
         "geodesic_degrees": metrics.geodesic_degrees(truth, poses),
         "mpjpe_mm": metrics.mpjpe_mm(true_joints, joints),
         "pa_mpjpe_mm": metrics.pa_mpjpe_mm(true_joints, joints),
-        "swapped": metrics.swapped(true_joints, joints).astype(np.float64),
+        "swapped": nearer_mirrored(true_joints, joints).astype(np.float64),
     }
     means = {name: float(values.mean()) for name, values in columns.items()}
     errors = columns["error_degrees"]
@@ -108,7 +142,7 @@ def _errors(
     trivial = {
         "mean_pose": with_root(training.mean(axis=0)),
         "persistence": np.tile(truth[0], (len(truth), 1)),
-        "nearest": nearest_poses,
+        "nearest": np.array([nearest(scene, training, k, each, beta) for k, each in enumerate(scene.observations)]),
     }
     baselines = {name: error_of(poses) for name, poses in trivial.items()}
     floor = None if prior is None else error_of(with_root(prior.inverse_transform(prior.transform(truth[:, 3:]))))
@@ -128,7 +162,7 @@ def _errors(
     }
 
 
-def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> tuple[dict[str, Array], dict[str, Any]]:
+def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> tuple[Table, dict[str, Any]]:
     """Return the columns and the measures of how certain the method is; NaN in frames where that is unknown."""
     skeleton, truth = scene.body.skeleton, scene.truth
     sides, radius_mm = np.full((2, len(frames)), np.nan)
@@ -163,7 +197,7 @@ def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
 
 def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
     """Return the measures of how joints accelerate and standing feet slide."""
-    joints, fps = motion_of(scene, frames).joints, scene.fps
+    joints, fps = scene.motion(frames).joints, scene.fps
     mean, true_joints = mean_known(acceleration(joints, fps)), None if scene.truth is None else scene.truth.joints
     true_mean = None if true_joints is None else mean_known(acceleration(true_joints, fps))
     slid = slides(joints, standing(joints if true_joints is None else true_joints, fps))
@@ -209,3 +243,30 @@ def _costs(scene: Scene, training: Array, k: int, observation: Observation, beta
             camera, silhouette = coarser_camera(camera, factor), coarser_silhouette(silhouette, factor)
         costs += mismatch(areas(scene.body, camera, silhouette, poses, translations), beta)
     return costs
+
+
+def anytime_trace(frames: Sequence[Frame]) -> dict[str, list[float]]:
+    """Return the anytime trace: after so many `evaluations` of a frame, the best `cost`, the mean over the frames.
+
+    A frame that spent fewer keeps its last cost; frames without a search do not count. There are at most 64 points.
+    """
+    searched = [frame.trace for frame in frames if len(frame.trace)]
+    if not searched:
+        return {"evaluations": [], "cost": []}
+    points = np.unique(np.concatenate([trace[:, 0] for trace in searched]))
+    points = points[points >= max(trace[0, 0] for trace in searched)]  # from where every frame has a cost
+    if len(points) > MAX_TRACE_POINTS:
+        wanted = np.geomspace(points[0], points[-1], MAX_TRACE_POINTS)
+        points = np.unique(points[np.searchsorted(points, wanted * (1.0 - 1e-12))])
+    mean = np.mean([trace[np.searchsorted(trace[:, 0], points, side="right") - 1, 1] for trace in searched], axis=0)
+    return {"evaluations": [int(point) for point in points], "cost": [float(f"{cost:.6g}") for cost in mean]}
+
+
+def mode_reliability(frames: Sequence[Frame], truth: Array, skeleton: Skeleton) -> list[list[float]]:
+    """Return, by bins of how likely each frame's likeliest mode is: frames, mean probability, how often it is right."""
+    weighed = [(frame.modes, joints) for frame, joints in zip(frames, truth, strict=True) if frame.modes]
+    if not weighed:
+        return []
+    right = np.array([likeliest_is_right(skeleton, modes, joints) for modes, joints in weighed])
+    likely = np.array([max(mode.weight for mode in modes) for modes, _ in weighed])
+    return [[count, round(mean, 6), round(share, 6)] for count, mean, share in reliability(likely, right)]

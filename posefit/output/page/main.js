@@ -31,9 +31,11 @@ function frameText(frame) {
   return [`frame ${D.first + frame * D.step} of ${D.first + D.count}, ${number(seconds(frame), 2)} s`, ...figures, ...states].join("; ");
 }
 
+const others = D.cameras.length > 1 ? D.cameras.map(() => make("canvas", { "aria-hidden": "true" })) : [];
 let last = "";
 function paint() {
-  const pictured = paintPicture();
+  const pictured = paintPicture($("picture"), show.camera);
+  others.forEach((canvas, number) => paintPicture(canvas, number));
   paintBody();
   cursors.forEach((move) => move(show.frame));
   const text = frameText(show.frame);
@@ -90,13 +92,14 @@ function player() {
   $("frame").oninput = () => seek(+$("frame").value);
   const speeds = [1, 0.5, 0.25, 0.1].map((speed) => [String(speed), `${speed}×`]);
   choose($("speed"), speeds, "1", () => {});
-  const cameras = D.cameras.map((_, k) => [String(k), String(k + 1)]);
-  choose($("camera"), cameras, "0", () => {
-    show.camera = +$("camera").value;
-    upright();
-    paint();
+  others.forEach((canvas, number) => {
+    const act = () => {
+      show.camera = number;
+      upright();
+      paint();
+    };
+    $("cameras").append(make("button", { type: "button", on: { click: act } }, canvas, `camera ${number + 1}`));
   });
-  $("camera-label").hidden = D.cameras.length < 2;
   $("with-film").parentNode.hidden = !D.film;
   $("with-mask").checked = !D.film;
   $("close-up").checked = closeness(0) > 1.4;

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.evaluation.errors import LOST, Table, mean_known
 from posefit.fitting.tracker import Frame
 from posefit.footage.quality import AROUND, LAG, changed_pixels
 from posefit.footage.scene import Scene
@@ -24,8 +25,6 @@ from posefit.motion.steadiness import BALLS, acceleration, runs, standing
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Mask
-from posefit.tracking.evaluation import LOST, mean_known
-from posefit.tracking.trajectory import motion_of
 from posefit.uncertainty.modes import poses_apart
 
 SMOOTH_SECONDS = 0.5  # before and after a frame, to which a smooth path is fitted
@@ -189,7 +188,7 @@ SIGNS = (
 )
 # How the figures that are known are listed.
 LISTED = {
-    "size_ratio": "size {size_m:.2f} m, given {height_m:.2f} m",
+    "size_ratio": "size {size_m:.2f} m, the fitted body's {height_m:.2f} m",
     "depth_scatter": "distance steady to {depth_scatter:.1%}",
     "foot_share": "a foot stands in {foot_share:.0%} of frames",
     "stance_spread_m": "at heights {stance_spread_m:.2f} m apart",
@@ -241,6 +240,35 @@ def _listed(figures: Mapping[str, Any]) -> str:
     return ", ".join(words.format(**figures) for name, words in LISTED.items() if figures[name] is not None)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Trust:
+    """Whether a track can be trusted: a sentence, a grade, what speaks against it, and every sign; None is unknown."""
+
+    sentence: str
+    grade: Grade
+    against: list[str]
+    frames: int  # that show enough of the person
+    size_ratio: float | None
+    size_m: float | None
+    height_m: float
+    depth_scatter: float | None
+    foot_share: float | None
+    stance_spread_m: float | None
+    explained: float | None
+    lost: float | None
+    unknown: float | None
+    interval_mm: float | None
+    training_mm: float | None
+    frontal: float | None
+    held: float
+    iou: float
+    acceleration: float | None
+    unknown_signs: Mapping[str, str]  # why each is unknown
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
 SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
 FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a person is seen from the front or the back
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
@@ -255,26 +283,25 @@ def trust_of(
     scene: Scene,
     tracked: Sequence[Frame],
     frames: Sequence[Frame],
-    rows: Sequence[Mapping[str, float]],
+    table: Table,
     iou: float,
     training: Sequence[Motion],
-) -> dict[str, Any]:
+) -> Trust:
     """Return whether a track can be trusted: the sentence, the grade, every figure, and why some are not known.
 
     `tracked` are the tracker's frames, and `frames` these in the end, smoothed; `iou` is their overlap with
     the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
-    usable = np.array([row["usable"] == 1.0 for row in rows])
+    usable = table["usable"] == 1.0
     cut = np.array([any(is_cut(view.mask) for view in each.silhouettes) for each in scene.observations])
     many = usable.sum() >= MIN_FRAMES
-    joints, camera, stature = motion_of(scene, frames).joints, scene.cameras[0], scene.body.stature
+    joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
     stands = standing(joints, scene.fps) & usable[:, None]
     walks = many and np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() > STAYS
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     several = len(scene.cameras) > 1
     ratio = _size(scene, frames, usable) if several else None
-    columns = ("lost", "unknown_sides", "interval_mm")
-    lost, unknown, radii = (np.array([row[name] for row in rows])[usable] for name in columns)
+    lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
     figures: dict[str, Any] = {
         "frames": int(usable.sum()),
         "size_ratio": ratio,
@@ -306,13 +333,13 @@ def trust_of(
         "frontal": SEVERAL if several else TOO_FEW,
         "training_mm": SEVERAL if several else "no motion was learned from" if many else TOO_FEW,
     }
-    return {
-        "sentence": sentence(figures, signs),
-        "grade": grade_of(signs),
-        "against": [words for _, words in signs],
+    return Trust(
+        sentence=sentence(figures, signs),
+        grade=grade_of(signs),
+        against=[words for _, words in signs],
+        unknown_signs={name: why for name, why in reasons.items() if figures[name] is None},
         **figures,
-        "unknown_signs": {name: why for name, why in reasons.items() if figures[name] is None},
-    }
+    )
 
 
 def _frontal_share(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:

@@ -16,7 +16,6 @@ from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.rasteriser import NEAR
-from posefit.uncertainty.modes import Mode
 
 BACKGROUND = (28, 24, 22)
 BOTH, MISSED, SPILLED = (186, 214, 168), (90, 90, 235), (235, 160, 70)  # Y, R, B
@@ -105,21 +104,19 @@ def solid_map(body: Body, camera: Camera, pose: Array, translation: Array, solid
     return image / 255.0
 
 
-def draw_other(image: Image, body: Body, camera: Camera, other: Mode | None) -> None:
-    """Draw another mode's bones as thin lines, if there is one; wrists and feet have the colours of their sides."""
-    if other is None:
-        return
-    pixels, depths = camera.project(body.skeleton.joints(other.pose, other.translation))
+def draw_bones(image: Image, body: Body, camera: Camera, pose: Array, translation: Array, colour: Any = None) -> None:
+    """Draw bones as thin lines, of one colour or those of their sides; wrists and feet have the colours of theirs."""
+    pixels, depths = camera.project(body.skeleton.joints(pose, translation))
     thick = max(1, round(camera.height / 240))
     # pixel centres are at +0.5 here, and at whole numbers in OpenCV
     points = np.rint((np.nan_to_num(pixels) - 0.5) * 16).astype(np.int64).tolist()
     for joint, parent in enumerate(PARENTS[1:], 1):
         if min(depths[joint], depths[parent]) > NEAR:
-            cv2.line(image, points[parent], points[joint], OTHER, thick, cv2.LINE_AA, 4)
+            line = SIDE_COLOURS[SIDES[joint]] if colour is None else colour
+            cv2.line(image, points[parent], points[joint], line, thick, cv2.LINE_AA, 4)
     for joint in _ENDS:
         if depths[joint] > NEAR:
-            colour = SIDE_COLOURS[SIDES[joint]]
-            cv2.circle(image, points[joint], 16 * (thick + 1), colour, -1, cv2.LINE_AA, 4)
+            cv2.circle(image, points[joint], 16 * (thick + 1), SIDE_COLOURS[SIDES[joint]], -1, cv2.LINE_AA, 4)
 
 
 def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Iterator[tuple[int, Array, Array, float]]:

@@ -1,5 +1,4 @@
-// The gallery: a card for each instance, and the window that plays its tracks.
-const CARDS = 60; // that are added at a time
+// Small pictures of tracks that move, and the window that plays one.
 const show = { row: null, frame: 0, camera: 0 };
 const pace = ({ step, fps }) => (1000 * step) / fps; // milliseconds of a frame
 const animated = D.animations ? Object.keys(D.animations.tracks).map(Number) : [];
@@ -30,16 +29,22 @@ function stillOf(row) {
   return { scene, track, camera, size: 2.08 * Math.max(...far, 1) };
 }
 
-function paintStill(canvas, { scene, track, camera, size }, time) {
-  const frame = time % scene.frames;
-  const { pen, width, height } = sheet(canvas, 1);
-  const scale = width / size;
-  const [truth, estimate] = [scene.joints(frame), track.joints(frame)].map((points) => projected(camera, points));
-  pen.translate(width / 2 - scale * truth[0][0], height / 2 - scale * truth[0][1]);
-  pen.scale(scale, scale);
-  if (scene.radii.length) silhouette(pen, camera, truth, scene.radii, "--truth", 0.35);
-  else sticks(pen, truth, ink("--truth"), 5 / scale);
-  sticks(pen, estimate, limbs(), 2.2 / scale);
+// Adds a button with a small picture that opens a track; returns what paints its picture at a time.
+function addStill(box, row, ...words) {
+  const canvas = make("canvas", { "aria-hidden": "true" });
+  box.append(button([canvas, make("span", {}, ...words)], () => openTrack(row), { class: "example" }));
+  const { scene, track, camera, size } = stillOf(row);
+  return (time) => {
+    const frame = time % scene.frames;
+    const { pen, width, height } = sheet(canvas, 1);
+    const scale = width / size;
+    const [truth, estimate] = [scene.joints(frame), track.joints(frame)].map((points) => projected(camera, points));
+    pen.translate(width / 2 - scale * truth[0][0], height / 2 - scale * truth[0][1]);
+    pen.scale(scale, scale);
+    if (scene.radii.length) silhouette(pen, camera, truth, scene.radii, "--truth", 0.35);
+    else sticks(pen, truth, ink("--truth"), 5 / scale);
+    sticks(pen, estimate, limbs(), 2.2 / scale);
+  };
 }
 
 function silhouette(pen, camera, pixels, radii, name, opacity) {
@@ -49,30 +54,7 @@ function silhouette(pen, camera, pixels, radii, name, opacity) {
   pen.globalAlpha = 1;
 }
 
-function gallery() {
-  const R = D.rows;
-  const some =
-    `; ${whole(animated.length)} of ${whole(R.key.length)} runs have one, so that this file stays small. ` +
-    "A report of the ledger that a row's command makes shows that row";
-  $("gallery-note").textContent =
-    `Each instance opens an animation and a skeleton that can be turned${animated.length < R.key.length ? some : ""}.`;
-  const error = (row) => R.error[row] ?? Infinity;
-  const best = new Map(); // a row of each instance
-  for (const row of animated.toSorted((a, b) => error(b) - error(a) || b - a)) best.set(R.instance[row], row);
-  const cards = [...best].sort((a, b) => a[0] - b[0]);
-  const add = () => {
-    for (const [instance, row] of cards.splice(0, CARDS)) {
-      const canvas = make("canvas", { "aria-hidden": "true" });
-      const small = make("small", {}, `best: ${METHODS[R.method[row]]}, ${number(R.error[row], 2)}°`);
-      const words = make("span", {}, INSTANCES[instance], small);
-      $("cards").append(button([canvas, words], () => openTrack(row), { class: "card" }));
-      const still = stillOf(row);
-      paintStill(canvas, still, Math.floor(still.scene.frames / 2));
-    }
-    $("more-cards").hidden = !cards.length;
-  };
-  $("more-cards").onclick = add;
-  add();
+function viewer() {
   turnable($("turning"), paint);
   $("frame").oninput = () => {
     play(false);
@@ -90,15 +72,8 @@ function openTrack(row) {
   show.frame = Math.min(show.frame, scene.frames - 1);
   show.camera = Math.min(show.camera, Math.max(scene.cameras.length - 1, 0));
   $("viewer-title").textContent = INSTANCES[R.instance[row]];
-  const methods = [...new Set(here.map((one) => R.method[one]))].sort((a, b) => a - b);
-  const names = methods.map((m) => [String(m), METHODS[m]]);
-  choose($("viewer-method"), names, String(R.method[row]), () => {
-    const same = here.filter((one) => R.method[one] === +$("viewer-method").value);
-    openTrack(same.find((one) => R.seed[one] === R.seed[show.row]) ?? same[0]);
-  });
-  const mine = here.filter((one) => R.method[one] === R.method[row]);
-  const seeds = mine.map((one) => [String(one), String(D.seeds[R.seed[one]])]);
-  choose($("viewer-seed"), seeds, String(row), () => openTrack(+$("viewer-seed").value));
+  const runs = here.map((one) => [String(one), `${METHODS[R.method[one]]}, seed ${D.seeds[R.seed[one]]}`]);
+  choose($("viewer-run"), runs, String(row), () => openTrack(+$("viewer-run").value));
   const cameras = scene.cameras.map((_, k) => [String(k), String(k + 1)]);
   choose($("viewer-camera"), cameras, String(show.camera), () => {
     show.camera = +$("viewer-camera").value;

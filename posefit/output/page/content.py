@@ -5,8 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
+from posefit.evaluation.errors import FRAME, LOST, Table
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.rotation import unwrapped, wrapped
@@ -14,24 +16,21 @@ from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
+from posefit.output.page.stills import Stills
+from posefit.output.picture import MIN_OTHER_WEIGHT
+from posefit.output.text import brief, held_frames, undetermined
 from posefit.page.bodies import camera_from_origin, in_16_bits
-from posefit.tracking.evaluation import LOST
-from posefit.tracking.measures import FRAME, Rows
-from posefit.tracking.page.stills import Stills
-from posefit.tracking.picture import MIN_OTHER_WEIGHT
-from posefit.tracking.table import brief, held_frames, undetermined
-from posefit.tracking.trajectory import motion_of
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
 
 TENTH = 0.1  # degrees: the unit of angles in a page
 UNIT = np.radians(TENTH)
 COLUMN = ("label", "unit", "digits", "factor")  # of a figure, as the page has it
-CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "seconds")
-MARKS: dict[str, Callable[[Mapping[str, float]], bool]] = {
-    "held": lambda row: not row["usable"],
-    "lost": lambda row: row["lost"] >= LOST,
-    "unknown": lambda row: row["unknown_sides"] == 1.0,
+CURVES = ("mpjpe_mm", "error_degrees", "iou", "cost", "pa_mpjpe_mm", "geodesic_degrees", "evaluations", "wall_seconds")
+MARKS: dict[str, Callable[[Table], NDArray[np.bool_]]] = {
+    "held": lambda table: table["usable"] == 0.0,
+    "lost": lambda table: table["lost"] >= LOST,
+    "unknown": lambda table: table["unknown_sides"] == 1.0,
 }
 ANGLE_NAMES = (
     *("root yaw", "root pitch", "root roll"),
@@ -42,24 +41,24 @@ ANGLE_NAMES = (
 def track_data(
     scene: Scene,
     frames: Sequence[Frame],
-    rows: Rows,
+    table: Table,
     summary: dict[str, Any],
     intervals: Mapping[str, Array],
     stills: Stills,
 ) -> dict[str, Any]:
-    """Return the data of the page; `intervals` come from `posefit.tracking.outputs.intervals_of`.
+    """Return the data of the page; `intervals` come from `posefit.output.folder.intervals_of`.
 
     Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
     track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
-    step, estimate = stills.step, motion_of(scene, frames)
+    step, estimate = stills.step, scene.motion(frames)
     joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, estimate.skeleton.free
     true = None if truth is None else truth.joints[::step]
     angles = unwrapped(estimate.poses)[::step]
     worth = "" if truth is None else f": {brief(summary)[0]}"
-    curves = [name for name in CURVES if name in rows[0]]
+    curves = [name for name in CURVES if name in table]
     return {
         "version": __version__,
         "title": str(summary["motion"]),
@@ -82,10 +81,8 @@ def track_data(
         "truth": None if true is None else in_16_bits(true - origin),
         "others": _others(scene, frames[::step], origin),
         "columns": {name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves},
-        "rows": {name: [row[name] for row in rows[::step]] for name in curves},
-        "marks": {
-            name: sorted({k // step for k, row in enumerate(rows) if marked(row)}) for name, marked in MARKS.items()
-        },
+        "rows": {name: table[name][::step].tolist() for name in curves},
+        "marks": {name: np.unique(np.flatnonzero(marked(table)) // step).tolist() for name, marked in MARKS.items()},
         "angles": {
             "names": [name for name, there in zip(ANGLE_NAMES, free, strict=True) if there],
             "values": in_16_bits(angles[:, free], UNIT),

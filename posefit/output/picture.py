@@ -11,12 +11,11 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.evaluation.errors import LOST, Table
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
-from posefit.silhouette.cost import project
-from posefit.silhouette.foreground import Image
-from posefit.tracking.drawing import (
+from posefit.output.drawing import (
     BACKGROUND,
     BOTH,
     LINES,
@@ -25,17 +24,19 @@ from posefit.tracking.drawing import (
     SPILLED,
     blank,
     draw_body,
-    draw_other,
+    draw_bones,
     opacities,
     side_camera,
     solid_map,
     width_of,
     write,
 )
-from posefit.tracking.evaluation import LOST
+from posefit.silhouette.cost import project
+from posefit.silhouette.foreground import Image
 from posefit.uncertainty.calibration import MAIN_LEVEL
 from posefit.uncertainty.modes import Mode, other_mode
 
+Row = Mapping[str, float]  # of a table
 PANEL = 480  # pixels high
 OVERLAP = np.array([BACKGROUND, MISSED, SPILLED, BOTH], dtype=np.uint8)  # of neither, the mask, the body, and both
 SUMMARY_STILLS = 6  # frames on the summary
@@ -61,7 +62,7 @@ class Painter:
         self,
         frame: Frame,
         observation: Observation,
-        row: Mapping[str, float],
+        row: Row,
         filmed: Image | None = None,
         radii: Array | None = None,
     ) -> Image:
@@ -77,7 +78,8 @@ class Painter:
         from_side = side_camera(body, camera, pose, place, PANEL)
         side = blank(PANEL, PANEL)
         draw_body(side, body, from_side, pose, place, solid)
-        draw_other(side, body, from_side, other)
+        if other is not None:
+            draw_bones(side, body, from_side, other.pose, other.translation, OTHER)
         image = np.hstack([left, side])
         if self._count in self._wanted:
             self._stills.append(self._still(image, row))
@@ -87,7 +89,7 @@ class Painter:
         image[:LABEL_HEIGHT] //= 4  # so that the label stands out from a bright sky
         write(image, "   ".join(label), (12, 26))
         write(image, "from the camera's right", (width + 12, 26))
-        if filmed is None:
+        if filmed is None or len(self._scene.cameras) > 1:
             _write_legend(image, PANEL - 14)
         lost = row["lost"] >= LOST
         notes = [("lost", MISSED)] if lost else []
@@ -100,7 +102,7 @@ class Painter:
         self._count += 1
         return image
 
-    def _still(self, image: Image, row: Mapping[str, float]) -> Image:
+    def _still(self, image: Image, row: Row) -> Image:
         """Return a small picture whose words are large enough to be read in a page."""
         still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
@@ -119,32 +121,37 @@ class Painter:
         solid: Array | None = None,
         other: Mode | None = None,
     ) -> Image:
-        """Return the body on what was `filmed`, or on the masks of all cameras, as a picture (height, width, 3)."""
-        body = self._scene.body
-        if filmed is not None:
-            drawn, camera = filmed.copy(), self._scene.cameras[0]
-            draw_body(drawn, body, camera, frame.pose, frame.translation, solid)
-            panel = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), PANEL)
-            draw_other(panel, body, _zoomed(camera, panel), other)
-            return panel
-        panels = []
+        """Return the body on what was `filmed` by the first camera, and on the masks of the others: (height, width, 3).
+
+        On masks its bones show which side is left.
+        """
+        body, pose, place = self._scene.body, frame.pose, frame.translation
         columns = min(2, len(self._scene.cameras))
         height = PANEL // -(-len(self._scene.cameras) // columns)
-        for camera, silhouette in zip(self._scene.cameras, observation.silhouettes, strict=True):
-            mask, fitted = silhouette.mask, project(body, camera, frame.pose, frame.translation)
-            panel = OVERLAP[_panel(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
-            camera = _zoomed(camera, panel)
-            if solid is not None:
-                share = solid_map(body, camera, frame.pose, frame.translation, solid)
-                faint, share = share < 1.0, share[share < 1.0, None]
-                panel[faint] = share * panel[faint] + (1.0 - share) * np.array(BACKGROUND)
-            draw_other(panel, body, camera, other)
+        panels = []
+        for number, camera in enumerate(self._scene.cameras):
+            if filmed is not None and number == 0:
+                drawn = filmed.copy()
+                draw_body(drawn, body, camera, pose, place, solid)
+                panel = _panel(np.asarray(cv2.addWeighted(drawn, SOLID, filmed, 1.0 - SOLID, 0.0), np.uint8), height)
+                zoomed = _zoomed(camera, panel)
+            else:
+                mask, fitted = observation.silhouettes[number].mask, project(body, camera, pose, place)
+                panel = OVERLAP[_panel(mask.view(np.uint8) + 2 * fitted.view(np.uint8), height, sharp=True)]
+                zoomed = _zoomed(camera, panel)
+                if solid is not None:
+                    share = solid_map(body, zoomed, pose, place, solid)
+                    faint, share = share < 1.0, share[share < 1.0, None]
+                    panel[faint] = share * panel[faint] + (1.0 - share) * np.array(BACKGROUND)
+                draw_bones(panel, body, zoomed, pose, place)
+            if other is not None:
+                draw_bones(panel, body, zoomed, other.pose, other.translation, OTHER)
             panels.append(panel)
         wide = max(panel.shape[1] for panel in panels)
         panels = [np.pad(panel, ((0, 0), (0, wide - panel.shape[1]), (0, 0))) for panel in panels]
         return _grid(panels, columns, 0)
 
-    def summary(self, rows: Sequence[Mapping[str, float]], notes: Sequence[str] = ()) -> Image:
+    def summary(self, table: Table, notes: Sequence[str] = ()) -> Image:
         """Return notes and stills of the track, above a curve of its error, or of its cost where truth is unknown."""
         grid = _grid(self._stills, 2, BACKGROUND[0])
         width = grid.shape[1]
@@ -154,11 +161,11 @@ class Painter:
             write(head, note, (12, 26), scale=SUMMARY_SCALE * min(1.0, (width - 24) / width_of(note, SUMMARY_SCALE)))
             parts.append(head)
         parts.append(grid)
-        if self._scene.pictures is None:
+        if self._scene.pictures is None or len(self._scene.cameras) > 1:
             parts.append(blank(LABEL_HEIGHT, width))
             _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
-        name = "error_degrees" if "error_degrees" in rows[0] else "cost"
-        return np.vstack([*parts, curve([row[name] for row in rows], name.replace("_", " "), width, 180)])
+        name = "error_degrees" if "error_degrees" in table else "cost"
+        return np.vstack([*parts, curve(table[name].tolist(), name.replace("_", " "), width, 180)])
 
 
 def _draw_border(image: Image, width: int) -> None:

@@ -15,8 +15,8 @@ The constant `D` is the data that content.py returns; `posefit.page` has what al
 
 from typing import Any
 
+from posefit.output.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 from posefit.page.document import assembled, colour_style, one_script, part
-from posefit.tracking.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 
 # The limbs of a body, and the truth, on any page; on dark screens as in pictures.
 BODY_LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}

@@ -1,0 +1,169 @@
+"""The one loop that drives a tracker: its frames are checked, its evaluations counted, costs and areas computed again.
+
+A broken rule ends the track with one line that names the tracker; a wrong figure is noted in an `Audit`, and put right.
+"""
+
+import math
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.fitting.tracker import Frame, Observation, Task, Tracker
+from posefit.fitting.validation import BrokenRuleError, plugin_errors
+from posefit.reading import quoted
+from posefit.silhouette.cost import pose_costs
+from posefit.silhouette.drawn import PoseCount, uncounted
+
+UNCOUNTED_POSES = 10  # ours: a frame may draw so many beyond its evaluations, as to draw its result once more
+COST_TOLERANCE = 1e-6  # ours: costs are rounded where they are added up in another order
+
+
+@dataclass(eq=False)
+class Audit:
+    """What a tracker, named `name`, reports wrongly of its frames; `warnings` has a line for each kind.
+
+    `beta` is that of the cost that it reports.
+    """
+
+    name: str
+    beta: float
+    _findings: dict[str, tuple[str, int]] = field(default_factory=dict)  # by kind: the first of them, and how many
+
+    @property
+    def warnings(self) -> list[str]:
+        """One line for each kind: the first of it, and how many frames it concerns."""
+        return [f"{first} ({count} such frame{'s' if count > 1 else ''})" for first, count in self._findings.values()]
+
+    def clear(self) -> None:
+        """Forget all findings."""
+        self._findings.clear()
+
+    def note(self, kind: str, number: int, what: str) -> None:
+        """Add a finding about a frame; only the first of a kind is kept in full."""
+        first, count = self._findings.get(kind, (f"{self.name}: frame {number} must {what}", 0))
+        self._findings[kind] = first, count + 1
+
+    def broken(self, rule: str) -> BrokenRuleError:
+        """Return the error that ends a track."""
+        return BrokenRuleError(f"{self.name}: {rule}")
+
+
+def drive(
+    tracker: Tracker, task: Task, observations: Iterable[Observation], rng: np.random.Generator, audit: Audit
+) -> Iterator[Frame]:
+    """Yield the tracker's frame for each observation, with the time that it took.
+
+    Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
+    pose. An honest frame stays as it is. Raises BrokenRuleError where a frame is missing or wrong.
+    """
+    waiting: deque[Observation] = deque()  # those whose frames are still to come
+    unreadable: Exception | None = None  # why an observation could not be read
+    read = reported = yielded = 0
+    reading = np.zeros(2)  # seconds, and CPU seconds, which observations took
+
+    def stream() -> Iterator[Observation]:
+        nonlocal read, reading, unreadable
+        rest = iter(observations)
+        while True:
+            start = clocks()
+            try:
+                with uncounted():  # to render a motion is no evaluation
+                    observation = next(rest, None)
+            except Exception as error:
+                unreadable = error
+                raise
+            finally:
+                reading += clocks() - start
+            if observation is None:
+                return
+            read += 1
+            waiting.append(observation)
+            yield observation
+
+    drawn, source = PoseCount(), stream()
+    frames: Iterator[Frame] | None = None
+    while True:
+        start = clocks() - reading
+        try:
+            with drawn.counting(), plugin_errors(audit.name, "it", passed=(InputError, ImportError, GeneratorExit)):
+                frames = iter(tracker.track(source, rng)) if frames is None else frames
+                frame = next(frames, None)
+        except BrokenRuleError as broken:
+            if unreadable is not None and broken.__cause__ is unreadable:
+                raise unreadable from None  # what could not be read is not the tracker's fault
+            raise
+        if frame is None:
+            break
+        seconds, cpu_seconds = (clocks() - reading - start).tolist()
+        yielded += 1
+        if yielded > read:
+            raise audit.broken(f"track must yield a frame for each observation, got {yielded} for {yielded - 1}")
+        _check(frame, audit)
+        # it may have drawn poses for observations that it looks at ahead
+        ahead = task.evaluations * (read - yielded)
+        counted = math.ceil(drawn.poses / len(task.cameras)) - reported - ahead
+        frame = _counted(frame, yielded - 1, counted, UNCOUNTED_POSES * read, task.evaluations, audit)
+        frame = _computed(frame, yielded - 1, task, waiting.popleft(), audit)
+        reported += frame.evaluations
+        yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
+    if yielded < read or next(source, None) is not None:
+        raise audit.broken(f"track must yield a frame for each observation, got {yielded} and then no more")
+
+
+def clocks() -> Array:
+    """Return what the clock shows now, and the CPU time of this process's threads (2,), in seconds."""
+    return np.array([time.perf_counter(), time.process_time()])
+
+
+def _check(frame: Frame, audit: Audit) -> None:
+    if np.shape(frame.pose) != (66,) or not np.isfinite(frame.pose).all():
+        raise audit.broken(f"a pose must be 66 finite angles, got shape {np.shape(frame.pose)}")
+    if np.shape(frame.translation) != (3,) or not np.isfinite(frame.translation).all():
+        raise audit.broken(f"a translation must be 3 finite metres, got {frame.translation}")
+    if not isinstance(frame.evaluations, int | np.integer) or frame.evaluations < 0:
+        raise audit.broken(f"evaluations must be a whole number, 0 or more, got {quoted(frame.evaluations)}")
+    if np.ndim(frame.trace) != 2 or np.shape(frame.trace)[1] != 2:
+        raise audit.broken(f"a trace must be (n, 2), evaluations and costs, got shape {np.shape(frame.trace)}")
+
+
+def _counted(frame: Frame, number: int, counted: int, leeway: int, budget: int, audit: Audit) -> Frame:
+    """Return the frame with the evaluations that were counted, where it reports fewer, and note it."""
+    if counted > frame.evaluations + leeway:
+        audit.note("evaluations", number, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
+        frame = with_evaluations(frame, counted)
+    if frame.evaluations > budget:
+        audit.note("budget", number, f"use at most {budget:,} evaluations, got {frame.evaluations:,}")
+    return frame
+
+
+def _computed(frame: Frame, number: int, task: Task, observation: Observation, audit: Audit) -> Frame:
+    """Return the frame with the areas and the cost of its pose, and note where it reports others."""
+    pose, place = np.asarray(frame.pose, np.float64)[None], np.asarray(frame.translation, np.float64)[None]
+    observed = [replace(silhouette) for silhouette in observation.silhouettes]  # without bits that it may change
+    costs, counts = pose_costs(task.body, task.cameras, observed, pose, place, audit.beta)
+    true = counts[:, 0]
+    if not np.array_equal(true, frame.areas):
+        audit.note("areas", number, f"have its pose's areas, {true.tolist()}, got {_short(frame.areas)}")
+        frame = replace(frame, areas=true)
+    cost = float(costs[0])
+    if not (isinstance(frame.cost, float | int | np.number) and abs(frame.cost - cost) <= COST_TOLERANCE):
+        audit.note("cost", number, f"have its pose's cost, {cost:.6g}, got {_short(frame.cost)}")
+        frame = replace(frame, cost=cost, trace=np.array([[frame.evaluations, cost]]))
+    return frame
+
+
+def with_evaluations(frame: Frame, evaluations: int) -> Frame:
+    """Return a frame with so many evaluations; those of its trace are stretched to them."""
+    stretched = frame.trace.copy()
+    stretched[:, 0] = stretched[:, 0] * evaluations // max(frame.evaluations, 1)
+    return replace(frame, evaluations=evaluations, trace=stretched)
+
+
+def _short(value: object) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(np.asarray(value).tolist())
+    return text if len(text) <= 80 else text[:77] + "..."

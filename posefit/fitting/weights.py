@@ -1,0 +1,30 @@
+"""Weights of costs, how many samples they are worth, and probabilities of odds."""
+
+import numpy as np
+
+from posefit.arrays import Array
+
+MAX_LOG_ODDS = 30.0  # ours: beyond it a probability would be 0 or 1
+
+
+def weigh(costs: Array, sharpness: float) -> Array:
+    """Return the weights (n,), exp(-sharpness cost), which sum to 1.
+
+    A cost that is nan or infinite weighs nothing; where no cost is known, all weigh the same.
+    """
+    known = np.isfinite(costs)
+    if not known.any():
+        return np.full(costs.size, 1.0 / costs.size)
+    rises = np.where(known, costs, np.inf) - costs[known].min()
+    weights: Array = np.exp(-sharpness * rises) if sharpness else known.astype(np.float64)  # GORDON1993 (likelihood)
+    return np.asarray(weights / weights.sum())
+
+
+def effective_sample_size(weights: Array) -> float:
+    """Return how many equal weights are worth as much as these (n,): 1 over the sum of squares, where they sum to 1."""
+    return float(weights.sum() ** 2 / (weights**2).sum())
+
+
+def logistic(log_odds: Array) -> Array:
+    """Return the probabilities of logarithms of odds, of any shape; none is 0 or 1."""
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS))))

@@ -1,0 +1,10 @@
+"""What a track leaves behind: files, pictures, a page and a printed table.
+
+| looking for | file |
+|---|---|
+| the folder that appears whole, and goes on where it ended; whether two tracks are the same | folder.py, identity.py |
+| every file, a line a format | files.py |
+| pictures: overlay.mp4 and summary.png | picture.py, drawing.py |
+| the page, track.html | page/ |
+| what is printed | text.py |
+"""

@@ -1,0 +1,204 @@
+"""The folder a track leaves behind: it appears whole under its name, or not at all.
+
+Until it is whole it stands beside its place, hidden, with every frame that was estimated so far. Where a track ends too
+early, because a disk is full or it is stopped, those frames are kept, and the same track can go on from them.
+"""
+
+import json
+import os
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from posefit.errors import InputError
+from posefit.evaluation.errors import Table
+from posefit.files import MARK, Unfinished, opencv_name, other_entries
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
+from posefit.measuring.gait import Gait
+from posefit.output.files import FILES, write_files
+from posefit.output.identity import Digest, difference
+from posefit.reading import cut, parsed_json, read_text
+from posefit.uncertainty.modes import Posterior
+
+_RECORD = "frames.jsonl"
+SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
+_MINE = (*FILES, _RECORD)  # what a track writes to its folder
+
+
+class Recorder:
+    """Where the frames of a track are recorded as they come; here nowhere."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        """Nothing has to be closed."""
+
+    def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
+        """Return the frames that were recorded before, and the state of the random generator after them."""
+        return [], None
+
+    def record(self, frame: Frame, state: dict[str, Any]) -> None:
+        """Record a frame, and the state of the random generator after it."""
+
+    def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
+        """Write everything."""
+
+
+class OutputFolder(Recorder):
+    """Writes beside the target and renames at the end. Raises ValueError where the target may not be written.
+
+    `spec` is what a track has to have in common with the one that it resumes.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        force: bool,
+        resume: bool,
+        spec: Mapping[str, Digest],
+        say: Callable[[str], None],
+    ) -> None:
+        self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
+        opencv_name(self.path)  # a name that it cannot write is refused before the work
+        if os.path.lexists(self.path):
+            if self.path.is_symlink() or not self.path.is_dir():
+                came = "a link" if self.path.is_symlink() else "a file"
+                raise InputError(f"{self.path}: expected a folder to write to, got {came}")
+            if not force:
+                raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
+            if others := other_entries(self.path, _MINE) or _unmarked(self.path):
+                came = f"one with {cut(others[0])}, which is none of posefit's"
+                raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
+        self._recorded, self._force = 0, force
+        self._place = self._same() if resume else None
+
+    def _same(self) -> Unfinished:
+        """Return the folder of the track that goes on: the latest with the same arguments."""
+        left = Unfinished.interrupted(self.path)
+        if not left:
+            raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
+        try:
+            others = [difference(folder.info, self._spec) for folder in left]
+        except (AttributeError, TypeError):
+            raise InputError(f"{left[0].path / MARK}: expected the arguments of a track, got others") from None
+        place = left[others.index(None)] if None in others else None
+        for folder in left:
+            if folder is not place:
+                folder.close()
+        if place is None:
+            raise InputError(f"{self.path}: {others[0]}")
+        return place
+
+    def __enter__(self) -> Self:
+        try:
+            if self._place is None:
+                for earlier in Unfinished.interrupted(self.path):
+                    earlier.remove(_MINE)
+                self._place = Unfinished.begin(self.path, self._spec)
+            self.building = self._place.path
+        except OSError as error:
+            raise InputError(f"{self.path}: expected a place to write to, got {error.strerror}") from None
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        assert self._place is not None
+        if kind is None:
+            try:
+                self._place.finish(_MINE, self._force)
+            except OSError as taken:
+                self._place.close()
+                where = f"{taken.strerror}; the results are in {self.building}"
+                raise InputError(f"{self.path}: expected its name to be free, got {where}") from None
+            (self.path / _RECORD).unlink(missing_ok=True)
+            return
+        kept = ""
+        if self._recorded:
+            for name in FILES:
+                (self.building / name).unlink(missing_ok=True)
+            kept = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
+            self._place.close()
+        else:
+            self._place.remove(_MINE)
+        if isinstance(error, OSError):
+            raise InputError(f"{self.path}: expected room to write to, got {error.strerror or error}{kept}") from error
+        if kept and isinstance(error, InputError):
+            raise InputError(f"{error}{kept}") from error
+        if kept:
+            self._say(kept[2:])
+
+    def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
+        """Return the frames that were recorded before, and the state of the random generator after them."""
+        frames: list[Frame] = []
+        kept: list[bytes] = []
+        state: dict[str, Any] | None = None
+        path = self.building / _RECORD
+        recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
+        for number, line in enumerate(recorded.splitlines(keepends=True), 1):
+            try:
+                frame, state = _frame_of(line)
+            except Exception as error:  # whatever a damaged line raises
+                if line.endswith(b"\n"):  # else it was being written when the track ended
+                    reason = cut(" ".join(str(error).split()))
+                    self._say(
+                        f"warning: {path} line {number}: expected a frame, got {reason}; tracked again from there"
+                    )
+                break
+            frames.append(frame)
+            kept.append(line)
+        if frames:
+            path.write_bytes(b"".join(kept))
+        self._recorded = len(frames)
+        return frames, state
+
+    def record(self, frame: Frame, state: dict[str, Any]) -> None:
+        """Record a frame, and the state of the random generator after it."""
+        posterior = None if frame.posterior is None else frame.posterior.as_dict()
+        row = {**vars(frame), "posterior": posterior, "state": state}
+        text = json.dumps(row, default=_encoded).encode()
+        with (self.building / _RECORD).open("ab") as file:
+            file.write(b"%08x %s\n" % (zlib.crc32(text), text))
+        self._recorded += 1
+
+    def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
+        """Write everything."""
+        write_files(self.building, scene, frames, table, gait, summary)
+
+
+def _unmarked(folder: Path) -> list[str]:
+    """Return the files of a folder, unless its summary is one of a track: those are nobody's whom we know."""
+    names = sorted(entry.name for entry in folder.iterdir())
+    try:
+        summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))
+    except (OSError, ValueError):
+        return names
+    marked = isinstance(summary, dict) and {"version", "method", "evaluations", "trust"} <= summary.keys()
+    return [] if marked else names
+
+
+def _encoded(value: Any) -> Any:
+    """Return what JSON holds of a frame's values: arrays with their type, else what it prints as."""
+    if isinstance(value, np.ndarray | np.generic):
+        return {"dtype": str(value.dtype), "values": value.tolist()}
+    return dict(value) if isinstance(value, Mapping) else str(value)
+
+
+def _decoded(mapping: dict[str, Any]) -> Any:
+    if mapping.keys() == {"dtype", "values"}:
+        return np.array(mapping["values"], dtype=mapping["dtype"])
+    return mapping
+
+
+def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
+    """Return a recorded frame, and the state of the random generator after it. Raises an error where it is damaged."""
+    checksum, _, text = line.rstrip(b"\n").partition(b" ")
+    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
+        raise InputError("a damaged one")
+    row = json.loads(text, object_hook=_decoded)
+    state, posterior = row.pop("state"), row.pop("posterior")
+    np.random.default_rng(0).bit_generator.state = state  # raises where it is none
+    return Frame(**row, posterior=None if posterior is None else Posterior.from_dict(posterior)), state

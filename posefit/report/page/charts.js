@@ -1,0 +1,161 @@
+// Charts of the methods that are shown: lines with bands and dots, and errors of joints.
+const LABELLED = 8; // lines that have their names at their ends
+
+// Round values of a logarithmic scale.
+const logSteps = (low, high) =>
+  range(36)
+    .map((k) => [1, 2, 5][k % 3] * 10 ** (Math.floor(k / 3) - 4))
+    .filter((value) => value >= low && value <= high);
+
+// Those of rising values that lie at least a gap apart, from the first place on.
+function spaced(values, of, gap, first = -Infinity) {
+  let free = first;
+  return values.filter((value) => {
+    const enough = of(value) >= free;
+    if (enough) free = of(value) + gap;
+    return enough;
+  });
+}
+
+const measuring = document.createElement("canvas").getContext("2d");
+
+// The width in pixels of a text of a figure, as base.css has it.
+function textWidth(text, weight = 400) {
+  measuring.font = `${weight} 12px system-ui, sans-serif`;
+  return measuring.measureText(text).width;
+}
+
+// The charts of a section, each with a line of the methods that are shown.
+function drawCharts(section) {
+  for (const about of D.charts.filter((one) => one.section === section)) {
+    const [box, note] = [make("div", { class: "chart", id: about.name }), make("p", { class: "small" })];
+    $(`${section}-charts`).append(make("figure", {}, make("figcaption", {}, about.title), box, note));
+    drawn(box, (width) => {
+      const [lines, without] = [[], []];
+      for (const [m, place] of visible())
+        if (about.lines[place]) lines.push({ m, ...about.lines[place] });
+        else without.push(METHODS[m]);
+      note.textContent = without.length ? `Without a line: ${without.join("; ")}.` : "";
+      return chart(width, lines, about);
+    });
+  }
+}
+
+// The value that 98 % of some values do not exceed.
+function usualMost(values) {
+  const rising = values.toSorted((a, b) => a - b);
+  return rising[Math.floor(0.98 * (rising.length - 1))] || 1;
+}
+
+// A chart of lines {m, x, y, low, high, dots}.
+function chart(width, lines, { x_label, y_label, most, log, stepped, guides }) {
+  const height = between(240, 380, 0.62 * width);
+  const longest = Math.max(0, ...lines.map(({ m }) => textWidth(METHODS[m])));
+  const named = lines.length > 0 && lines.length <= LABELLED && longest < 0.3 * width;
+  const edges = { left: 46, right: named ? longest + 16 : 22, top: 24, bottom: 40 };
+  const places = [...lines.flatMap(({ x }) => x), ...guides.flatMap(([x, , end]) => [x, end])];
+  const ends = [log ? Math.min(...places) : 0, places.length ? Math.max(...places) : 1];
+  const x = { from: ends[0], to: ends[1], log, label: x_label, show: log ? whole : rounded };
+  const inner = width - edges.left - edges.right;
+  const across = (value) => (inner * Math.log(value / x.from)) / Math.max(Math.log(x.to / x.from), 1e-9);
+  x.marks = log ? spaced(logSteps(x.from, x.to), across, 44) : steps(0, x.to, inner / 90);
+  const to = most ?? 1.05 * usualMost(lines.flatMap(({ y }) => y));
+  const y = { to, marks: steps(0, to, 5), show: rounded, label: y_label };
+  const frame = axes({ ...edges, width, height, name: `${y_label} over ${x_label}` }, x, y);
+  const { svg, at, up } = frame;
+  for (const [x1, y1, x2, y2] of guides)
+    svg.append(drawLine(at(x1), up(y1), at(x2), up(y2), { class: "axis", "stroke-dasharray": "4 4" }));
+  svg.append(...lines.map((line, order) => drawnLine(frame, line, order, stepped)));
+  if (named)
+    spread(
+      lines.map((line) => up(line.y.at(-1))),
+      14,
+      30,
+      height - 42,
+    ).forEach((place, k) => svg.append(drawText(width - longest - 8, place + 4, METHODS[lines[k].m])));
+  return svg;
+}
+
+// A line with its band, and marks of its method: on every dot, else now and then.
+function drawnLine({ at, up }, { m, x, y, low, high, dots }, order, stepped) {
+  const points = x.map((value, k) => [at(value), up(y[k])]);
+  const line = path(
+    stepped ? points.flatMap((point, k) => (k ? [[point[0], points[k - 1][1]], point] : [point])) : points,
+  );
+  const bounded = low ? range(x.length).filter((k) => given(low[k]) && given(high[k])) : [];
+  const ends = bounded.map((k) => [at(x[k]), up(low[k]), up(high[k])]);
+  const marked = spaced(
+    points.filter((_, k) => y[k]),
+    ([place]) => place,
+    85,
+    70 + 17 * (order % 5),
+  );
+  const title = draw("title", {}, `${METHODS[m]}: ${number(y.at(-1), 3)} at the end`);
+  return draw(
+    "g",
+    { class: "series", "data-method": m },
+    ends.length ? band(ends, { class: "band", style: `fill: ${colour(m)}` }) : null,
+    draw("path", { class: "near", d: line }, title),
+    draw("path", { class: "curve", d: line, ...stroke(m, 2) }),
+    ...(dots.length
+      ? points.map(([left, top], k) => mark(m, left, top, 4.5, `${METHODS[m]}: ${dots[k]}`))
+      : marked.map(([left, top]) => mark(m, left, top, 3.6))),
+  );
+}
+
+// Places as near to the wanted ones as possible, in the same order, at least a gap apart.
+function spread(wanted, gap, low, high) {
+  const order = range(wanted.length).sort((a, b) => wanted[a] - wanted[b]);
+  const places = [];
+  order.forEach((k, rank) => (places[k] = Math.max(wanted[k], rank ? places[order[rank - 1]] + gap : low)));
+  let most = high;
+  for (const k of order.reverse()) {
+    places[k] = Math.min(places[k], most);
+    most = places[k] - gap;
+  }
+  return places;
+}
+
+function curves() {
+  legend();
+  if (D.charts.length) drawCharts("curves");
+  else $("curves-charts").append("No run has a trace.");
+}
+
+function joints() {
+  drawn($("joint-errors"), (width) => {
+    const shown = visible();
+    const row = 20;
+    const to = 1.05 * Math.max(1, ...shown.flatMap(([, place]) => D.joint_errors[place].values));
+    const box = { width, height: row * D.joints.length + 44, left: 112, right: 14, top: 4, bottom: 40 };
+    const x = { to, marks: steps(0, to, Math.max(3, width / 110)), show: whole, label: "mm", rules: true };
+    const { svg, at } = axes({ ...box, name: "error of each joint" }, x);
+    D.joints.forEach((joint, j) => {
+      svg.append(drawText(104, row * j + 18, joint, { "text-anchor": "end" }));
+      shown.forEach(([m, place], k) => {
+        const { values, low, high } = D.joint_errors[place];
+        const y = row * j + 7 + (shown.length > 1 ? (13 * k) / (shown.length - 1) : 6);
+        const ends = given(low[j]) ? drawLine(at(low[j]), y, at(high[j]), y, { class: "band", ...stroke(m, 2) }) : null;
+        const dot = mark(m, at(values[j]), y, 3.6, `${METHODS[m]}, ${joint}: ${number(values[j], 1)} mm`);
+        svg.append(draw("g", { class: "series", "data-method": m }, ends, dot));
+      });
+    });
+    return svg;
+  });
+}
+
+function certainty() {
+  drawCharts("certainty");
+  const { levels, methods } = D.certainty;
+  const share = (value) => `${number(100 * value, 1)} %`;
+  const percents = (value) => `${whole(100 * value)} %`;
+  const within = (level) => `Share of joints whose truth lies in the ball that should hold ${percents(level)} of them`;
+  const columns = levels.flatMap((level, k) => [
+    column(`within ${percents(level)}`, ({ coverage }) => coverage[k], share, { about: within(level) }),
+    column("mm", ({ width }) => width[k], whole, { about: "Mean radius of these balls" }),
+  ]);
+  const about = "Expected calibration error of the likeliest mode's probability: the mean distance from the diagonal";
+  const error = column("calibration error", "ece", (value) => number(value, 3), { about });
+  const rows = D.taking_part.flatMap((m, place) => (methods[place] ? [{ m, ...methods[place] }] : []));
+  table($("sure"), [methodColumn("m"), ...columns, error], rows, { name: "Uncertainty" });
+}

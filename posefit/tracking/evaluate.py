@@ -1,0 +1,89 @@
+"""The last step: errors or signs of trust of a track, and what a user should know before they trust it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.evaluation.errors import LOST, Table, evaluated, unseen
+from posefit.evaluation.trust import trust_of
+from posefit.fitting.shape import Shape
+from posefit.fitting.tracker import Frame, Task
+from posefit.footage.scene import Scene
+from posefit.measuring.gait import backwards, backwards_warning, gait_of
+from posefit.tracking.method import Method
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import RELOCALISED
+from posefit.tracking.result import Course, Setup, Track
+from posefit.tracking.trajectory import Tracked
+from posefit.uncertainty.modes import modes_of, track_modes
+
+
+def evaluate(
+    scene: Scene,
+    frames: Sequence[Frame],
+    tracked: Tracked,
+    shape: Shape | None,
+    method: Method,
+    task: Task,
+    options: TrackOptions,
+    clock: Array,
+) -> Track:
+    """Return a track with errors against the truth where it is known, else signs of trust.
+
+    `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
+    from the first mask that was read.
+    """
+    skeleton = scene.body.skeleton
+    posteriors = [frame.posterior for frame in frames]
+    posteriors = [None if each is None else replace(each, modes=modes_of(skeleton, each)) for each in posteriors]
+    frames = [replace(frame, posterior=each) for frame, each in zip(frames, posteriors, strict=True)]
+    none = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
+    table, measures = evaluated(scene, frames, method.prior, task.angles, method.audit.beta, clock)
+    motion, trust = scene.motion(frames), None
+    walks_back = backwards(motion, unseen(table))
+    warnings = [*scene.warnings, *method.audit.warnings]
+    if scene.truth is None:
+        warnings += filter(None, [backwards_warning(walks_back)])
+        trust = trust_of(scene, tracked.frames, frames, table, measures.iou, task.training)
+    setup = Setup(
+        motion=scene.name,
+        method=method.name,
+        settings=method.settings,
+        seed=options.seed,
+        train=[clip.name for clip in task.training],
+        evaluations_per_frame=task.evaluations,
+        dimensions=method.dimensions(task),
+        translation=task.translation,
+        first_pose=options.first_pose,
+        smooth=bool(options.smooth),
+        views=len(scene.cameras),
+        camera=scene.placing,
+        size_pixels=(scene.cameras[0].width, scene.cameras[0].height),
+        fps=scene.fps,
+        frames=len(frames),
+    )
+    modes = track_modes(skeleton, posteriors)
+    stay = None if tracked.stay is None else (scene.first + tracked.stay[0], scene.first + tracked.stay[1])
+    course = Course(
+        hypotheses=tracked.hypotheses,
+        build=None if shape is None else shape.as_dict(),
+        trace=frames[0].trace.tolist() if len(frames) == 1 else None,
+        modes=[round(mode.weight, 6) for mode in modes] or None,
+        none_of_modes=round(float(np.mean(none)), 6) if none else None,
+        unknown_sides=_numbers(table, "unknown_sides", 1.0),
+        lost_frames=_numbers(table, "lost", LOST),
+        relocalised=[scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
+        retracked_outside=stay,
+        backwards_share=round(float(walks_back.mean()), 6),
+        warnings=warnings,
+    )
+    gait = gait_of(motion, unseen(table))
+    return Track(motion, frames, table, measures, trust, gait, setup, course, modes, scene)
+
+
+def _numbers(table: Table, name: str, least: float) -> list[int] | None:
+    """Return the frames that have so much or more in a column; None where all are unknown."""
+    values = table[name]
+    return None if np.isnan(values).all() else table["frame"][values >= least].tolist()
