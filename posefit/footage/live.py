@@ -15,6 +15,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.files import opencv_name
 from posefit.footage.images import PIXELS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
@@ -70,7 +71,9 @@ class Stream:
             # a file of its own: Python ends by SIGABRT while a thread reads from its standard input
             frames = netpbm_images(pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb"))
         else:
-            capture = cv2.VideoCapture(int(source) if source.isdigit() else source)
+            name = opencv_name(source)
+            address = name if os.path.exists(name) else source
+            capture = cv2.VideoCapture(int(source) if source.isdigit() else address)
             if not capture.isOpened():
                 raise InputError(f"live must be a device or an address that can be opened, or -, got {quoted(source)}")
             rate = capture.get(cv2.CAP_PROP_FPS)
