@@ -334,6 +334,9 @@ def _qualisys(text: str) -> list[Calibration]:
         )
         names = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
         distortion = [float(lens.get(name, "0")) for name in (*names, "radialDistortion3")]
+        for key, value in lens.items():
+            if _OF_LENS.fullmatch(_plain(key)) and key not in (*names, "radialDistortion3") and _counts(value):
+                raise InputError(f"the lens key {quoted(key)}, which is not known")
         turned = np.array([[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"])
         rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
         position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0

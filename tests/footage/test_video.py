@@ -116,7 +116,7 @@ def test_a_relative_name_with_a_colon_is_a_file(tmp_path: Path, monkeypatch: pyt
     assert opencv_name("run-10:30") == str(tmp_path / "run-10:30")
 
 
-@each("where", ["source", "out", "extract", "live"])
+@each("where", ["source", "out", "extract", "live", "masks"])
 def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Path, where: str) -> None:
     strange = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9")
     film(tmp_path / "walk.avi", truth()[:4])
@@ -124,11 +124,15 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Pat
     if where == "source":
         os.rename(tmp_path / "walk.avi", f"{strange}.avi")
         words = ("track", f"{strange}.avi", "--out", tmp_path / "out")
+    elif where == "masks":
+        np.savez(strange + ".npz", masks=truth()[:4])
+        (tmp_path / "walk.avi").unlink()
+        words = ("track", strange + ".npz", "--out", tmp_path / "out")
     elif where == "live":
         words = ("track", "--live", strange)
     elif where == "extract":
         words = ("extract", tmp_path / "walk.avi", "--out", strange)
-    assert "expected a name in UTF-8, got one that OpenCV cannot open" in error_of(*words)
+    assert "expected a name in UTF-8, got one that is not" in error_of(*words)
     assert len(list(tmp_path.iterdir())) == 1
 
 
