@@ -31,7 +31,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.camera import Camera, check_focal
+from posefit.geometry.camera import Camera, check_focal, is_focal
 from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
@@ -111,7 +111,8 @@ class Calibration:
         """
         if self.size is None:
             middle = self.matrix[:2, 2] / size
-            return replace(self, size=size) if ((middle > 0.25) & (middle < 0.75)).all() else None
+            fits = ((middle > 0.25) & (middle < 0.75)).all() and is_focal(np.diag(self.matrix)[:2], size)
+            return replace(self, size=size) if fits else None
         for mine, other in zip(self.size, size, strict=True):
             if mine != other and (abs(mine - other) >= BLOCK or max(mine, other) % BLOCK):
                 return None
