@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import lru_cache
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -195,11 +196,6 @@ def _views(field: str, value: Any) -> tuple[float, ...]:
     return degrees
 
 
-def _frames(field: str, value: Any) -> int:
-    between(field, frames := whole(field, value, 1), 1, MAX_FRAMES)
-    return frames
-
-
 def _corruption(field: str, value: Any) -> dict[str, float]:
     if not isinstance(value, Mapping):
         raise InputError(f"{field} must be a table of strengths such as {{holes = 0.3}}, got {quoted(value)}")
@@ -230,8 +226,12 @@ def _within(high: float) -> Callable[[str, Any], float]:
     return check
 
 
-def _whole(least: int) -> "Check":
-    return lambda field, value: whole(field, value, least)
+def _whole(least: int, most: float = inf) -> "Check":
+    def check(field: str, value: Any) -> int:
+        between(field, number := whole(field, value, least), least, most)
+        return number
+
+    return check
 
 
 def _choice(*choices: object) -> "Check":
@@ -255,7 +255,7 @@ CHECKS: Checks = {
     "corruption": _corruption,
     "instance": _whole(0),
     "name": _label,
-    "frames": _frames,
+    "frames": _whole(1, MAX_FRAMES),
     "yaw_off_degrees": _within(ALL_AROUND),
     "body_off_percent": _within(MAX_BODY_OFF),
 }

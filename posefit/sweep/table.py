@@ -24,19 +24,9 @@ if TYPE_CHECKING:
 
 ORDER = ("motion", "view_degrees", "corruption", "instance", "method", "settings", "seed", "key")
 _TEXTS = (
-    "key",
-    "version",
-    "status",
-    "reason",
-    "kind",
-    "method",
-    "name",
-    "motion",
-    "train",
-    "settings",
-    "view_degrees",
+    "key", "version", "status", "reason", "kind", "method", "name", "motion", "train", "settings", "view_degrees",
     "corruption",
-)
+)  # fmt: skip
 
 
 def is_search(spec: Mapping[str, Any]) -> bool:

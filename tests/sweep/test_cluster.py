@@ -5,14 +5,14 @@ import os
 import shutil
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from posefit.sweep.ledger import Ledger
 from tests.sweep.fake import SLOW, STARTS, behave, cells, starts
+from tests.sweep.test_chaos import wait_for
 
 ROOT = Path(__file__).parents[2]
 COUNT = 60
@@ -100,13 +100,6 @@ def remove() -> None:
         subprocess.run(["ip", "netns", "del", name], check=False, capture_output=True)
 
 
-def wait_for(what: Callable[[], bool], seconds: float = 600.0) -> None:
-    until = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < until, "waited too long"
-        time.sleep(0.1)
-
-
 def test_a_host_of_workers_that_dies_and_comes_back_costs_no_row(hosts: Hosts, tmp_path: Path) -> None:
     noted = tmp_path / "starts"
     hosts.start(0, "distributed.cli.dask_scheduler", "--host", "10.87.0.1", "--no-dashboard", "--no-show")
@@ -119,7 +112,7 @@ def test_a_host_of_workers_that_dies_and_comes_back_costs_no_row(hosts: Hosts, t
     wait_for(lambda: len(starts(noted)) > before + 5)  # the other one goes on
     alive = {process for _, process in starts(noted)}
     hosts.come_back(2)
-    wait_for(lambda: {process for _, process in starts(noted)} > alive)
+    wait_for(lambda: {process for _, process in starts(noted)} > alive)  # and both again
     assert driver.wait(timeout=600) == 1
     ledger = Ledger(tmp_path / "results")
     rows = [row["key"] for row in ledger.rows()]

@@ -1,6 +1,7 @@
 """What a user types, and what comes back: rows, a preview, and one line for every mistake."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from tests.cases import each
 from tests.commands import error_of, run
+from tests.report.browser import ledger, result
+from tests.sweep.fake import cells
 
 PLAN = """
 [defaults]
@@ -63,9 +66,9 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
 
 @pytest.mark.slow
 def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
-    result = run("sweep", plan, "--dry-run", "--workers", 2)
-    assert result.exit_code == 0, result.stderr
-    *lines, last = result.stdout.splitlines()
+    done = run("sweep", plan, "--dry-run", "--workers", 2)
+    assert done.exit_code == 0, done.stderr
+    *lines, last = done.stdout.splitlines()
     assert lines == [
         "method            4 x sapso@pca, 4 x random@full",
         "motion            8 x walk",
@@ -91,9 +94,9 @@ def test_durations_in_words() -> None:
 def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(plan: Path) -> None:
     # the prior refuses its setting when it is fitted: the sweep would isolate it, and so does its preview
     plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
-    result = run("sweep", plan, "--dry-run", "--workers", 1)
-    assert result.exit_code == 0, result.stderr
-    *_, warning, last = result.stdout.splitlines()
+    done = run("sweep", plan, "--dry-run", "--workers", 1)
+    assert done.exit_code == 0, done.stderr
+    *_, warning, last = done.stdout.splitlines()
     assert warning.startswith("warning: random@pca on walk, instance 0, seed 0: InputError: ")
     assert last.startswith("9 cells, 9 of them to run, 1,440 evaluations: about ")  # 9 x 2 frames of 80
 
@@ -103,9 +106,9 @@ def test_a_preview_of_many_cells_fits_a_screen_however_many_kinds_fail(plan: Pat
     plan.write_text(
         f'defaults.settings.pca.components = -1\n[product]\nmethods = {methods}\nmotions = ["walk"]\nseeds = 900\n'
     )
-    result = run("sweep", plan, "--dry-run", "--workers", 1)
-    assert result.exit_code == 0, result.stderr
-    method, motion, seed, *warnings, last = result.stdout.splitlines()
+    done = run("sweep", plan, "--dry-run", "--workers", 1)
+    assert done.exit_code == 0, done.stderr
+    method, motion, seed, *warnings, last = done.stdout.splitlines()
     assert method.split(maxsplit=1) == ["method", ", ".join(f"900 x {one}" for one in methods)]
     assert motion.split(maxsplit=1) == ["motion", "5,400 x walk"]
     assert seed.endswith(", 6 x 10, 6 x 11, and 888 other values")
@@ -152,6 +155,18 @@ def test_mistakes_are_one_line_and_write_nothing(words: list[str], message: str,
     places = {"PLAN": plan, "OUT": tmp_path / "out", "BAD": tmp_path / "bad.toml"}
     assert message in error_of("sweep", *(places.get(word, word) for word in words))
     assert not (tmp_path / "out").exists()
+
+
+def test_names_of_a_ledger_neither_steer_a_terminal_nor_forge_lines(tmp_path: Path) -> None:
+    cell = replace(cells(1)[0], method="sapso@\x1b[31m\nno method is better")
+    other = replace(cell, seed=1)
+    folder = ledger(tmp_path / "results", [result(cell, 1.0)], [(other, ["it\x1b[2J\ntook ages"])])
+    printed = run("report", folder)
+    assert printed.exit_code == 0, printed.output
+    assert "\x1b" not in printed.output
+    assert r"sapso@\x1b[31m\nno method is better" in printed.stdout
+    assert r"it\x1b[2J\ntook ages" in printed.stdout
+    assert not any(line.startswith(("no method", "took ages")) for line in printed.stdout.splitlines())
 
 
 def test_without_distributed_dask_says_what_to_install(

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import shutil
 import signal
 import sqlite3
@@ -152,6 +153,14 @@ def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
     for opened in (Ledger, Writer):
         with pytest.raises(ValueError, match="expected a ledger that posefit sweep wrote, got another SQLite file"):
             opened(other)
+        (tmp_path / "other" / "short.sqlite").write_bytes(b"x")
+        with pytest.raises(ValueError, match="a whole SQLite file, got a file of 1 byte, too short to be one: take it"):
+            opened(tmp_path / "other" / "short.sqlite")
+    (empty := tmp_path / "empty" / FILE).parent.mkdir()
+    empty.touch()
+    with pytest.raises(ValueError, match="expected a ledger that posefit sweep wrote, got an empty file"):
+        Ledger(empty)
+    Writer(empty).close()  # as where a driver was killed at once
     folder = filled(tmp_path / "later", 1)
     changed(folder, "PRAGMA user_version = 9")
     for opened in (Ledger, Writer):
@@ -199,23 +208,32 @@ def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
     Writer(path).close()
 
 
-def test_a_file_that_was_copied_while_it_was_written_opens_with_all_that_was_committed(tmp_path: Path) -> None:
-    # as after a power failure: the files as they are between any two calls that write
+FILL = "import sys, pathlib, tests.sweep.fake as fake; fake.filled(pathlib.Path(sys.argv[1]), 20_000)"
+
+
+def test_a_ledger_copied_while_its_driver_writes_opens_with_all_that_was_committed_before(tmp_path: Path) -> None:
+    # as after a power failure: a reader's open transaction keeps rows from moving between the two files meanwhile
     path, copy = tmp_path / "results" / FILE, tmp_path / "copy" / FILE
-    chosen = cells(200)
-    with Writer(path) as ledger:
-        ledger.plan(chosen)
-        for count, cell in enumerate(chosen, 1):
-            with ledger.transaction():
-                ledger.finish(cell.key, result(cell))
-                if count % 2:
-                    copy.parent.mkdir()
-                    for name in (FILE, f"{FILE}-wal"):
-                        shutil.copyfile(path.with_name(name), copy.with_name(name))
-                    copied = Ledger(copy)
-                    assert len(list(copied.rows())) == count - 1
-                    copied.close()
-                    shutil.rmtree(copy.parent)
+    missing: list[int] = []
+    with subprocess.Popen([sys.executable, "-c", FILL, str(path.parent)], cwd=ROOT) as driver:
+        while len(missing) < 40:
+            if not path.exists() or not path.with_name(f"{FILE}-wal").exists():
+                time.sleep(0.05)
+                continue
+            with closing(sqlite3.connect(path, isolation_level=None)) as reader:
+                reader.execute("BEGIN")
+                try:
+                    before = reader.execute("SELECT count(*) FROM cells WHERE status = 'done'").fetchone()[0]
+                except sqlite3.OperationalError:  # no table yet
+                    continue
+                copy.parent.mkdir()
+                for name in (FILE, f"{FILE}-wal"):
+                    shutil.copyfile(path.with_name(name), copy.with_name(name))
+            with closing(Ledger(copy)) as copied:
+                missing += [before - len(copied)] * (before > 0)
+            shutil.rmtree(copy.parent)
+        driver.kill()
+    assert max(missing) <= 0
 
 
 def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(tmp_path: Path) -> None:
@@ -311,6 +329,13 @@ def test_a_row_is_outdated_where_any_part_of_its_version_is_not_the_installed_on
         for cell in old:
             ledger.finish(cell.key, result(cell))
     assert Ledger(tmp_path / "results").outdated() == {versions[1]: 1, versions[2]: 1}
+
+
+def test_a_ledger_is_pickled_as_the_places_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(filled(tmp_path / "results", 2).parent)
+    pickled = pickle.dumps(ledger := Ledger("results"))
+    monkeypatch.chdir("/")
+    assert list(pickle.loads(pickled).rows()) == list(ledger.rows())
 
 
 def test_a_ledger_is_read_while_its_driver_writes(tmp_path: Path) -> None:

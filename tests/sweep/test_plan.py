@@ -310,7 +310,7 @@ def test_a_tracker_is_a_method_by_its_name_and_its_package_is_part_of_the_versio
     assert cell.version == f"{posefit_build()}, posefit-hold 2.5 {source_digest(Holds.__module__)}"
     row = run_cell(cell).row
     assert row["prior_floor_degrees"] is None
-    assert row["trace"]["evaluations"][-1] <= 2440
+    assert row["trace"] == {"evaluations": [], "cost": []}  # it does not search
 
 
 PLAIN = '[[cells]]\nmethod = "random@pca"\nmotion = "walk"\n'
