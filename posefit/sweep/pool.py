@@ -21,7 +21,7 @@ from posefit.errors import InputError
 from posefit.limits import end_with_parent, memory
 from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
-START_SECONDS = 60.0  # that a process may take to begin a job
+START_SECONDS = 60.0  # that a process may take to begin a job; twice as long after each time that none did
 LEFT = 64  # the status of a process that a job ended with 0
 # Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
 # out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
@@ -38,6 +38,7 @@ class Pool:
         self._workers, self._limits = workers, limits
         self._run, self._prepare = cloudpickle.dumps(run), cloudpickle.dumps(prepare)
         self._running: dict[ProcessFuture[bytes], tuple[Any, float]] = {}
+        self._start_seconds = START_SECONDS
         self._start()
 
     def window(self) -> int:
@@ -54,11 +55,12 @@ class Pool:
         """Return the jobs that ended."""
         done = wait(self._running, seconds, FIRST_COMPLETED).done
         outcomes = [self._outcome(future) for future in tuple(self._running) if future in done]
-        late = time.monotonic() - START_SECONDS
+        late = time.monotonic() - self._start_seconds
         stuck = any(start < late and not future.running() for future, (_, start) in self._running.items())
         if stuck or not self._pool.active:  # a worker died while it took a job from the others' queue
             outcomes += [Outcome(job) for job, _ in self._running.values()]
             self._running.clear()
+            self._start_seconds *= 2.0
             self.close()
             self._start()
         return outcomes
