@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from posefit.plugin import Array, effective_sample_size, weigh
 
+TOLERANCE, MAX_STEPS = 1e-9, 100  # ours: of the share that survives, and steps towards it
 MAX_SHARPNESS = 1e12  # ours: where more particles than wanted share the lowest cost, none is sharp enough
 
 
@@ -30,8 +31,6 @@ def sharpness(costs: Array, wanted: float) -> float:
 
     The survival rate falls as beta rises.
     """
-    from scipy.optimize import brentq
-
     if survival(costs, 0.0) <= wanted:
         return 0.0
     low, high = 0.0, 1.0
@@ -39,4 +38,13 @@ def sharpness(costs: Array, wanted: float) -> float:
         low, high = high, 2.0 * high
         if high > MAX_SHARPNESS:
             return high
-    return float(brentq(lambda beta: survival(costs, beta) - wanted, low, high))  # DEUTSCHER2005 (beta)
+    above, below, side, beta = survival(costs, low) - wanted, survival(costs, high) - wanted, 0, high
+    for _ in range(MAX_STEPS):  # false position, by the Illinois rule
+        beta = (low * below - high * above) / (below - above)  # DEUTSCHER2005 (beta)
+        if abs(rest := survival(costs, beta) - wanted) < TOLERANCE:
+            break
+        if rest > 0.0:
+            low, above, below, side = beta, rest, below * (0.5 if side > 0 else 1.0), 1
+        else:
+            high, below, above, side = beta, rest, above * (0.5 if side < 0 else 1.0), -1
+    return beta

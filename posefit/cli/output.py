@@ -97,7 +97,7 @@ def _mistake(error: BaseException) -> str:
     if isinstance(error, OSError) and isinstance(error.filename, str):
         return f"{error.filename}: expected a file or folder that can be used, got {error.strerror}"
     if isinstance(error, MemoryError):
-        return f"expected work that fits {allowed_bytes() / 1e9:.3g} GB of memory, got {error or 'more'}"
+        return f"expected work that fits {allowed_bytes() / 1e9:.3g} GB of memory, got {str(error) or 'more'}"
     return str(error)
 
 

@@ -242,7 +242,7 @@ def _fitting(calibration: Calibration, size: tuple[int, int], *, scaled: bool = 
         return padded
     if calibration.size is None:
         middle = "x".join(f"{value:g}" for value in calibration.matrix[:2, 2])
-        raise InputError(f"camera {quoted(calibration.name)} must have its centre in {size[0]}x{size[1]}, got {middle}")
+        raise InputError(f"camera {quoted(calibration.name)} must be of {size[0]}x{size[1]}, got a centre of {middle}")
     width, height = calibration.size
     if scaled and abs(size[0] * height / (size[1] * width) - 1.0) <= SAME_SHAPE:
         return calibration

@@ -1,20 +1,23 @@
 """The frames of a camera, a network stream or a pipe as they come, and the person in each of them."""
 
+import io
 import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.files import opencv_name
 from posefit.footage.images import PIXELS
 from posefit.footage.quality import FrameQuality
 from posefit.footage.segmentation import Extraction, Segmentation
@@ -68,9 +71,13 @@ class Stream:
         frames: Iterator[Image]
         if source == "-":
             # a file of its own: Python ends by SIGABRT while a thread reads from its standard input
-            frames = netpbm_images(pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb"))
+            with suppress(io.UnsupportedOperation):  # a stream in memory has no file
+                pipe = pipe or os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+            frames = netpbm_images(pipe or sys.stdin.buffer)
         else:
-            capture = cv2.VideoCapture(int(source) if source.isdigit() else source)
+            name = opencv_name(source)
+            address = name if os.path.exists(name) else source
+            capture = cv2.VideoCapture(int(source) if source.isdigit() else address)
             if not capture.isOpened():
                 raise InputError(f"live must be a device or an address that can be opened, or -, got {quoted(source)}")
             rate = capture.get(cv2.CAP_PROP_FPS)
@@ -152,26 +159,6 @@ def _captured(capture: Any) -> Iterator[Image]:
         yield image
 
 
-@dataclass(frozen=True, eq=False)
-class _FirstFrames:
-    """The first frames of a stream, as a video from which a segmenter learns."""
-
-    path: Path
-    fps: float
-    images: Sequence[Image] = field(repr=False)
-    claimed: int = 0
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self.images[0].shape[1], self.images[0].shape[0]
-
-    def count(self) -> int:
-        return len(self.images)
-
-    def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
-        return (scaled(image, size) for image in self.images[start:stop:step])
-
-
 def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None]) -> Iterator[LiveMask]:
     """Yield the person in the frames of a stream: grey frames are masks; others are segmented.
 
@@ -191,8 +178,7 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    video = cast(Video, _FirstFrames(Path(stream.name), stream.fps, learned))
-    segmentation = Segmentation(video, how, (None, None))
+    segmentation = Segmentation(Video.of_images(learned, Path(stream.name), stream.fps), how, (None, None))
     segmenter = segmentation.learned()
     quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))
     for live in images:

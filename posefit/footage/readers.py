@@ -151,6 +151,8 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
                 if not stored:
                     shape = marks.values.shape
                     check_decoded(name, marks.values.nbytes * sum(known))
+                if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
+                    raise InputError(f"{file}: masks must be finite, got nan or infinity")
                 if marks.values.shape != shape:
                     raise InputError(f"{file}: mask must have shape {shape}, got {marks.values.shape}")
                 counts.add(marks.values, marks.soft)

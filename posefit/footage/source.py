@@ -10,6 +10,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from posefit.errors import InputError
+from posefit.files import opencv_name
 from posefit.footage.cameras import CameraView, calibrated, combined, listed, world_of
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import IMAGES, is_photo, page_count
@@ -84,6 +85,9 @@ def scene_of(
 
     The options are those of `posefit.track`, see `posefit.tracking.options`. Raises InputError where one does not fit.
     """
+    for source in sources:  # names are in every file that is written
+        if isinstance(source, str | Path | tuple):
+            opencv_name(source[0] if isinstance(source, tuple) else source)
     kinds = {kind_of(source) for source in sources}
     if len(kinds) > 1:
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")

@@ -39,7 +39,8 @@ class Video:
     fps: float
     size: tuple[int, int]  # width and height in pixels, as filmed
     claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
-    pictures: Sequence[tuple[Path, int]] = field(default=(), repr=False)  # files and their pages; of a video file none
+    # images, or their files and pages; of a video file none
+    pictures: Sequence[tuple[Path, int] | Image] = field(default=(), repr=False, compare=False)
     warnings: Sequence[str] = ()  # what a user should know of its frames
     guesses: Sequence[str] = ()  # what it does not state
     _order: Order = field(kw_only=True, repr=False, compare=False)  # of the file's frames: one for each moment
@@ -90,11 +91,17 @@ class Video:
         return replace(video, claimed=int(claimed)) if 0.0 < claimed < 1e9 and not uneven else video
 
     @classmethod
+    def of_images(cls, images: Sequence[Image], name: Path, fps: float) -> "Video":
+        """Return the film of images in memory."""
+        order, size = np.arange(len(images)), (images[0].shape[1], images[0].shape[0])
+        return cls(name, fps, size, pictures=images, _order=order, _filmed=order >= 0)
+
+    @classmethod
     def of_pictures(cls, files: Sequence[Path], name: Path, fps: float | None) -> "Video":
         """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
         frames, guesses = numbered(files, str(name))
-        pictures = [(file, page) for file in files for page in range(page_count(file))]
-        image = _picture(*pictures[0])
+        pictures: list[tuple[Path, int] | Image] = [(file, page) for file in files for page in range(page_count(file))]
+        image = _picture(pictures[0])
         filmed = np.array([file is not None for file in frames])
         order = np.cumsum(filmed) - 1
         if len(pictures) > len(files):
@@ -110,7 +117,7 @@ class Video:
         Raises InputError where a frame has another size than the first.
         """
         wanted = Counter(self._order[start:stop:step].tolist())  # a frame may stand for several moments
-        decoded = self._decoded(list(wanted)) if not self.pictures else (_picture(*self.pictures[k]) for k in wanted)
+        decoded = (_picture(self.pictures[k]) for k in wanted) if self.pictures else self._decoded(list(wanted))
         for (number, times), filmed in zip(wanted.items(), decoded, strict=False):
             if (filmed.shape[1], filmed.shape[0]) != self.size:
                 came = f"{filmed.shape[1]}x{filmed.shape[0]} in frame {number}"
@@ -141,7 +148,10 @@ class Video:
         return bool(self._filmed[k])
 
 
-def _picture(file: Path, page: int) -> Image:
+def _picture(source: tuple[Path, int] | Image) -> Image:
+    if isinstance(source, np.ndarray):
+        return source
+    file, page = source
     image = read_image(file, grey=False, page=page)
     if image is None:
         raise InputError(f"{file}: expected a picture, got a file that is none")

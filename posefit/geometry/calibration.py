@@ -31,7 +31,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.geometry.camera import Camera, check_focal
+from posefit.geometry.camera import Camera, check_focal, is_focal
 from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 
 Up = Literal["x", "y", "z"]
@@ -111,7 +111,8 @@ class Calibration:
         """
         if self.size is None:
             middle = self.matrix[:2, 2] / size
-            return replace(self, size=size) if ((middle > 0.25) & (middle < 0.75)).all() else None
+            fits = ((middle > 0.25) & (middle < 0.75)).all() and is_focal(np.diag(self.matrix)[:2], size)
+            return replace(self, size=size) if fits else None
         for mine, other in zip(self.size, size, strict=True):
             if mine != other and (abs(mine - other) >= BLOCK or max(mine, other) % BLOCK):
                 return None
@@ -334,6 +335,9 @@ def _qualisys(text: str) -> list[Calibration]:
         )
         names = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
         distortion = [float(lens.get(name, "0")) for name in (*names, "radialDistortion3")]
+        for key, value in lens.items():
+            if _OF_LENS.fullmatch(_plain(key)) and key not in (*names, "radialDistortion3") and _counts(value):
+                raise InputError(f"the lens key {quoted(key)}, which is not known")
         turned = np.array([[float(place.get(f"r{i}{j}", "")) for j in "123"] for i in "123"])
         rotation = np.diag([1.0, -1.0, -1.0]) @ turned  # its camera looks along -z with y up
         position = np.array([float(place.get(axis, "")) for axis in "xyz"]) / 1000.0

@@ -144,9 +144,14 @@ class Camera:
             raise InputError(f"{path}: {error}") from None
 
 
+def is_focal(focal: Array, size: Sequence[float] | Array) -> bool:
+    """Return whether a lens may have such focal lengths (2,) for pictures of a size."""
+    return bool(FOCALS[0] * max(size) <= np.min(focal) and np.max(focal) <= FOCALS[1] * max(size))
+
+
 def check_focal(focal: Array, size: Sequence[float] | Array) -> None:
     """Return nothing. Raises InputError where no lens has such focal lengths (2,) for pictures of a size."""
-    low, high = (share * max(size) for share in FOCALS)
-    if not (low <= np.min(focal) and np.max(focal) <= high):
+    if not is_focal(focal, size):
+        low, high = (share * max(size) for share in FOCALS)
         came = " and ".join(f"{length:g}" for length in focal)
         raise InputError(f"focal must be in pixels, for such pictures {low:g} to {high:g}, got {came}")

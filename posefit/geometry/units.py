@@ -1,9 +1,8 @@
 """Units of length: which one a file is in, by a length that a person has."""
 
+import math
 from collections.abc import Mapping
 from typing import Literal, get_args
-
-import numpy as np
 
 from posefit.errors import InputError
 from posefit.reading import quoted
@@ -36,10 +35,10 @@ def unit_of(length: float, plausible: tuple[float, float] = STATURES) -> Unit | 
 
     Where several are plausible it is the one that is nearest to the middle of both, by ratio.
     """
-    if not (np.isfinite(length) and length > 0.0):
+    if not (math.isfinite(length) and length > 0.0):
         return None
     low, high = plausible
-    middle = np.log(low * high) / 2.0
-    off = {unit: abs(float(np.log(length * METRES[unit])) - middle) for unit in UNITS}
+    middle = math.log(low * high) / 2.0
+    off = {unit: abs(float(math.log(length * METRES[unit])) - middle) for unit in UNITS}
     best = min(UNITS, key=off.__getitem__)
     return best if low <= length * METRES[best] <= high else None

@@ -52,6 +52,7 @@ NAMES = {
 }
 ROTATIONS = "Zrotation Xrotation Yrotation"
 LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
+BOM = b"\xef\xbb\xbf"  # which some editors write first
 NODES = 1_000  # joints and ends of a file
 FRAME_TIMES = (1e-4, 10.0)  # seconds
 WHOLE_RATE = 1e-4  # how far a rate may be from a whole number, as a share: files state 0.0083333 for 1 / 120
@@ -125,12 +126,11 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
 
 @dataclass
 class _Node:
-    name: str
+    name: str  # "" of an End Site
     parent: int
     offset: Array | None = None
     channels: list[tuple[bool, int]] = field(default_factory=list)  # whether it turns, and its axis
     column: int = 0  # of its first channel
-    tips: list[Array] = field(default_factory=list)  # the offsets of its End Sites
 
 
 @dataclass
@@ -143,12 +143,13 @@ class _Content:
 def _parsed(path: Path) -> _Content:
     """Return what a file says. Raises InputError with file and line where it is no BVH file."""
     nodes: list[_Node] = []
-    opened: list[_Node | None] = []  # None for an End Site
-    waiting: _Node | str | None = None  # what the next brace opens
-    count, frame_time, width, ends = -1, 0.0, 0, 0
+    opened: list[_Node] = []
+    numbers: list[int] = []  # of those that are opened
+    waiting: _Node | None = None  # what the next brace opens
+    count, frame_time, width = -1, 0.0, 0
     data, rows, number, moving = array("d"), 0, 0, False
     for number, raw in lines_of(path, LONGEST_LINE):
-        words = raw.split()
+        words = raw.removeprefix(BOM).split()
         if not words:
             continue
         if frame_time:
@@ -177,31 +178,23 @@ def _parsed(path: Path) -> _Content:
             else:
                 raise mistake(path, number, "Frames: and Frame Time:", shown(raw))
         elif word in (b"ROOT", b"JOINT", b"END"):
-            if waiting is not None or (word == b"ROOT") != (not opened) or (opened and node is None):
+            if waiting is not None or (word == b"ROOT") != (node is None) or (node is not None and not node.name):
                 raise mistake(path, number, "a ROOT, with JOINT and End Site inside", shown(raw))
-            if len(nodes) + ends >= NODES:
+            if len(nodes) >= NODES:
                 raise mistake(path, number, f"at most {NODES} joints and ends", "more")
-            if word == b"END":
-                waiting, ends = "", ends + 1
-            else:
-                name = b" ".join(rest).decode("utf-8", errors="replace")
-                waiting = _Node(name, -1 if node is None else nodes.index(node))
-                nodes.append(waiting)
+            name = "" if word == b"END" else b" ".join(rest).decode("utf-8", errors="replace") or "unnamed"
+            waiting = _Node(name, -1 if node is None else numbers[-1])
+            nodes.append(waiting)
         elif word == b"{" and waiting is not None:
             brace = True
-        elif word == b"}" and opened:
-            if node is not None and node.offset is None:
+        elif word == b"}" and node is not None:
+            if node.offset is None:
                 raise mistake(path, number, f"an OFFSET of {quoted(node.name)}", "none")
             opened.pop()
-        elif word == b"OFFSET" and opened:
-            offset = np.array(values_of(path, number, words, 3))
-            if node is not None:
-                node.offset = offset
-            else:
-                owner = opened[-2]
-                assert owner is not None
-                owner.tips.append(offset)
-        elif word == b"CHANNELS" and node is not None and not node.channels:
+            numbers.pop()
+        elif word == b"OFFSET" and node is not None:
+            node.offset = np.array(values_of(path, number, words, 3))
+        elif word == b"CHANNELS" and node is not None and node.name and not node.channels:
             node.channels, node.column = _channels(path, number, words, raw), width
             width += len(node.channels)
         elif word == b"MOTION" and not opened and nodes:
@@ -209,7 +202,8 @@ def _parsed(path: Path) -> _Content:
         elif word != b"HIERARCHY" or nodes:
             raise mistake(path, number, "HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION", shown(raw))
         if brace and waiting is not None:
-            opened.append(waiting if isinstance(waiting, _Node) else None)
+            opened.append(waiting)
+            numbers.append(len(nodes) - 1)
             waiting = None
     if not rows or rows != count:
         raise mistake(path, max(number, 1), f"{max(count, 1)} frames", f"{rows}")
@@ -278,8 +272,7 @@ def _rig(content: _Content) -> Rig:
     for number in turned:
         turns[number], places[number] = turned[number], placed[number]
     at_rest = np.tile(np.eye(3), (len(nodes), 1, 1))
-    tips = [node.tips for node in nodes]
-    return Rig(names, parents, joints, tips, (at_rest, rest), (turns, places))
+    return Rig(names, parents, joints, (at_rest, rest), (turns, places))
 
 
 def write_bvh(path: str | Path, motion: Motion) -> None:

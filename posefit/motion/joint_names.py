@@ -84,7 +84,10 @@ class Joints(NamedTuple):
 
 
 def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str]:
-    """Return the joints of a tree whose nodes come after their parents, -1 for a root's; or what it lacks."""
+    """Return the joints of a tree whose nodes come after their parents, -1 for a root's; or what it lacks.
+
+    Where a bone ends that no joint follows, the node's name is "".
+    """
     parts = [part_of(name) for name in names]
     paths: list[list[int]] = []  # of each node, from a root to it
     for node, parent in enumerate(parents):
@@ -92,6 +95,11 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     limbs: dict[tuple[str, str], int] = {}
     for side in ("left", "right"):
         limbs.update({(side, joint): node for joint, node in _limbs(side, parts, paths).items()})
+        for above, end in (("shin", "foot"), ("forearm", "hand")):  # a limb may end there
+            last = limbs.get((side, above))
+            ends = [child for child, parent in enumerate(parents) if parent == last and not names[child]]
+            if ends and (side, end) not in limbs:
+                limbs[side, end] = ends[0]
     missing = [f"{side} {joint}" for side, joint in NEEDED if (side, joint) not in limbs]
     for side in ("left", "right"):
         for chain in (LEGS, ARMS):

@@ -7,7 +7,7 @@ off the frame that is most like it, each bone turned the shortest way from the o
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -56,12 +56,9 @@ _STEADY = ("femur", "tibia", "humerus", "radius", "wrist")
 class Rig:
     """Which nodes are a person's joints, and where nodes are and how they are turned: at rest, and in the frames."""
 
-    names: Sequence[str]
+    names: Sequence[str]  # "" where a bone ends that no joint follows
     parents: Sequence[int]
     joints: Joints
-    tips: Sequence[Sequence[Array]] = field(
-        repr=False
-    )  # of each node: where bones that no node follows end, (3,) in it
     rest: tuple[Array, Array] = field(repr=False)  # turns (nodes, 3, 3) and places (nodes, 3)
     moving: tuple[Array, Array] = field(repr=False)  # turns (nodes, T, 3, 3) and places (nodes, T, 3)
 
@@ -112,10 +109,13 @@ class _Places:
         return _Bone(node, *((1.0 - share) * first + share * last for first, last in ends))
 
     def tip(self, node: int, least: float) -> Array | None:
-        """Return where a node's bone ends, in the node: the farthest of its ends; None where it has none so far off."""
-        ends = [*self.rig.tips[node]]
-        ends = ends or [self._offset(child) for child, parent in enumerate(self.rig.parents) if parent == node]
-        best = max(ends, key=lambda end: float(np.linalg.norm(end)), default=None)
+        """Return where a node's bone ends, in the node; None where nothing is so far off.
+
+        That is at its farthest End Site, or else at the farthest node that hangs from it.
+        """
+        children = [child for child, parent in enumerate(self.rig.parents) if parent == node]
+        ends = [child for child in children if not self.rig.names[child]] or children
+        best = max(map(self._offset, ends), key=lambda end: float(np.linalg.norm(end)), default=None)
         return best if best is not None and float(np.linalg.norm(best)) > least else None
 
     def _offset(self, node: int) -> Array:
@@ -131,7 +131,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     """
     average = average_skeleton()
     turns, places = up @ rig.moving[0], rig.moving[1] @ up.T
-    rig = Rig(rig.names, rig.parents, rig.joints, rig.tips, rig.rest, (turns, places))
+    rig = replace(rig, moving=(turns, places))
     legs = [_length(rig, side) for side in ("left", "right")]
     mine = average.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum()
     scale = float(np.mean(legs)) / float(mine)

@@ -35,7 +35,14 @@ def one_script(package: str, names: Sequence[str]) -> str:
 
 def embedded(value: Any) -> str:
     """Return JSON that is safe in a script element, whatever texts it holds; nan and infinities are null."""
-    return json.dumps(plain(value), allow_nan=False, separators=(",", ":")).translate(_UNSAFE)
+    return _json(value).translate(_UNSAFE)
+
+
+def _json(value: Any) -> str:
+    """Return JSON, made of one part of a table after the other, as all numbers at once take much memory."""
+    if isinstance(value, dict):
+        return f"{{{','.join(f'{json.dumps(str(name))}:{_json(inner)}' for name, inner in value.items())}}}"
+    return json.dumps(plain(value), allow_nan=False, separators=(",", ":"))
 
 
 def plain(value: Any) -> Any:

@@ -37,7 +37,7 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
         "made": f"{printable(ledger.path.resolve().name)}, {time.strftime('%d %B %Y', time.localtime(ledger.changed))}",
         "answer": ["Every cell failed." if runs.failures else "No run has an error: nothing can be compared."],
         "header": _header(runs, contest),
-        "methods": [{"name": n, "settings": v["settings"]} for n, v in zip(runs.methods, runs.variants, strict=False)],
+        "methods": [{"name": n, "settings": v["settings"]} for n, v in zip(runs.methods, runs.variants, strict=True)],
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
         "joints": [place.replace("_", " ") for place in PLACES],
@@ -58,7 +58,10 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
             "baselines": baselines,
             "taking_part": contest.methods,
         }
-    data |= (_search_part if kind.name == "search" else _track_part)(ledger, runs, contest, data, warn)
+    if kind.name == "track":
+        data |= _track_part(ledger, runs, contest, data, warn)
+    else:
+        data |= _search_part(contest)
     data["sections"] += ["failures"] if runs.failures else []
     return data
 
@@ -94,7 +97,7 @@ def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, 
     }
 
 
-def _search_part(_: Ledger, __: Runs, contest: Contest | None, *___: Any) -> dict[str, Any]:
+def _search_part(contest: Contest | None) -> dict[str, Any]:
     """Return what the page has of single searches alone, and their list of sections."""
     if contest is None:
         return {"sections": []}

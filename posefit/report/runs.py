@@ -22,7 +22,7 @@ from posefit.sweep.cell import cell_from
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
-Kind = Tracks | Searches
+Kind = Tracks | Searches  # whose methods and fields have the same names
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (Tracks(), Searches())}
 # what a method chooses; all else but the seed makes an instance
 _METHOD_FIELDS = ("method", "name", "settings", "evaluations", "hypotheses", "infeasible", "version")
@@ -146,7 +146,9 @@ def _sorted_runs(version: str, kind: Kind, rows: list[_Row], quarantined: Sequen
         kind=kind,
         version=version,
         methods=tuple(names[text] for text in methods),
-        variants=tuple({**v, "settings": printable(", ".join(settings_text(v["settings"])))} for v in variants),
+        variants=tuple(
+            {**v, "settings": printable(", ".join(settings_text(v["settings"])))} for v in variants[: len(methods)]
+        ),
         instances=distinct([kind.place_name(place) for place in places], details),
         places=tuple(places),
         method=method,

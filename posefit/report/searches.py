@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 RANDOM = "random"  # the method that is the baseline
 POINTS = 61  # of a curve
-EVERY = 1_000_000  # names: a list of all
 
 Place = Mapping[str, Any]
 _COLUMNS = (
@@ -110,7 +109,8 @@ class Searches:
         functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
         instances = counted(len({(place["function"], place["instance"]) for place in places}), "instance")
         noun = "function" if len(functions) == 1 else "functions"
-        return f"{noun} {listed(functions, EVERY)} in {listed(dimensions, EVERY)} dimensions, {instances} in all"
+        numbers = f"{listed(functions, len(functions))} in {listed(dimensions, len(dimensions))}"
+        return f"{noun} {numbers} dimensions, {instances} in all"
 
     def baseline_sentences(self, first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
         """Return how random search compares with the leader."""

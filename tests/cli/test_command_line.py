@@ -20,16 +20,18 @@ import posefit
 from posefit.cli import main
 from posefit.cli.output import say
 from posefit.errors import InputError
-from posefit.motion import built_in
+from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip, write_amc
 from posefit.motion.asf import write_asf
 from posefit_priors.pca import PCA
 from tests.cases import each
 from tests.commands import error_of, printed, run
 from tests.files import arrays
+from tests.geometry.turns import about
+from tests.motion.rigs import STYLES, write_rig
 from tests.plugins.test_registry import point, registering
 
-FEW = ["--evaluations", "50", "--set", "annealed.population_size=10"]
+FEW = ["--evaluations", "50"]
 QUICK = [*FEW, "--size", "120x90"]
 FILES = {
     "poses.npz", "track.amc", "track.bvh", "track.trc", "track.c3d", "track.glb", "track.mot", "model.osim",
@@ -109,9 +111,7 @@ def test_the_same_seed_gives_the_same_poses_with_any_number_of_threads() -> None
 
 def test_the_command_is_the_typed_call() -> None:
     summary = printed("track", "walk", "--frames", "0:3", "--seed", "7", *QUICK)
-    called = posefit.track(
-        "walk", frames=(0, 3), seed=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90)
-    ).summary
+    called = posefit.track("walk", frames=(0, 3), seed=7, evaluations=50, size=(120, 90)).summary
     for key in KEYS - TIMES:
         assert summary[key] == called[key]
 
@@ -120,7 +120,7 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     summary = printed("fit", "walk", "--frame", "7", "--out", tmp_path / "fit", *QUICK)
     assert len(summary["pose_degrees"]) == 66
     assert summary["frames"] == 1
-    fit = posefit.fit("walk", frame=7, evaluations=50, settings={"annealed.population_size": 10}, size=(120, 90))
+    fit = posefit.fit("walk", frame=7, evaluations=50, size=(120, 90))
     np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
     assert fit.trace.shape[1] == 2
 
@@ -153,6 +153,37 @@ def test_an_amc_is_tracked_with_the_asf_beside_it(clip: tuple[Path, Path]) -> No
     summary = printed("track", clip[1], "--method", "sapso", "--train", "walk-a", "--train", "walk-c", *QUICK)
     assert summary["frames"] == 3  # 12 frames at 120 Hz, at 30
     assert summary["train"] == ["walk-a", "walk-c"]
+
+
+def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(tmp_path: Path) -> None:
+    walk, out = recorded.clip("16_15").motion().frames(0, 12), tmp_path / "out"
+    path = write_rig(tmp_path / "rig.bvh", walk, STYLES["mixamo"], 100.0, about(0, np.pi / 2))
+    words = ["--method", "sapso", "--train", "walk-a", "--frames", "5:8", "--evaluations", "100", "--size", "120x90"]
+    assert run("track", path, "--out", out, *words).exit_code == 0
+    summary = json.loads((out / "summary.json").read_text())
+    unit, axis = summary["warnings"]
+    assert unit.startswith(f"{path}: lengths are taken for centimetres")
+    assert axis == f"{path}: z is taken to be up, as the person stands along it; --up sets it"
+    for name in ("frames.csv", "angles.csv"):
+        with (out / name).open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert [int(float(row["frame"])) for row in rows] == [5, 6, 7]
+        assert [float(row["seconds"]) for row in rows] == pytest.approx([5 / 30, 6 / 30, 7 / 30], abs=1e-3)
+    assert arrays(out / "poses.npz")["frames"].tolist() == [5, 6, 7]
+    assert (out / "track.trc").read_text().splitlines()[6].startswith(f"6\t{5 / 30:.6f}")
+    stated = printed("track", path, "--unit", "cm", "--up", "z", *words)
+    assert stated["warnings"] == []
+    assert stated["mpjpe_mm"] == pytest.approx(summary["mpjpe_mm"])
+
+
+def test_an_amc_without_a_rate_is_assumed_to_be_cmus_or_given_one(clip: tuple[Path, Path]) -> None:
+    text = clip[1].read_text()
+    clip[1].write_text(text[text.index(":FULLY") :])
+    words = ["--method", "sapso", "--train", "walk-a", "--evaluations", "100", "--size", "120x90"]
+    assumed, given = printed("track", clip[1], *words), printed("track", clip[1], "--rate", "60", *words)
+    assert (assumed["frames"], given["frames"]) == (3, 6)
+    assert "120 frames a second are assumed" in assumed["warnings"][0]
+    assert given["warnings"] == []
 
 
 def test_a_folder_and_an_npz_of_the_same_masks_give_the_same(tmp_path: Path) -> None:
@@ -247,7 +278,7 @@ def test_bad_files_are_refused(clip: tuple[Path, Path], tmp_path: Path) -> None:
     np.savez(tmp_path / "c.npz", masks=np.full((2, 9, 9), np.nan))
     for words, message in (
         ([tmp_path / "empty"], "expected a folder with mask images"),
-        ([tmp_path / "a.npz"], "with the key masks"),
+        ([tmp_path / "a.npz"], "masks must have shape (frames, height, width), got (3,)"),
         ([tmp_path / "b.npz"], "masks must have shape (frames, height, width), got (3, 4)"),
         ([tmp_path / "c.npz"], "masks must be finite"),
     ):

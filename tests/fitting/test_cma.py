@@ -160,3 +160,11 @@ def test_a_spread_of_nothing_is_refused() -> None:
             CMAES(space, np.random.default_rng(0))
     narrow = Toy(4, start=Start(np.zeros(4), np.array([0.1, 0.0, 0.1, 0.1]), np.zeros(4)))
     assert np.abs(CMAES(narrow, np.random.default_rng(0)).ask()[:, 1]).max() < 1e-5
+
+
+def test_what_is_moved_is_moved_towards_the_best_of_the_last_generation() -> None:
+    optimiser = CMAES(Toy(3, shell), np.random.default_rng(0), population_size=10)
+    for seed in range(3):
+        proposals, costs = optimiser.ask(), np.random.default_rng(seed).random(10)
+        optimiser.tell(proposals, costs)
+        np.testing.assert_array_equal(optimiser.home, proposals[costs.argmin()])

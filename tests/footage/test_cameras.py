@@ -87,7 +87,7 @@ def test_everything_that_is_guessed_is_reported(tmp_path: Path) -> None:
         "the calibration is for pictures of this size, which it does not state",
     ]
     bare.write_text("K: [[200, 0, 79.5], [0, 200, 259.5], [0, 0, 1]]\n")
-    with pytest.raises(ValueError, match="camera 'bare' must have its centre in 160x120, got 79.5x259.5"):
+    with pytest.raises(ValueError, match="camera 'bare' must be of 160x120, got a centre of 79.5x259.5"):
         scene_of([source], camera=[bare])
 
 

@@ -185,7 +185,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     assert result.summary["frames"] == 12
     assert result.summary["held_frames"] == 3
     assert result.summary["evaluations"] == 9 * 400
-    assert [row["usable"] for row in result.frames] == usable.astype(float).tolist()
+    assert result.table["usable"].tolist() == usable.astype(float).tolist()
     poses = result.motion.poses
     np.testing.assert_array_equal(poses[5], poses[4])
     np.testing.assert_array_equal(poses[6], poses[4])

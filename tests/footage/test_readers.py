@@ -196,3 +196,14 @@ def test_a_person_who_touches_the_border_in_all_masks_is_followed(walk: list[Any
         )
     scene = scene_of([tmp_path])
     assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(walk)
+
+
+def test_an_image_of_numbers_that_are_none_is_refused(tmp_path: Path) -> None:
+    values = np.zeros((12, 10), dtype=np.float32)
+    values[3:9, 2:6] = 0.7
+    Image.fromarray(values).save(tmp_path / "a.tif")
+    assert read_masks(tmp_path, ALL).silhouette(0).mask.sum() == 24
+    values[0, 0] = np.nan
+    Image.fromarray(values).save(tmp_path / "a.tif")
+    with pytest.raises(ValueError, match="a.tif: masks must be finite, got nan or infinity"):
+        read_masks(tmp_path, ALL)

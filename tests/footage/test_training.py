@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.footage import source
 from posefit.motion import built_in, recorded
+from posefit.motion import clips as clips_of_sources
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
@@ -65,12 +65,12 @@ def test_more_than_the_memory_holds_is_refused_before_a_motion_is_made(monkeypat
     poses = sum(int(clip.times[-1]) + 1 for clip in recorded.clips())
     clips = training_clips(["library"])
     assert sum(clip.count(recorded.FPS) for clip in clips) == poses
-    monkeypatch.setattr(source, "allowed_bytes", lambda: 3 * poses * POSE_BYTES)
+    monkeypatch.setattr(clips_of_sources, "allowed_bytes", lambda: 3 * poses * POSE_BYTES)
     assert len(training_motions(clips[:1], 120.0)) == 1
     message = f"the 0.6 GB of memory that there may be, got 0.8 GB for {4 * poses:,} poses at 120 frames a second"
     with pytest.raises(ValueError, match=message):
         training_motions(clips, 120.0)
-    monkeypatch.setattr(source, "allowed_bytes", lambda: 100_000_000)
+    monkeypatch.setattr(clips_of_sources, "allowed_bytes", lambda: 100_000_000)
     error = error_of("track", "walk", "--train", "library")
     assert error.startswith("posefit: train must take at most the 0.1 GB of memory that there may be, got 0.1 GB")
 

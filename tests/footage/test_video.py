@@ -116,7 +116,7 @@ def test_a_relative_name_with_a_colon_is_a_file(tmp_path: Path, monkeypatch: pyt
     assert opencv_name("run-10:30") == str(tmp_path / "run-10:30")
 
 
-@each("where", ["source", "out", "extract"])
+@each("where", ["source", "out", "extract", "live", "masks"])
 def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Path, where: str) -> None:
     strange = os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9")
     film(tmp_path / "walk.avi", truth()[:4])
@@ -124,9 +124,15 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Pat
     if where == "source":
         os.rename(tmp_path / "walk.avi", f"{strange}.avi")
         words = ("track", f"{strange}.avi", "--out", tmp_path / "out")
+    elif where == "masks":
+        np.savez(strange + ".npz", masks=truth()[:4])
+        (tmp_path / "walk.avi").unlink()
+        words = ("track", strange + ".npz", "--out", tmp_path / "out")
+    elif where == "live":
+        words = ("track", "--live", strange)
     elif where == "extract":
         words = ("extract", tmp_path / "walk.avi", "--out", strange)
-    assert "expected a name in UTF-8, got one that OpenCV cannot open" in error_of(*words)
+    assert "expected a name in UTF-8, got one that is not" in error_of(*words)
     assert len(list(tmp_path.iterdir())) == 1
 
 
@@ -141,9 +147,7 @@ def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(
 
 def test_a_link_that_leads_nowhere_is_no_place_to_write_to(tmp_path: Path) -> None:
     (tmp_path / "out").symlink_to(tmp_path / "nothing")
-    assert "out: expected a folder to write to, got a link that leads nowhere" in error_of(
-        "track", "walk", "--out", tmp_path / "out"
-    )
+    assert "out: expected a folder to write to, got a link" in error_of("track", "walk", "--out", tmp_path / "out")
 
 
 def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:

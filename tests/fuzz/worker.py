@@ -57,7 +57,8 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
 
     def calibration(path: Path) -> object:
         cameras = read_calibrations(path)
-        alike = [camera for camera in cameras if camera.size is None or 3 * camera.size[0] == 4 * camera.size[1]]
+        cameras = [fit for camera in cameras if (fit := camera if camera.size else camera.padded((640, 480)))]
+        alike = [camera for camera in cameras if camera.size and 3 * camera.size[0] == 4 * camera.size[1]]
         return [(camera.camera((64, 48), upright(cameras)), camera.maps((64, 48))) for camera in alike]
 
     def video(path: Path) -> object:

@@ -106,6 +106,11 @@ def test_qualisys_third_radial_number_is_opencvs_fifth(tmp_path: Path) -> None:
         ("a.xml", "<calibration>", "XML that is broken"),
         ("a.xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><calibration/>", "document type"),
         ("a.xml", QUALISYS.replace("intrinsic", "lens"), "a camera without intrinsic"),
+        (
+            "a.xml",
+            QUALISYS.replace("tangentalDistortion1", "tangentialDistortion1"),
+            "the lens key 'tangentialDistortion1'",
+        ),
         ("a.xml", QUALISYS.replace('r11="1"', 'r11="3"'), "a rotation that is none"),
         ("a.yml", "%YAML:1.0\n---\nimage_width: 3\n", "without camera_matrix, image_width and image_height"),
     ],

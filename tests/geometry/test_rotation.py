@@ -11,12 +11,16 @@ from scipy.spatial.transform import Rotation
 from posefit.arrays import Array
 from posefit.geometry.rotation import (
     along_y,
+    angles_about,
     geodesic,
     joint_angles_from_rotation,
     quaternions,
     root_angles_from_rotation,
     rotation_from_joint_angles,
     rotation_from_root_angles,
+    shortest_turn,
+    steady_angles,
+    unwrapped,
     wrapped,
 )
 from tests.cases import each
@@ -106,3 +110,33 @@ def test_y_is_taken_to_any_direction() -> None:
     np.testing.assert_allclose(rotations @ np.swapaxes(rotations, -1, -2), np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
     lengths = np.linalg.norm(directions, axis=1)
     np.testing.assert_allclose(lengths[:, None] * rotations[..., 1], directions, atol=1e-12)
+
+
+def test_the_shortest_turn_takes_one_direction_to_another_about_what_is_across_both() -> None:
+    rng = np.random.default_rng(4)
+    start, end = rng.normal(size=(2, 50, 3))
+    start[0], end[0] = (1.0, 2.0, 3.0), (-2.0, -4.0, -6.0)  # half a turn
+    start[1], end[1] = (0.0, 0.0, 2.0), (0.0, 0.0, 1.0)
+    turns = shortest_turn(start, end)
+    np.testing.assert_allclose(turns @ np.swapaxes(turns, -1, -2), np.tile(np.eye(3), (50, 1, 1)), atol=1e-12)
+    unit = [each / np.linalg.norm(each, axis=1, keepdims=True) for each in (start, end)]
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", turns, unit[0]), unit[1], atol=1e-12)
+    cosines = (unit[0] * unit[1]).sum(axis=1)
+    np.testing.assert_allclose((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, cosines, atol=1e-12)  # of the angle
+    np.testing.assert_array_equal(shortest_turn(np.zeros(3), end[0]), np.eye(3))
+
+
+def test_steady_angles_are_the_same_rotations_without_jumps() -> None:
+    times = np.linspace(0.0, 12.0, 400)
+    spin = np.stack([3.0 * times, 2.0 * np.sin(times), 1.5 * times], axis=-1)  # its middle angle passes 90 degrees
+    rotations = rotation_from_joint_angles(spin[:, ::-1])
+    angles = angles_about((2, 1, 0), rotations)
+    assert np.abs(np.diff(angles, axis=0)).max() > 3.0
+    steady = steady_angles(angles)
+    assert np.abs(np.diff(steady, axis=0)).max() < 0.2
+    np.testing.assert_allclose(rotation_from_joint_angles(steady[:, ::-1]), rotations, atol=1e-9)
+
+
+def test_unwrapped_passes_over_what_is_unknown() -> None:
+    series = np.array([3.0, np.nan, np.nan, -3.1, -3.0])
+    np.testing.assert_allclose(unwrapped(series), [3.0, np.nan, np.nan, 2 * np.pi - 3.1, 2 * np.pi - 3.0])

@@ -108,6 +108,9 @@ STYLES: dict[str, Style] = {
     ),
     "biovision": Style(BIOVISION),
     "biovision without toes": Style({joint: name for joint, name in BIOVISION.items() if joint != "toe"}),
+    "biovision to wrists and ankles": Style(
+        {joint: name for joint, name in BIOVISION.items() if joint not in ("hand", "foot", "toe")}
+    ),
     "poser": Style(
         {
             "hips": "hip", "spine": "abdomen", "chest": "chest", "neck": "neck", "head": "head",
@@ -215,7 +218,9 @@ def write_rig(
             parent = start
             for role in chain:
                 parent = add(role, side, parent) if role in style.names else parent
-            joints[parent].tip = at_rest[JOINTS.index(letter + end)]
+            lacks = chain[2 if chain is LEG else 3] not in style.names  # it ends at the ankle or the wrist
+            last = end if not lacks else "tibia" if chain is LEG else "radius"
+            joints[parent].tip = at_rest[JOINTS.index(letter + last)]
     if style.no_ends:
         for joint in joints:
             joint.tip = None

@@ -206,6 +206,15 @@ def test_what_a_rig_lacks_is_at_rest_and_said(tmp_path: Path) -> None:
     assert (np.linalg.norm(forwards, axis=1) > 0.03).all()
     whole = read_bvh(write_rig(tmp_path / "whole.bvh", walk, STYLES["motionbuilder"]))
     assert whole.notes == ()
+    path = write_rig(tmp_path / "short.bvh", walk, STYLES["biovision to wrists and ankles"])
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())  # as some editors save it
+    short = read_bvh(path)
+    assert "without lfoot, ltoes, rfoot, rtoes, lwrist, lhand, rwrist, rhand, which are" in short.notes[0]
+    for above, end in (("lhumerus", "lradius"), ("rhumerus", "rradius"), ("lfemur", "ltibia"), ("rfemur", "rtibia")):
+        shank, expected = (
+            each.joints[:, JOINTS.index(end)] - each.joints[:, JOINTS.index(above)] for each in (short, walk)
+        )
+        np.testing.assert_allclose(shank, expected, atol=1e-5)
 
 
 @each(("unit", "axis"), [(unit, axis) for unit in UNITS for axis in ("y", "z")] + [("m", "x"), ("cm", "-y")])

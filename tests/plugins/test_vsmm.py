@@ -24,8 +24,9 @@ from posefit.testing import check_tracker
 from posefit_vsmm import tracker
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.motion import library as library_of_models
+from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.search import Search
-from posefit_vsmm.state import decode, encode, plus
+from posefit_vsmm.state import AT, ENDS, ERROR, decode, encode, plus
 from posefit_vsmm.switching import Switching
 from posefit_vsmm.tracker import MAX_BLIND_FRAMES, VSMM, swarm_led_by_models
 from tests.cases import each
@@ -241,7 +242,8 @@ def test_a_setting_counts_whatever_the_variant_is() -> None:
 
 @each("variant", ["default", "patent"])
 def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    task, observations = seen(frames=6)
+    task, observations = seen(frames=5)
+    observations[3] = blank(observations[3])  # where no joint is detected
     measured: list[np.ndarray] = []
     marks = np.arange(17)[:, None] + np.array([1000.0, 2000.0])  # where no joint is expected
     monkeypatch.setattr(tracker.JointFilter, "follow", lambda *_: marks)
@@ -258,5 +260,37 @@ def test_a_hidden_joint_is_where_its_own_filter_has_it(variant: str, monkeypatch
         np.testing.assert_array_equal(frame.details["joints"][0][hidden], marks[hidden])
         assert (frame.details["joints"][0][~hidden] < 1000.0).all()
         hidden_joints += int(hidden.sum())
-    assert hidden_joints
+    assert hidden_joints >= 17
     assert any((points >= 1000.0).any() for points in measured) is (variant == "patent")
+
+
+def test_a_detection_that_is_too_far_off_counts_as_an_end_without_a_limb() -> None:
+    task, observations = seen(frames=1)
+    motion = built_in.motion("jacks-b", frames=1)
+    state = encode(motion.poses, motion.translations)[0]
+    cameras = tracker.JointCameras(task.body, task.cameras, library_of_models().dependent)
+    hand = int(ENDS[AT["left hand"], 0])
+    pixels = cameras.project(task.cameras[0], state[None])[0][0, AT["left hand"]]
+    measured = []
+    for away in (0.0, 60.0):  # pixels that a landmark is off
+        landmarks = np.zeros((1, 27, 3))
+        landmarks[0, hand] = [*(pixels + away), 1.0]
+        views = [lines_of(observations[0].silhouettes[0].mask)]
+        measured += cameras.detect(views, state, 1e-6 * np.eye(ERROR), landmarks)
+    near, far = measured
+    assert near.confidence[AT["left hand"]] == 1.0
+    assert far.confidence[AT["left hand"]] == 0.0
+    assert far.unassigned == near.unassigned + 1
+
+
+def test_a_limb_is_sought_all_around_once_it_was_missing_for_some_frames() -> None:
+    task, _ = seen(frames=1)
+    followed = tracker.TrackFilter(VSMM(task), np.random.default_rng(0))
+    followed._missing = dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0)
+    confidence = np.ones(17)
+    confidence[AT["left hand"]] = 0.0
+    missing = tracker.JointMeasurement(np.zeros((17, 2)), confidence, np.ones((17, 2)), 1)
+    for measured in (missing, missing._replace(unassigned=0), missing):  # no end is left over: the limb is hidden
+        for frame in range(1, tracker.MISSING_FRAMES + 1):
+            extra = followed._missing_variances([measured])
+            assert extra.any() == (frame == tracker.MISSING_FRAMES and measured.unassigned == 1)

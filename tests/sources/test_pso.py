@@ -72,3 +72,13 @@ def test_bests_are_remembered_and_every_move_is_accepted() -> None:  # KENNEDY19
     np.testing.assert_array_equal(pso.pbest, [first[0], first[1], second[2]])
     np.testing.assert_array_equal(pso.pbest_cost, [3.0, 1.0, 1.5])
     np.testing.assert_allclose(np.abs(pso.ask() - second).max(), np.abs(pso.v).max())  # it moves on from worse, too
+
+
+def test_a_cost_that_is_only_as_good_is_no_new_best() -> None:  # KENNEDY1995 (pbest, gbest)
+    pso = PSO(Toy(3), np.random.default_rng(0), population_size=4)
+    first = pso.ask()
+    for costs in ([5.0, 5.0, 5.0, 5.0], [5.0, 6.0, 5.0, 4.0]):
+        moved = pso.ask()
+        pso.tell(moved, np.array(costs))
+    np.testing.assert_array_equal(pso.pbest[:3], first[:3])
+    np.testing.assert_array_equal(pso.pbest[3], moved[3])

@@ -194,7 +194,7 @@ def test_images_of_another_size_are_refused(every_frame, walk):
 
 def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(walk, tmp_path):
     out = tmp_path / "out"
-    words = ["track", "--live", "-", "--out", out, "--evaluations", 40, "--population-size", 20, "--restarts", 1]
+    words = ["track", "--live", "-", "--out", out, "--evaluations", 80, "--restarts", 1]
     script = "import posefit.footage.live as live; live.STALL_SECONDS = 20.0; from posefit.cli import run; run()"
     command = [sys.executable, "-c", script, *map(str, words), "--view-degrees", "45"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=False) as process:

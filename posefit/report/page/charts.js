@@ -27,7 +27,7 @@ function textWidth(text, weight = 400) {
 
 // The charts of a section, each with a line of the methods that are shown.
 function drawCharts(section) {
-  for (const about of D.charts.filter((one) => one.section === section)) {
+  for (const about of D.charts.filter(({ section: own }) => own === section)) {
     const [box, note] = [make("div", { class: "chart", id: about.name }), make("p", { class: "small" })];
     $(`${section}-charts`).append(make("figure", {}, make("figcaption", {}, about.title), box, note));
     drawn(box, (width) => {
