@@ -40,13 +40,15 @@ from posefit.output.drawing import draw_body, write
 from posefit.reading import existing, read_text
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.options import ITERATIONS, TrackOptions
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands import CLIPS
-from posefit_reproduce.sapso.experiment import estimate_images
+from posefit_reproduce.experiment import Table
+from posefit_reproduce.sapso.experiment import ITERATIONS, estimate_images, options_of
+from posefit_reproduce.sapso.methods import LABELS as METHOD_LABELS
+from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
 from posefit_reproduce.sapso.motions import paper_motions
 from posefit_reproduce.sapso.paper import FRAMES as FRAMES_OF_THE_PAPER
-from posefit_reproduce.sapso.paper import METHODS, OURS, PAPER, settings_of
 
 Activity = Literal["walk", "run"]
 ACTIVITIES: dict[str, Activity] = {"walking": "walk", "jogging": "run", "jog": "run", "running": "run"}
@@ -58,7 +60,8 @@ TALL = 300  # pixels of a picture in a figure
 SQUARE = 0.65  # of the person's height in pixels: half the side of such a picture
 SOLID = 0.65  # how much of the film the body hides
 SINGLE = "PCA + SAPSO, images"
-LABELS = {SINGLE: SINGLE} | {name: f"{METHODS[name].label}, tracked" for name in PAPER}
+TRACKED = (*PAPER, LETTER)
+LABELS = {SINGLE: SINGLE} | {name: f"{METHOD_LABELS[name]}, tracked" for name in TRACKED}
 Estimates = dict[int, Frame]  # the poses of some frames of a scene
 
 
@@ -141,14 +144,14 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     and nothing is smoothed.
     """
     estimates: dict[str, Estimates] = {}
-    for name in PAPER:
-        how = TrackOptions(method=name, evaluations=40 * (iterations + 1), seed=seed, smooth=False, body_frames=0)
-        track = track_scene(replace(scene, yaw=None), training, how.changed(settings=settings_of(name)))
+    for name in TRACKED:
+        how = TrackOptions(**options_of(name, training, iterations), seed=seed, smooth=False, body_frames=0)
+        track = track_scene(replace(scene, yaw=None), training, how)
         estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]
     images = {k: replace(scene.observations[k], yaw=None) for k in chosen}
-    single = estimate_images(scene, images, training, OURS, iterations, seed)  # last: its seconds have no compiling
+    single = estimate_images(scene, images, training, OURS, iterations, seed)
     return {SINGLE: dict(zip(chosen, single, strict=True)), **estimates}
 
 
@@ -160,7 +163,6 @@ def figures_of(estimates: Estimates, scene: Scene) -> dict[str, float]:
         "usable": len(usable),
         "iou": float(np.mean([metrics.iou(frame.areas)[0] for frame in usable])),
         "cost": float(np.mean([frame.cost for frame in usable])),
-        "seconds_per_frame": float(np.mean([frame.seconds for frame in usable])),
     }
 
 
@@ -196,17 +198,13 @@ def _square(image: Any, silhouette: Silhouette) -> Image:
     return square
 
 
-def lines_of(name: str, film: dict[str, Any]) -> list[str]:
-    """Return what is printed of a film."""
-    first, stop = film["frames"]
-    lines = [
-        f"{name}: {film['activity']}, frames {first} to {stop - 1}, camera {film['camera']}",
-        f"{'':24}{'frames':>8}{'usable':>8}{'IoU':>8}{'cost':>8}{'s':>8}",
+def table_of(name: str, film: dict[str, Any]) -> Table:
+    """Return what is known of a film's estimates, without a truth."""
+    rows = [
+        [LABELS[method], *(str(row[key]) for key in ("frames", "usable")), f"{row['iou']:.3f}", f"{row['cost']:.2f}"]
+        for method, row in film["estimates"].items()
     ]
-    for method, row in film["estimates"].items():
-        figures = f"{row['iou']:8.3f}{row['cost']:8.2f}{row['seconds_per_frame']:8.3f}"
-        lines.append(f"  {LABELS[method]:22}{row['frames']:8}{row['usable']:8}{figures}")
-    return lines + [f"  {warning}" for warning in film["warnings"]]
+    return Table(name, ["method", "frames", "usable", "IoU with the mask", "cost (4)"], rows)
 
 
 @click.command(cls=Command)
@@ -258,14 +256,19 @@ def main(
             }
             shown, single = list(estimates[SINGLE]), {SINGLE: estimates.pop(SINGLE)}
             for figure, each in (("figure-8", single), ("figure-10", estimates)):
-                cv2.imwrite(str(folder / f"{figure}-{recording.name}.png"), picture(scene, each, shown, first))
+                image = picture(scene, each, shown, first)
+                cv2.imwrite(str(folder / f"{figure}-{recording.name}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 85])
+            table = table_of(recording.name, rows[recording.name])
+            (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
         report = {"seed": seed, "iterations": iterations, "films": rows}
         (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     if as_json:
         click.echo(json.dumps(report))
         return
     for name, film in rows.items():
-        click.echo("\n".join(lines_of(name, film)))
+        first, stop = film["frames"]
+        click.echo(f"{name}: {film['activity']}, frames {first} to {stop - 1}, camera {film['camera']}\n")
+        click.echo("\n".join([f"{table_of(name, film)}\n", *film["warnings"]]))
     click.echo(f"written to {out}")
 
 

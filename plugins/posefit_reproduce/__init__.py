@@ -1,16 +1,17 @@
 """The experiments of the two publications, and the benchmark: `posefit reproduce` and `posefit bench`.
 
-    posefit reproduce sapso  Acta Automatica Sinica 38(5): its tables, figures and claims
-    posefit reproduce vsmm   CN101894278: four activities, against an IMM over all models
+    posefit reproduce sapso  Acta Automatica Sinica 38(5): its tables, figures and claims, and what each part is worth
+    posefit reproduce vsmm   CN101894278: four activities, by default and to the letter, against an IMM over all models
     posefit bench            how fast the loop is
 
 Each has `--help`, and `--json` for one JSON object on stdout. Other measurements are scripts in the repository's
 folder `docs/studies`.
 
     commands.py     the command lines
+    experiment.py   the shape of both: runs that are stored, and tables, claims and figures made of them
     sapso/, vsmm/   the experiments; `sapso/letter.py` is an optimiser, `sapso-letter`
     bench/          the benchmark
-    jobs.py         runs jobs in processes, by the engine of `posefit sweep`
+    jobs.py         runs jobs in processes, by the pool of `posefit sweep`
 """
 
 from posefit import hookimpl

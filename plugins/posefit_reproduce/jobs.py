@@ -1,13 +1,11 @@
-"""What the experiments share: jobs in processes of the sweep engine, and the folder of a report with figures."""
+"""Jobs in processes of the sweep's pool, for the experiments and for studies."""
 
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import closing, contextmanager
-from pathlib import Path
+from contextlib import closing
 from typing import Any, TypeVar
 
 from posefit.errors import InputError
-from posefit.files import new_folder
 from posefit.sweep.engine import Limits
 from posefit.sweep.pool import Pool, cores
 
@@ -51,25 +49,3 @@ def each(
 
 def _called(job: tuple[K, Callable[[], T]]) -> T:
     return job[1]()
-
-
-def check_seeds(seeds: int) -> None:
-    """Return nothing. Raises ValueError where it is no number of seeds."""
-    if seeds < 1:
-        raise InputError(f"seeds must be at least 1, got {seeds}")
-
-
-@contextmanager
-def figures_folder(path: str | Path | None) -> Iterator[Path | None]:
-    """Yield a new folder for a report and its figures, whole or not at all; None where there is no path.
-
-    Raises ImportError where the library that draws figures is not installed, and InputError where the path exists.
-    """
-    if path is None:
-        yield None
-        return
-    from posefit.report.figures import library
-
-    library("")
-    with new_folder(path) as folder:
-        yield folder

@@ -85,12 +85,14 @@ class IMM:
     """One cycle after the other over models that change into each other: the states of a Markov chain.
 
     `predict(states, covariances)` returns each model's state (r, n) and covariance (r, e, e) a frame later. Row i of
-    `transition` (r, r) holds how probable each model is after model i.
+    `transition` (r, r) holds how probable each model is after model i. The residual is that of the predicted state, or
+    of the mixed one that it was predicted from, as the patent's (9) has it.
     """
 
     predict: Callable[[Array, Array], tuple[Array, Array]]
     transition: Array
     manifold: Manifold = Manifold()
+    at_mixed: bool = False  # whether residuals are those of states before their prediction. Interpretation V3
 
     def __post_init__(self) -> None:
         if not ((self.transition >= 0.0).all() and np.allclose(self.transition.sum(axis=1), 1.0)):
@@ -100,7 +102,8 @@ class IMM:
         """Return the belief one frame later; `measure` returns the measurement for states."""
         mixed = self.mixed(belief)
         states, covariances = self.predict(mixed.states, mixed.covariances)  # VSMM 6.3a
-        after = self.updated(replace(mixed, states=states, covariances=covariances), measure)
+        predicted = replace(mixed, states=states, covariances=covariances)
+        after = self.updated(predicted, (lambda _: measure(mixed.states)) if self.at_mixed else measure)
         joint = after.log_likelihoods + mixed.log_probabilities  # VSMM 6.4
         return replace(after, log_probabilities=joint - np.logaddexp.reduce(joint))
 

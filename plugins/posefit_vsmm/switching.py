@@ -15,7 +15,7 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit_vsmm.groups import Topology, most_probable
 from posefit_vsmm.imm import IMM, QUATERNIONS, Belief, Measure, Measurement, start
-from posefit_vsmm.motion import MotionModels, lifted
+from posefit_vsmm.motion import FPS, MotionModels, lifted
 from posefit_vsmm.state import AT, inverse_tangents, unit
 
 # where thighs and shanks begin and end
@@ -23,7 +23,8 @@ _UPPER = [AT[name] for name in ("left hip", "right hip", "left knee", "right kne
 _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right foot")]
 Structure = Literal["variable", "all"]
 MOST = 3  # of the four lower limbs. Interpretation V15
-FIRST_CYCLES = 10  # over all models before a group is chosen
+FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
+FIRST_SECONDS = 1.0  # by default: within ten cycles the filter has not settled yet. Interpretation V19
 ENDED = 0.9  # the ratio, new to old, below which a new group ends
 
 
@@ -81,6 +82,8 @@ class Switching:
         self.topology, self.groups = topology, topology.groups
         self.models = models.of(topology.union(topology.groups))
         self._patent, self._structure, self._filter = patent, structure, lru_cache(self._filter_of)
+        second = round(FIRST_SECONDS * FPS / self.models.share)
+        self._first_cycles = FIRST_CYCLES if patent else max(FIRST_CYCLES, second)
         self.restart()
 
     def restart(self) -> None:
@@ -94,7 +97,9 @@ class Switching:
 
     def _filter_of(self, names: tuple[str, ...]) -> IMM:
         models, transition = self.models.of(names), self.topology.transition(names)
-        return IMM(models.predict_numbers, transition) if self._patent else IMM(models.predict, transition, QUATERNIONS)
+        if self._patent:
+            return IMM(models.predict_numbers, transition, at_mixed=True)
+        return IMM(models.predict, transition, QUATERNIONS)
 
     @property
     def imm(self) -> IMM:
@@ -152,15 +157,16 @@ class Switching:
             self.group = likely
             return after
         if self.group is None:
-            return after if self._cycles < FIRST_CYCLES else self._only(likely, after)
+            return after if self._cycles < self._first_cycles else self._only(likely, after)
         if self.newcomer is not None:
             return self.decided(after)
         number = requested_group(self._points)
         if number is None or number >= len(self.groups) or (newcomer := tuple(self.groups)[number]) == self.group:
             return after
         if self._patent:
+            old = self.active
             both = self.joined(before, newcomer)
-            return self.decided(self.imm.cycle(both, measure))  # run again, and judged
+            return self.decided(self._beside(old).cycle(both, measure))  # run again, and judged
         # Interpretation V11: the cycle is run again over both groups; new models had a probability of 0
         old, fused = self.active, self.imm.fused(before)
         self.bring_in(newcomer)
@@ -168,12 +174,25 @@ class Switching:
             regrouped(before, old, self.active, dict.fromkeys(self.active, (*fused, -np.inf))), measure
         )
 
+    def _beside(self, old: Sequence[str]) -> IMM:
+        """Return the filter in which the prediction of models that are not `old` has their noise as its covariance."""
+        imm, rows = self.imm, [k for k, name in enumerate(self.active) if name not in old]
+        noises = self.models.of(self.active).noises
+
+        def predict(states: Array, covariances: Array) -> tuple[Array, Array]:
+            states, covariances = imm.predict(states, covariances)
+            for k in rows:
+                covariances[k] = self._lifted(states[k : k + 1], noises[k])[0]  # VSMM 8.2
+            return states, covariances
+
+        return replace(imm, predict=predict)
+
     def joined(self, belief: Belief, newcomer: str) -> Belief:
         """Return a belief with another group's models beside those in force, as the patent starts them. VSMM 8."""
         old, (state, _) = self.active, self.fused(belief)
         self.bring_in(newcomer)
         top = belief.log_probabilities.max()  # VSMM 8.1
-        noises = dict(zip(self.models.names, self.models.noises, strict=True))  # VSMM 8.2
+        noises = dict(zip(self.models.names, self.models.noises, strict=True))
         poses = {name: self.models.captured_nearest(name, state) for name in self.active if name not in old}  # VSMM 8.3
         new = {name: (pose, self._lifted(pose[None], noises[name])[0], top) for name, pose in poses.items()}
         return normalised(regrouped(belief, old, self.active, new))

@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, Start, displacement
-from posefit.fitting.check import at_least, between, choices, positive, whole
+from posefit.fitting.check import at_least, between, choices, one_of, positive, whole
 from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, minimise
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
@@ -120,7 +120,8 @@ class Prediction:
         spread (k): standard deviations of the start, as multiples of the predicted step, 0 or more. Interpretation S5.
         floor: the least they are, in half-ranges of the box, above 0: a still subject keeps some. Interpretation S5.
         root_range_degrees: yaw, pitch and roll that are searched, to either side of the last ones. Ours.
-        tilt: pitch and roll are "learned" with the latents, or a "box" around upright. Interpretation S16.
+        tilt: pitch and roll are "learned" with the latents, or a "box" around upright; by default learned, and a box
+            to the letter of the paper. Interpretation S16.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
         relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
         variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
@@ -130,7 +131,7 @@ class Prediction:
     spread: float = SPREAD
     floor: float = FLOOR
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
-    tilt: Literal["learned", "box"] = "learned"
+    tilt: Literal["learned", "box"] | None = None
     beta: float = BETA
     relocalise_gap: int | None = None
     variant: Literal["default", "paper"] = "default"
@@ -138,6 +139,7 @@ class Prediction:
     def __post_init__(self) -> None:
         object.__setattr__(self, "beta", float(self.beta))  # 1 is 1.0, to compiled loops and in a summary
         choices(Prediction, vars(self))
+        one_of("tilt", self.tilt or "learned", ("learned", "box"))
         positive("floor", self.floor)
         between("beta", self.beta, 0.0, 1.0)
         for name in ("spread", "root_range_degrees"):
@@ -147,7 +149,7 @@ class Prediction:
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""
-        if self.tilt == "box" or self.variant == "paper" or not training:
+        if (self.tilt or ("box" if self.variant == "paper" else "learned")) == "box" or not training:
             return None
         return Tilt.of(prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES)))
 

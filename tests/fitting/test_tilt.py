@@ -142,6 +142,9 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
     assert tilt(TrackOptions(method=("annealed", learned))) is None
     assert tilt(TrackOptions(method=("annealed", learned), settings={"tracker.tilt": "learned"})) is not None
+    assert tilt(TrackOptions(method="@pca", settings={"tracker.variant": "paper"})) is None
+    with pytest.raises(ValueError, match="tilt must be"):  # what is set wins: it is not quietly a box
+        tilt(TrackOptions(method="@pca", settings={"tracker.variant": "paper", "tracker.tilt": "learned"}))
 
 
 @each(

@@ -1,5 +1,6 @@
 """The experiment of the VSMM patent: what it comes to, and what `posefit reproduce vsmm` prints and draws."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -9,44 +10,38 @@ import pytest
 from click.testing import CliRunner
 
 from posefit.cli import main
-from posefit.fitting.tracker import Frame
 from posefit.motion import built_in
-from posefit_reproduce.vsmm import activities
+from posefit_reproduce.experiment import Results, Run, reproduce
+from posefit_reproduce.vsmm import activities, tables
 from posefit_reproduce.vsmm.activities import film_of
-from posefit_reproduce.vsmm.experiment import (
-    HAND,
-    METHODS,
-    PatentTrack,
-    State,
-    activity_figures,
-    change,
-    detected_cm,
-    follow_film,
-    model_states,
-    switching_figures,
-)
+from posefit_reproduce.vsmm.experiment import LABELS, MODELS, TUNED, Scale, patent_experiment, perform
+from posefit_reproduce.vsmm.tables import ELBOW, HAND, film_figures, joint_errors, switching_figures
 from posefit_vsmm.state import AT
-
-WORDS = ("walk", "arms-out", "jacks", "squat")  # the labels of the film's activities
 
 
 @pytest.fixture(scope="module")
-def experiment() -> PatentTrack:
-    return follow_film(METHODS["default"], 0)
+def tracked() -> dict[str, Any]:
+    return dict(perform(Run("tuned", "film", "default", seed=0)))
 
 
 @pytest.fixture(scope="module")
 def film() -> activities.Film:
-    return film_of(0)
+    return film_of(TUNED)
 
 
 @pytest.mark.slow
-def test_the_experiment_is_about_as_good_as_the_patents(experiment: PatentTrack) -> None:
-    figures = experiment.figures
-    assert figures["dominant_fraction"] >= 0.8
-    assert figures["elbow_cm"] <= 5.2
-    assert figures["hand_cm"] <= 5.2
-    assert figures["activity_accuracy"] > figures["chance"]
+def test_the_experiment_is_about_as_good_as_the_patents(tracked: dict[str, Any]) -> None:
+    figures = film_figures(0, tracked)
+    assert figures["dominant"] >= 80.0
+    assert figures["elbow"] <= 5.2
+    assert figures["hand"] <= 5.2
+    assert figures["label"] > 100.0 * 140 / 450  # by chance
+
+
+def test_no_film_is_both_tuned_on_and_reported() -> None:
+    runs = list(Scale(films=3).runs)
+    assert {run.seed for run in runs if run.kind == "reported"} == {5, 6, 7}
+    assert {run.seed for run in runs if run.kind == "tuned"} == {0, 1, 2, 3, 4}
 
 
 def test_no_motion_of_the_experiment_was_learned_from(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,85 +58,84 @@ def test_no_motion_of_the_experiment_was_learned_from(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.slow
-def test_the_figures_are_drawn(tmp_path: Path, experiment: PatentTrack) -> None:
+def test_tables_and_figures_are_made_of_runs(tmp_path: Path, tracked: dict[str, Any]) -> None:
     pytest.importorskip("matplotlib")
-    from posefit_reproduce.vsmm.figures import patent_figures
+    made = patent_experiment(Scale(films=2))
+    found = reproduce(dataclasses.replace(made, perform=lambda run: tracked), tmp_path / "out", 1, None)
+    names = {"compared", "films-default", "films-patent", "claims", "labels-default", "labels-patent", "settings"}
+    assert {table.name for table in found} == {*names, "predictions"}
+    for figure in ("9-joints-default.jpg", "10-probabilities-patent.png", "11-errors-default.png"):
+        assert (tmp_path / "out" / f"figure-{figure}").stat().st_size > 10_000
+    settings = next(table for table in found if table.name == "settings")
+    assert [row[1:3] for row in settings.rows] == [["0.0", "0"]] * 4  # a setting that changes nothing
 
-    names = patent_figures(film_of(0), experiment.frames, tmp_path)
-    assert names == ["figure-9-joints.png", "figure-10-probabilities.png", "figure-11-errors.png"]
-    assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
 
-
-@pytest.mark.slow
-def test_reproduce_prints_both_presets() -> None:
-    wrong = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "0"])
+def test_a_number_of_films_that_is_none_is_a_mistake() -> None:
+    wrong = CliRunner().invoke(main, ["reproduce", "vsmm", "--films", "0"])
     assert wrong.exit_code == 2
-    assert wrong.output.splitlines()[-1] == "posefit: seeds must be at least 1, got 0"
-    result = CliRunner().invoke(main, ["reproduce", "vsmm", "--seeds", "1"])
-    assert result.exit_code == 0
-    for words in ("default  patent  imm_all_six", "\nthe right model ", "\ndegrees ahead ", "\nlabels, patent "):
-        assert words in result.stdout
+    assert wrong.output.splitlines()[-1] == "posefit: films must be at least 1, got 0"
 
 
-def states(film: activities.Film, probability: float = 0.9) -> list[State]:
-    """Return the states of a tracker that is always right and has one group an activity."""
-    groups = {one.label: tuple(sorted(one.models)) for one in activities.ACTIVITIES}
-    counts = {"lost": False, "filter_seconds": 0.001, "detection_seconds": 0.002}
-    every = []
-    for label in film.labels:
-        name = activities.ACTIVITIES[label].label
-        shares = np.full(len(groups[name]), (1.0 - probability) / max(len(groups[name]) - 1, 1))
-        shares[0] = probability
-        force = {"group": name, "newcomer": None, "models": groups[name], "probabilities": shares}
-        every.append({"groups": groups, **force, "activity": WORDS[label], **counts})
-    return every
+def right(film: activities.Film) -> dict[str, Any]:
+    """Return what a tracker holds that is always right: groups G1, G1, G3 and G3 in force, one model at 0.9."""
+    labels = np.array(film.labels)
+    probabilities = np.full((len(labels), len(MODELS)), 0.02)
+    names = ("walk", "arms-out", "jacks", "squat")
+    probabilities[np.arange(len(labels)), [MODELS.index(names[label]) for label in labels]] = 0.9
+    none = np.full(len(labels), -1)
+    seconds = {"filter_seconds": np.full(len(labels), 0.001), "detection_seconds": np.full(len(labels), 0.002)}
+    lost = np.zeros(len(labels), dtype=bool)
+    group = np.array([0, 0, 2, 2])[labels]
+    return {"probabilities": probabilities, "group": group, "newcomer": none, "label": labels, "lost": lost, **seconds}
 
 
 def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) -> None:
-    figures = switching_figures(film, states(film))
-    assert figures["dominant_fraction"] == figures["right_model_fraction"] == figures["right_group_fraction"] == 1.0
-    assert figures["switch_delays_frames"] == [0, 0, 0]
-    assert figures["wrong_activations"] == figures["wrong_terminations"] == figures["activations"] == 0
-    assert (figures["filter_ms"], figures["detection_ms"]) == pytest.approx((1.0, 2.0))
+    figures = switching_figures(film.labels, right(film))
+    assert [figures[name] for name in ("dominant", "model", "group", "label")] == [100.0] * 4
+    assert [figures[name] for name in ("delay", "activations", "wrong_terminations", "lost")] == [0.0] * 4
+    assert (figures["filter"], figures["detection"]) == pytest.approx((1.0, 2.0))
 
 
 def test_what_is_late_or_wrong_is_counted(film: activities.Film) -> None:
-    right = states(film)
-    # waving and striding shares the model `walk` with stepping; jumping jacks, 140 frames, and squat, 60, do not
-    figures = switching_figures(film, [right[0]] * len(right))
-    assert figures["switch_delays_frames"] == [0, 140, 60]
-    assert figures["right_group_fraction"] == 250 / 450
-    right[5] = {**right[5], "newcomer": "squat"}
-    right[7] = {**right[7], "group": None}  # a restart
-    figures = switching_figures(film, right)
-    assert (figures["activations"], figures["wrong_activations"]) == (1, 1)
-    assert figures["right_group_fraction"] == 449 / 450
+    arrays = right(film)
+    # for ten frames all models are tried; G1 stays: waving and striding shares the model `walk` with stepping, and
+    # jumping jacks, 140 frames, and squats, 60, do not
+    arrays["group"] = np.where(np.arange(450) < 10, -1, 0)
+    figures = switching_figures(film.labels, arrays)
+    delays = [figures[f"delay_{name}"] for name in ("stepping", "waving", "jacks", "squat")]
+    assert delays == [10, 0, 140, 60]
+    assert figures["delay"] == 140
+    assert figures["group"] == pytest.approx(100.0 * 240 / 450)
+    arrays = right(film)
+    arrays["newcomer"] = np.where(np.arange(450) == 5, 2, -1)  # G3, while the person steps
+    figures = switching_figures(film.labels, arrays)
+    assert (figures["activations"], figures["wrong_activations"], figures["wrong_terminations"]) == (1, 1, 0)
+    arrays = right(film)
+    arrays["group"][100:110] = 2  # the right group goes
+    assert switching_figures(film.labels, arrays)["wrong_terminations"] == 1
 
 
 def test_labels_are_counted_by_activity(film: activities.Film) -> None:
-    figures = activity_figures(film, states(film))
-    assert figures["confusion"] == [[120, 0, 0, 0, 0], [0, 130, 0, 0, 0], [0, 0, 140, 0, 0], [0, 0, 0, 60, 0]]
-    assert (figures["activity_accuracy"], figures["chance"]) == (1.0, 140 / 450)
-    jump = {**states(film)[0], "activity": "jump"}
-    assert activity_figures(film, [jump] * 450)["confusion"][3] == [0, 0, 0, 0, 60]
+    runs = {Run("reported", "film", "default", seed=TUNED): right(film)}
+    table = tables.labels_table("labels", Results(runs), "default")
+    assert table.heads[0] == "% (by chance 31)"  # 140 of 450 frames
+    assert [row[1:] for row in table.rows] == [
+        ["100", "0", "0", "0", "0", "0"],
+        ["0", "100", "0", "0", "0", "0"],
+        ["0", "0", "100", "0", "0", "0"],
+        ["0", "0", "0", "100", "0", "0"],
+    ]
+    runs[next(iter(runs))]["label"] = np.full(450, LABELS.index("jump"))
+    assert tables.labels_table("labels", Results(runs), "default").rows[3][1:] == ["0", "0", "0", "0", "100", "0"]
 
 
-def test_errors_against_detected_joints_leave_hidden_ones_out(film: activities.Film) -> None:
-    truth = film.truth.skeleton.joints(film.truth.poses[:1], film.truth.translations[:1])
-    pixels, depths = film.camera.project(truth)
-    nothing = np.zeros((1, 3), dtype=np.int64)
-    frame = Frame(film.truth.poses[0], film.truth.translations[0], 0.0, nothing, 1)
-    joints, confidence = np.zeros((1, 17, 2)), np.zeros((1, 17))
-    point = AT["right hand"]
-    joints[0, point] = pixels[0, HAND] + [3.0, 4.0]
-    confidence[0, point] = 0.5
-    assert model_states([frame]) == []  # of a tracker without models
-    assert switching_figures(film, []) == {}
-    elbow, hand = detected_cm(film, [frame], [{"joints": joints, "confidence": confidence}])[0]
-    assert np.isnan(elbow)
-    assert hand == pytest.approx(100.0 * 5.0 * depths[0, HAND] / film.camera.focal[0])
-
-
-def test_alternatives_are_compared_film_by_film() -> None:
-    rows: list[list[dict[str, Any]]] = [[{"mpjpe_mm": mm} for mm in values] for values in ((90, 110), (100, 104))]
-    assert change(*rows) == {"worse_mm": 2.0, "worse_films": 1.0}
+def test_errors_against_detected_joints_are_of_every_frame(film: activities.Film) -> None:  # Interpretation V18
+    truth = film.truth
+    pixels, depths = film.camera.project(truth.skeleton.joints(truth.poses, truth.translations))
+    joints = np.zeros((450, 1, 17, 2))
+    joints[:, 0, AT["right hand"]] = pixels[:, HAND] + [3.0, 4.0]
+    joints[:, 0, AT["right elbow"]] = pixels[:, ELBOW]
+    errors = joint_errors(film, {"poses": truth.poses, "translations": truth.translations, "joints": joints})
+    np.testing.assert_allclose(errors["_detected"][:, 0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(errors["_detected"][:, 1], 100.0 * 5.0 * depths[:, HAND] / film.camera.focal[0])
+    np.testing.assert_allclose(errors["_space"], 0.0)

@@ -5,7 +5,7 @@ with Applications to Tracking and Navigation, Wiley 2001, chapter 11.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,8 +72,11 @@ def begin(truth: Array) -> Belief:
     return start(truth[0], np.diag([400.0, 100.0, 400.0, 100.0]), 2)
 
 
-def reference(belief: Belief, seen: Array) -> Belief:
-    """Return one cycle as the book writes it: probabilities as they are, S inverted, P - K S K'."""
+def reference(belief: Belief, seen: Array, at_mixed: bool = False) -> Belief:
+    """Return one cycle as the book writes it: probabilities as they are, S inverted, P - K S K'.
+
+    With `at_mixed` the residual is that of the state before it is predicted, as the patent's (9) has it.
+    """
     mu = np.exp(belief.log_probabilities)
     c = TRANSITION.T @ mu
     states, covariances, likelihoods = [], [], []
@@ -87,7 +90,7 @@ def reference(belief: Belief, seen: Array) -> Belief:
         x, P = MODELS[j].matrix @ mean, MODELS[j].matrix @ spread @ MODELS[j].matrix.T + MODELS[j].noise
         S = H @ P @ H.T + SIGMA**2 * np.eye(2)
         K = P @ H.T @ np.linalg.inv(S)
-        v = seen - H @ x
+        v = seen - H @ (mean if at_mixed else x)
         states.append(x + K @ v)
         covariances.append(P - K @ S @ K.T)
         likelihoods.append(np.exp(-0.5 * v @ np.linalg.inv(S) @ v) / np.sqrt(np.linalg.det(2.0 * np.pi * S)))
@@ -95,12 +98,13 @@ def reference(belief: Belief, seen: Array) -> Belief:
     return Belief(np.array(states), np.array(covariances), np.log(mu / mu.sum()), np.log(likelihoods))
 
 
-def test_a_flight_is_filtered_as_the_book_writes_it() -> None:  # VSMM 6.2a
+@each("at_mixed", [False, True])
+def test_a_flight_is_filtered_as_the_book_and_the_patent_write_it(at_mixed: bool) -> None:  # VSMM 6.2a
     truth, seen = path(np.random.default_rng(0))
-    imm = imm_of(MODELS, TRANSITION)
+    imm = replace(imm_of(MODELS, TRANSITION), at_mixed=at_mixed)
     belief = twin = begin(truth)
     for place in seen:
-        belief, twin = imm.cycle(belief, measuring(place)), reference(twin, place)
+        belief, twin = imm.cycle(belief, measuring(place)), reference(twin, place, at_mixed)
         np.testing.assert_allclose(belief.states, twin.states, rtol=1e-8, atol=1e-6)
         np.testing.assert_allclose(belief.covariances, twin.covariances, rtol=1e-7, atol=1e-6)
         np.testing.assert_allclose(belief.log_probabilities, twin.log_probabilities, atol=1e-7)

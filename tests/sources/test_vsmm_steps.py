@@ -33,8 +33,9 @@ from posefit_vsmm.state import (
     plus,
     tangents,
 )
-from posefit_vsmm.switching import FIRST_CYCLES, Switching, limb_angles, normalised, regrouped, requested_group
+from posefit_vsmm.switching import Switching, limb_angles, normalised, regrouped, requested_group
 from posefit_vsmm.tracker import VSMM, TrackFilter
+from tests.cases import each
 
 SIZE = (240, 320)  # rows, columns
 NO_BIAS = np.zeros((len(POINTS), 2))
@@ -342,17 +343,35 @@ def begun(switching: Switching) -> Belief:
     return switching.start(encode(walk.poses[:1], walk.translations[:1])[0], 0.01 * np.eye(ERROR))
 
 
-def test_after_ten_cycles_over_all_models_the_most_probable_group_stays() -> None:  # VSMM 5
+@each(("variant", "cycles"), [("patent", 10), ("default", 30)])  # by default a second of 30 frames
+def test_after_some_cycles_over_all_models_the_most_probable_group_stays(variant: str, cycles: int) -> None:  # VSMM 5
     for model, group in (("walk", "G1"), ("squat", "G3")):
-        switching = running()
-        belief, measure = begun(switching), telling(model, switching)
-        for _ in range(FIRST_CYCLES - 1):
+        switching = running(variant=variant)
+        state, covariance = begun(switching).states[0], 0.01 * np.eye(ERROR)
+        belief, measure = switching.start(state, covariance), telling(model, switching)
+        for _ in range(cycles - 1):
             belief = switching.cycle(belief, measure, NOBODY)
             assert switching.group is None
         belief = switching.cycle(belief, measure, NOBODY)
         assert switching.group == group
         assert len(belief.probabilities) == 3
         assert np.isclose(belief.probabilities.sum(), 1.0)
+
+
+def test_a_new_models_prediction_has_its_noise_as_covariance_to_the_letter() -> None:  # VSMM 8.2
+    switching = running(variant="patent")
+    belief = replace(begun(switching), log_probabilities=np.log(np.full(6, 1.0 / 6.0)))
+    belief = switching._only("G1", belief)
+    old = switching.active
+    both = switching.joined(belief, "G3")
+    states, covariances = switching._beside(old).predict(both.states, both.covariances)
+    _, usual = switching.imm.predict(both.states, both.covariances)
+    noises = switching.models.of(switching.active).noises
+    for k, name in enumerate(switching.active):
+        expected = usual[k] if name in old else lifted(states[k : k + 1], noises[k])[0]
+        np.testing.assert_allclose(covariances[k], expected)
+        if name not in old:
+            assert np.trace(covariances[k]) < np.trace(usual[k])
 
 
 def test_the_points_are_projected_and_their_jacobian_is_right() -> None:  # VSMM 6.1

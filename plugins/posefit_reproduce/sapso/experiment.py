@@ -1,171 +1,141 @@
-"""The experiments of the SAPSO paper's section 5: single images, tracks of three motions, first frames, baselines.
+"""The experiments of the SAPSO paper's section 5: tracks of three motions, single images, first frames, baselines.
 
-The tables need errors of single angles and frames, and the figures poses, which a sweep does not keep; so all are jobs.
+| kind | what is run |
+|---|---|
+| track | 100 frames, the first yaw known to 45 degrees. Table 2, figure 9 |
+| unknown | the same with the first yaw unknown. Interpretation S17 |
+| image | each frame by itself, from all around, the yaw unknown. Section 5.3, table 1, figure 7 |
+| hidden | the same with a part of the silhouette hidden. Figure 8 |
+| first | searches of the first frame with several sizes of the swarm. Figure 6 |
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from itertools import product
-from typing import Any, Literal, NamedTuple
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.errors import InputError
 from posefit.evaluation.errors import nearest
 from posefit.evaluation.measures import BASELINES
-from posefit.fitting import metrics
-from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import place_of
 from posefit.footage.scene import Scene, with_corruption
-from posefit.geometry.rotation import wrapped
 from posefit.motion.motion import Motion
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
-from posefit.uncertainty.modes import nearer_mirrored
-from posefit_reproduce.jobs import Progress, check_seeds, each
-from posefit_reproduce.sapso.motions import PaperMotion, paper_scene
-from posefit_reproduce.sapso.paper import (
-    COMPARED,
-    DRIVEN,
-    LETTER,
-    OCCLUDER,
-    OURS,
-    WORKERS,
-    Scale,
-    settings_of,
-)
-from posefit_swarm.sapso import SAPSO
+from posefit_reproduce.experiment import Arrays, Experiment, Results, Run
+from posefit_reproduce.sapso.methods import LETTER, METHODS, OTHERS, OURS, PAPER, PARTS, TURNING
+from posefit_reproduce.sapso.motions import PaperMotion, paper_motions, paper_scene
+from posefit_reproduce.sapso.paper import FRAMES, SWARMS
 
-PARTICLES = 40  # N, section 5.2
-
-# a motion tracked; its frames each by itself, and with a part hidden; what needs no search; searches of its first frame
-Kind = Literal["tracked", "images", "hidden", "baselines", "first frame"]
+PARTICLES, ITERATIONS = 40, 60  # section 5.2
+OCCLUDER = 0.5  # strength of the occluder that hides a part of the silhouette, as in figure 8
+BOTH = (OURS, LETTER)
+COMPARED = {
+    "walk": (*PAPER, *OTHERS, *PARTS),
+    "turn": (*PAPER, *OTHERS, *PARTS, *TURNING),
+    "run": (*PAPER, *OTHERS, *PARTS),
+}
 
 
-class Run(NamedTuple):
-    """Names what is run."""
+@dataclass(frozen=True)
+class Scale:
+    """How much of the paper's experiments is run.
 
-    kind: Kind
-    motion: str
-    view: float
-    seed: int = 0
-    method: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class PaperTrack:
-    """Poses of a motion's frames, tracked or each by itself, and their figures."""
-
-    poses: Array = field(repr=False)  # (T, 66)
-    seconds: float  # a frame
-    evaluations: float  # a frame
-    swapped: float  # share of frames
-    lost: float
-
-
-@dataclass(frozen=True, eq=False)
-class PaperResults:
-    """All results, from which tables and figures are made."""
-
-    motions: Mapping[str, PaperMotion]
-    scale: Scale
-    seeds: int
-    # a `PaperTrack` where poses are estimated, by name the poses (T, 66) of baselines, and of first frames the lowest
-    # costs (swarms, iterations + 1)
-    runs: Mapping[Run, Any] = field(repr=False)
-
-    def of(self, motion: str, method: str = "", kind: Kind = "tracked") -> list[Any]:
-        """Return the results of a method, view by view and seed by seed."""
-        return [
-            self.runs[Run(kind, motion, view, seed, method)]
-            for view, seed in product(self.scale.views, range(self.seeds))
-        ]
-
-    def poses(self, motion: str, name: str = OURS, kind: Kind = "tracked") -> Array:
-        """Return what a method or a baseline makes of a motion, (views, seeds, T, 66)."""
-        if name in BASELINES:
-            poses = [self.runs[Run("baselines", motion, view)][name] for view in self.scale.views]
-            return np.repeat(np.array(poses)[:, None], self.seeds, axis=1)
-        results = np.array([result.poses for result in self.of(motion, name, kind)])
-        return results.reshape(len(self.scale.views), self.seeds, *results.shape[1:])
-
-    def errors(self, motion: str, name: str, free: bool = False) -> Array:
-        """Return the errors (8) in degrees of a method or a baseline, (views, seeds, T).
-
-        Those of all angles, or of the `free` ones that move. Interpretation S18.
-        """
-        test = self.motions[motion].test
-        chosen = test.skeleton.free if free else None
-        poses = self.poses(motion, name)
-        return np.array([[metrics.pose_error_degrees(test.poses, one, chosen) for one in view] for view in poses])
-
-    def angle_errors(self, motion: str, name: str = OURS, kind: Kind = "images") -> Array:
-        """Return the absolute errors (views, seeds, T, 66) of each angle in degrees. Section 5.3."""
-        away = wrapped(self.poses(motion, name, kind) - self.motions[motion].test.poses)
-        return np.asarray(np.degrees(np.abs(away)))
-
-
-def repeat_paper(
-    motions: Mapping[str, PaperMotion],
-    seeds: int,
-    scale: Scale,
-    workers: int = WORKERS,
-    progress: Progress | None = None,
-) -> PaperResults:
-    """Return what the experiments give on the motions of `paper_motions`, from so many processes.
-
-    Raises ValueError where `seeds` is no positive number.
+    Single images take every other seed, and their letter, which is eight times as slow, the first one.
     """
-    check_seeds(seeds)
-    jobs: dict[Run, Callable[[], Any]] = {}
-    for (name, motion), view in product(motions.items(), scale.views):
-        jobs[Run("baselines", name, view)] = partial(baseline_poses, motion, view)
-        for seed in range(seeds):
-            runs = [Run("tracked", name, view, seed, method) for method in COMPARED[name]]
-            jobs |= {run: partial(follow_paper, motion, run, scale) for run in runs}
-            images: tuple[Kind, ...] = ("images", "hidden")
-            runs = [Run(kind, name, view, seed, method) for kind, method in product(images, (OURS, LETTER))]
-            jobs |= {run: partial(estimate_paper, motion, run, scale) for run in runs}
-            if name in ("walk", "run"):
-                jobs[Run("first frame", name, view, seed)] = partial(converge, motion, scale, view, seed)
-    return PaperResults(motions, scale, seeds, each(jobs, workers, progress))
+
+    seeds: int = 10
+    frames: int = FRAMES
+    views: tuple[float, ...] = (0.0, 45.0, 90.0)  # of tracks
+    around: tuple[float, ...] = tuple(45.0 * k for k in range(8))  # of single images
+    iterations: int = ITERATIONS
+
+    @property
+    def runs(self) -> Iterator[Run]:
+        """All runs, seed by seed, so that what is interrupted has whole seeds."""
+        if self.seeds < 1:
+            raise InputError(f"seeds must be at least 1, got {self.seeds}")
+        for seed, motion in product(range(self.seeds), COMPARED):
+            for view, method in product(self.views, (*COMPARED[motion], *BASELINES)):
+                yield Run("track", motion, method, view, seed)
+            if motion != "turn":
+                yield from (Run("first", motion, method, view, seed) for view, method in product(self.views, BOTH))
+            if seed % 2:
+                continue
+            methods = (OURS,) if seed else BOTH
+            yield from (Run("image", motion, method, view, seed) for view, method in product(self.around, methods))
+            for kind, view, method in product(("hidden", "unknown"), self.views, methods):
+                yield Run(kind, motion, method, view, seed)
 
 
-def follow_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
+QUICK = Scale(seeds=2, frames=15, views=(0.0, 45.0), around=(0.0, 45.0))
+
+
+@lru_cache(maxsize=2)
+def loaded(clips: str | Path | None, frames: int) -> Mapping[str, PaperMotion]:
+    """Return the motions of `paper_motions`, read once a process."""
+    return paper_motions(clips, frames)
+
+
+def perform(clips: str | Path | None, scale: Scale, run: Run) -> Arrays:
+    """Return what a run gives: poses (T, 66), and CPU seconds and evaluations a frame; costs of a first frame."""
+    motion = loaded(clips, scale.frames)[run.subject]
+    if run.kind == "first":
+        frames = [first_frame(motion, scale.iterations, count, run) for count in SWARMS]
+        return {"history": np.array([frame.trace[:, 1] for frame in frames])}
+    scene = paper_scene(motion, run.view)
+    if run.method in BASELINES:
+        return {"poses": baseline(motion, scene, run.method)}
+    if run.kind in ("track", "unknown"):
+        frames = follow(scene, motion, scale, run)
+    else:
+        observations: Sequence[Observation] = scene.observations
+        if run.kind == "hidden":
+            observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, run.seed)
+        images = dict(enumerate(observations))
+        frames = estimate_images(scene, images, motion.training, run.method, scale.iterations, run.seed)
+    return {
+        "poses": np.array([frame.pose for frame in frames]),
+        "cpu_seconds": np.median([frame.cpu_seconds or 0.0 for frame in frames]),
+        "evaluations": np.mean([frame.evaluations for frame in frames]),
+    }
+
+
+def options_of(name: str, training: Sequence[Motion], iterations: int) -> dict[str, Any]:
+    """Return the options of a method's tracks, all with N (C + 1) evaluations a frame."""
+    options = {"train": training, "evaluations": PARTICLES * (iterations + 1), **METHODS[name].options}
+    method = options["method"]
+    if isinstance(method, tuple) and isinstance(method[1], type):
+        learned = method[1]().fit(np.concatenate([motion.poses[:, 3:] for motion in training]))
+        options["method"] = method[0], learned
+    return options
+
+
+def follow(scene: Scene, motion: PaperMotion, scale: Scale, run: Run) -> list[Frame]:
     """Track a motion; the first pose is searched, from any yaw if it is unknown, and the translation is known."""
-    results = track(
-        paper_scene(motion, run.view, first_yaw=scale.first_yaw),
-        restarts=RESTARTS if scale.first_yaw == "unknown" else None,
-        train=motion.training,
-        method=run.method,
-        settings=settings_of(run.method),
-        evaluations=PARTICLES * (scale.iterations + 1),
-        seed=run.seed,
-    )
-    summary = results.summary
-    evaluations = summary["evaluations"] / summary["frames"]
-    shares = summary["swap_rate"], summary["lost_rate"]
-    return PaperTrack(results.motion.poses, summary["seconds_per_frame"], evaluations, *shares)
+    options = options_of(run.method, motion.training, scale.iterations)
+    if run.kind == "unknown":
+        return track(replace(scene, yaw=None), restarts=RESTARTS, seed=run.seed, **options).frames
+    return track(scene, seed=run.seed, **options).frames
 
 
 def estimate_images(
-    scene: Scene,
-    images: Mapping[int, Observation],
-    training: Sequence[Motion],
-    name: str,
-    iterations: int,
-    seed: int,
+    scene: Scene, images: Mapping[int, Observation], training: Sequence[Motion], name: str, iterations: int, seed: int
 ) -> list[Frame]:
     """Return the pose in each image by itself, whichever way the person faces: a full circle of yaws. Section 5.3.
 
     `images` are observations of the scene by their frames' numbers; a method is run that `METHODS` names.
     """
-    options = TrackOptions(method=name, settings=settings_of(name), evaluations=PARTICLES * (iterations + 1), seed=seed)
+    options = TrackOptions(**options_of(name, training, iterations), seed=seed)
     task = replace(task_of(scene, options, training), yaw=None)  # Interpretation S17
     method, frames = prepare(options, task), list[Frame]()
     for k, image in images.items():
@@ -175,83 +145,38 @@ def estimate_images(
     return frames
 
 
-def estimate_paper(motion: PaperMotion, run: Run, scale: Scale) -> PaperTrack:
-    """Estimate the pose in each frame by itself; the translation is known. Section 5.3."""
-    scene = paper_scene(motion, run.view)
-    observations = scene.observations
-    if run.kind == "hidden":
-        observations = with_corruption(observations, {"occluder": OCCLUDER}, 0.0, run.seed)
-    images = dict(enumerate(observations))
-    frames = estimate_images(scene, images, motion.training, run.method, scale.iterations, run.seed)
-    estimate = replace(motion.test, poses=np.array([frame.pose for frame in frames]))
-    truth, joints = motion.test.joints, estimate.joints
-    return PaperTrack(
-        estimate.poses,
-        float(np.mean([frame.seconds for frame in frames])),
-        float(np.mean([frame.evaluations for frame in frames])),
-        float(nearer_mirrored(truth, joints).mean()),
-        float((metrics.mpjpe_mm(truth, joints) > metrics.LOST_MM).mean()),
-    )
+def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
+    """Return the poses (T, 66) of a baseline, with the true root and translation, which no method has."""
+    truth, angles = motion.test.poses, motion.angles
+    if name == "persistence":
+        return np.tile(truth[0], (len(truth), 1))
+    if name == "nearest":
+        return np.array([nearest(scene, angles, k, image) for k, image in enumerate(scene.observations)])
+    return np.column_stack([truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))])
 
 
-def baseline_poses(motion: PaperMotion, view: float) -> dict[str, Array]:
-    """Return the poses (T, 66) of each baseline, all with the true root and translation, which no method has."""
-    truth, angles, scene = motion.test.poses, motion.angles, paper_scene(motion, view)
-    mean = np.column_stack([truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))])
-    held = np.tile(truth[0], (len(truth), 1))
-    best = np.array([nearest(scene, angles, k, seen) for k, seen in enumerate(scene.observations)])
-    return {"mean_pose": mean, "persistence": held, "nearest": best}
+def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run, method: Any = None) -> Frame:
+    """Return what a method, or another in its place, makes of the first frame with a swarm of some size."""
+    options = options_of(run.method, motion.training, iterations)
+    name = run.method.partition("@")[0] if method is None else method[0].__name__
+    options["settings"] = {**options["settings"], f"{name}.population_size": particles}
+    options |= {"method": method or options["method"], "evaluations": particles * (iterations + 1), "seed": run.seed}
+    return track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]
 
 
-def converge(motion: PaperMotion, scale: Scale, view: float, seed: int) -> Array:
-    """Return the lowest cost after each iteration (swarms, iterations + 1) in the first frame, for each N."""
-    scene = paper_scene(motion, view, (0, 1), scale.first_yaw)
-    return np.array(
-        [_first_frame(scene, motion, scale, count, seed, method=OURS).trace[:, 1] for count in scale.swarms]
-    )
+def paper_experiment(clips: str | Path | None, scale: Scale) -> Experiment:
+    """Return the experiment on CMU clips of a folder, or of the library. Raises InputError where clips lack."""
+    motions = loaded(clips, scale.frames)
 
+    def tables(results: Results) -> Any:
+        from posefit_reproduce.sapso.tables import paper_tables
 
-def _first_frame(scene: Scene, motion: PaperMotion, scale: Scale, particles: int, seed: int, **method: Any) -> Frame:
-    """Return what a method makes of a scene of one frame."""
-    chosen = method["method"]
-    name = OURS.partition("@")[0] if isinstance(chosen, str) else chosen[0].__name__
-    settings = {**DRIVEN, f"{name}.population_size": particles}
-    how: dict[str, Any] = {"settings": settings, "evaluations": particles * (scale.iterations + 1), "seed": seed}
-    return track(scene, train=motion.training, **how, **method).frames[0]
+        return paper_tables(results, motions)
 
+    def figures(results: Results) -> Any:
+        from posefit_reproduce.sapso.figures import paper_figures
+        from posefit_reproduce.sapso.tables import Analysis
 
-@dataclass(frozen=True, eq=False)
-class WatchedSwarm:
-    """A swarm in the first frame, from iteration to iteration."""
+        return paper_figures(Analysis(results, motions))
 
-    scene: Scene
-    poses: Sequence[Array] = field(repr=False)  # of each iteration (n, 66)
-    translations: Sequence[Array] = field(repr=False)  # of each iteration (n, 3)
-    best: Sequence[int]  # of each iteration, the proposal of lowest cost
-    history: Array = field(repr=False)  # (iterations + 1,) lowest cost so far
-
-
-def watched_swarm(motion: PaperMotion, scale: Scale, particles: int, seed: int = 0) -> WatchedSwarm:
-    """Return the proposals of SAPSO in the first frame."""
-    scene = paper_scene(motion, scale.shown, (0, 1), scale.first_yaw)
-
-    class Watched(SAPSO):
-        def __init__(
-            self, space: SearchSpace, rng: np.random.Generator, *, population_size: int, iterations: int
-        ) -> None:
-            super().__init__(space, rng, population_size=population_size, iterations=iterations)
-            self.decoded: list[tuple[Array, Array]] = []
-            self.cheapest: list[int] = []
-            self.searched = space
-            searches.append(self)
-
-        def tell(self, proposals: Array, costs: Array) -> None:
-            self.decoded.append(self.searched.decode(proposals))
-            self.cheapest.append(int(np.argmin(costs)))
-            super().tell(proposals, costs)
-
-    searches: list[Watched] = []
-    frame = _first_frame(scene, motion, scale, particles, seed, method=(Watched, "pca"))
-    search = searches[-1]  # the one before it only compiles
-    poses, translations = zip(*search.decoded, strict=True)
-    return WatchedSwarm(scene, poses, translations, search.cheapest, frame.trace[:, 1])
+    return Experiment(list(scale.runs), partial(perform, clips, scale), tables, figures)

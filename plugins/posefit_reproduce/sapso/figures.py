@@ -1,7 +1,7 @@
 """The figures of the SAPSO paper, drawn again: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,42 +9,37 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from posefit.arrays import Array
+from posefit.fitting.space import SearchSpace
+from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit.report.figures import COLOURS
 from posefit_priors.pca import PCA
-from posefit_reproduce.sapso.experiment import PaperResults, WatchedSwarm, watched_swarm
-from posefit_reproduce.sapso.motions import LABELS, PaperMotion
-from posefit_reproduce.sapso.paper import (
-    CONVERGED,
-    METHODS,
-    OURS,
-    PAPER,
-    SHOWN_ITERATIONS,
-    SHOWN_PARTICLES,
-    SMALL_DEGREES,
-)
+from posefit_reproduce.experiment import Run
+from posefit_reproduce.sapso.experiment import ITERATIONS, first_frame
+from posefit_reproduce.sapso.methods import LABELS as METHODS
+from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
+from posefit_reproduce.sapso.motions import LABELS, PaperMotion, paper_scene
+from posefit_reproduce.sapso.paper import CONVERGED, SHOWN_ITERATIONS, SHOWN_PARTICLES, SMALL_DEGREES, SWARMS
+from posefit_reproduce.sapso.tables import Analysis
+from posefit_swarm.sapso import SAPSO
 
 MOTIONS = ("walk", "run")
+SHOWN_VIEW = 45.0  # of figure 5
 _DIM = "0.55"
 _LEGEND: dict[str, Any] = {"fontsize": 8, "frameon": False}
 
 
-def paper_figures(results: PaperResults, folder: Path) -> list[str]:
-    """Write the figures to a folder that is there, and return the names of the files."""
-    figures = {
-        "figure-3-latents.png": _in_compact_space(results, _latents),
-        "figure-4-clusters.png": _in_compact_space(results, _clusters),
-        "figure-5-swarm.png": swarm_figure(watched_swarm(results.motions["walk"], results.scale, SHOWN_PARTICLES)),
-        "figure-6-convergence.png": lowest_cost_figure(results),
-        "figure-7-dimensions.png": dimension_figure(results),
-        "figure-9-frames.png": frame_figure(results),
-    }
-    for name, figure in figures.items():
-        figure.savefig(folder / name, dpi=130)
-    return list(figures)
+def paper_figures(analysis: Analysis) -> Iterator[tuple[str, Figure]]:
+    """Yield the figures with the names of their files."""
+    yield "figure-3-latents.png", _in_compact_space(analysis, _latents)
+    yield "figure-4-clusters.png", _in_compact_space(analysis, _clusters)
+    yield "figure-5-swarm.png", swarm_figure(watched_swarm(analysis.motions["walk"]))
+    yield "figure-6-convergence.png", lowest_cost_figure(analysis)
+    yield "figure-7-dimensions.png", dimension_figure(analysis)
+    yield "figure-9-frames.png", frame_figure(analysis)
 
 
-def _in_compact_space(results: PaperResults, draw: Callable[[Any, PaperMotion, PCA], str]) -> Figure:
+def _in_compact_space(analysis: Analysis, draw: Callable[[Any, PaperMotion, PCA], str]) -> Figure:
     """Return the first three latents of two motions, drawn by a function that returns a title."""
     figure = Figure(figsize=(10.0, 4.8), layout="constrained")
     for k, motion in enumerate(MOTIONS):
@@ -52,7 +47,7 @@ def _in_compact_space(results: PaperResults, draw: Callable[[Any, PaperMotion, P
         axes.set(xlabel="latent 1", ylabel="latent 2", zlabel="latent 3")
         axes.tick_params(labelsize=7)
         axes.set_box_aspect(None, zoom=0.88)  # else the last label is cut
-        title = draw(axes, results.motions[motion], PCA().fit(results.motions[motion].angles))
+        title = draw(axes, analysis.motions[motion], PCA().fit(analysis.motions[motion].angles))
         axes.set_title(f"{LABELS[motion]}: {title}", fontsize=9)
     return figure
 
@@ -78,6 +73,42 @@ def _clusters(axes: Any, motion: PaperMotion, prior: PCA) -> str:
     return f"K = {len(prior.centres)}, {within:.0f} % of the poses valid"
 
 
+@dataclass(frozen=True, eq=False)
+class WatchedSwarm:
+    """A swarm in the first frame, from iteration to iteration."""
+
+    scene: Scene
+    poses: list[Array] = field(repr=False)  # of each iteration (n, 66)
+    translations: list[Array] = field(repr=False)  # of each iteration (n, 3)
+    best: list[int]  # of each iteration, the proposal of lowest cost
+    history: Array = field(repr=False)  # (iterations + 1,) lowest cost so far
+
+
+def watched_swarm(motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS) -> WatchedSwarm:
+    """Return the proposals of SAPSO in the first frame."""
+
+    class Watched(SAPSO):
+        def __init__(
+            self, space: SearchSpace, rng: np.random.Generator, *, population_size: int, iterations: int
+        ) -> None:
+            super().__init__(space, rng, population_size=population_size, iterations=iterations)
+            self.searched = space
+            for series in (poses, translations, best):
+                del series[:]  # a search before only compiles
+
+        def tell(self, proposals: Array, costs: Array) -> None:
+            decoded = self.searched.decode(proposals)
+            poses.append(decoded[0])
+            translations.append(decoded[1])
+            best.append(int(np.argmin(costs)))
+            super().tell(proposals, costs)
+
+    poses, translations, best = list[Array](), list[Array](), list[int]()
+    run = Run("first", "walk", OURS, SHOWN_VIEW)
+    frame = first_frame(motion, iterations, particles, run, method=(Watched, "pca"))
+    return WatchedSwarm(paper_scene(motion, SHOWN_VIEW, (0, 1)), poses, translations, best, frame.trace[:, 1])
+
+
 def swarm_figure(swarm: WatchedSwarm) -> Figure:
     """Return the silhouette, and on it the bones of all particles after some iterations; the best in colour."""
     scene, shown = swarm.scene, [k for k in SHOWN_ITERATIONS if k < len(swarm.poses)]
@@ -101,33 +132,41 @@ def swarm_figure(swarm: WatchedSwarm) -> Figure:
     return figure
 
 
-def lowest_cost_figure(results: PaperResults) -> Figure:
-    """Return the lowest cost against the iteration in the first frame, for each N: medians over runs."""
+def lowest_cost_figure(analysis: Analysis) -> Figure:
+    """Return the lowest cost against the iteration in the first frame, for each N: medians over views and seeds."""
     figure = Figure(figsize=(10.0, 3.8), layout="constrained")
     panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        histories = np.array(results.of(motion, kind="first frame"))
-        for k, count in enumerate(results.scale.swarms):
-            _band(axes, histories[:, k], COLOURS[k], f"N = {count}")
+        for name, style in ((OURS, "-"), (LETTER, ":")):
+            histories = analysis.results.of("history", "first", motion, name)
+            for k, count in enumerate(SWARMS):
+                middle = np.median(histories[:, :, k].reshape(-1, histories.shape[-1]), axis=0)
+                axes.plot(
+                    middle, style, color=COLOURS[k], linewidth=1.3, label=f"N = {count}" + " letter" * (style == ":")
+                )
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
-        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {len(histories)} runs")
+        runs = histories.shape[0] * histories.shape[1]
+        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {runs} runs")
         _plain(axes)
     panels[0].set_ylabel("lowest cost")
-    panels[-1].legend(**_LEGEND)
+    panels[-1].legend(ncols=2, **_LEGEND)
     return figure
 
 
-def dimension_figure(results: PaperResults) -> Figure:
-    """Return the error of each angle in single images, of PCA + SAPSO and of the mean training pose."""
+def dimension_figure(analysis: Analysis) -> Figure:
+    """Return the error of each angle in single images of eight views, of PCA + SAPSO, its letter and the mean pose."""
     names = ["root", *(JOINTS[joint] for joint in INNER)]
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
-    panels: Any = figure.subplots(len(results.motions), 1, sharex=True)
-    for axes, motion in zip(panels, results.motions, strict=True):
-        ours, mean = (results.angle_errors(motion, name).mean(axis=(0, 1, 2)) for name in (OURS, "mean_pose"))
-        axes.bar(np.arange(len(ours)), ours, color=COLOURS[0], label=METHODS[OURS].label)
-        axes.plot(mean, "_", color=COLOURS[1], markersize=7, label="mean training pose, true root")
+    panels: Any = figure.subplots(len(analysis.motions), 1, sharex=True)
+    for axes, motion in zip(panels, analysis.motions, strict=True):
+        for name, kind, style in ((LETTER, "image", "x"), ("mean_pose", "track", "_")):
+            away = analysis.away(motion, name, kind).mean(axis=(0, 1, 2))
+            label = METHODS[name] + ", true root" * (kind == "track")
+            axes.plot(away, style, color=COLOURS[1 + (kind == "track")], markersize=5, label=label)
+        ours = analysis.away(motion, OURS, "image").mean(axis=(0, 1, 2))
+        axes.bar(np.arange(len(ours)), ours, color=COLOURS[0], label=METHODS[OURS])
         axes.axhline(SMALL_DEGREES, color=_DIM, linewidth=0.8, linestyle=":")
-        axes.set(ylabel="degrees", xlim=(-1, len(ours)), title=LABELS[motion])
+        axes.set(ylabel="degrees", xlim=(-1, len(ours)), ylim=(0.0, 25.0), title=LABELS[motion])
         for k in range(3, len(ours), 3):
             axes.axvline(k - 0.5, color="0.92", linewidth=0.8, zorder=0)
         _plain(axes)
@@ -137,19 +176,19 @@ def dimension_figure(results: PaperResults) -> Figure:
     return figure
 
 
-def frame_figure(results: PaperResults) -> Figure:
-    """Return the error of each frame of the paper's three methods: medians over views and seeds, middle halves."""
+def frame_figure(analysis: Analysis) -> Figure:
+    """Return the error of each frame of the paper's methods and the letter: medians of all runs, middle halves."""
     figure = Figure(figsize=(10.0, 6.4), layout="constrained")
     panels: Any = figure.subplots(len(MOTIONS), 1)
     for axes, motion in zip(panels, MOTIONS, strict=True):
-        for name, colour in zip(PAPER, COLOURS[1::-1] + COLOURS[2:], strict=False):
-            errors = results.errors(motion, name)
-            _band(axes, errors.reshape(-1, errors.shape[2]), colour, METHODS[name].label)
-        mean = results.errors(motion, "mean_pose")[0, 0]
+        for name, colour in zip((*PAPER, LETTER), (*COLOURS[1::-1], *COLOURS[2:4]), strict=True):
+            errors = analysis.away(motion, name).mean(axis=3)
+            _band(axes, errors.reshape(-1, errors.shape[2]), colour, METHODS[name])
+        mean = analysis.away(motion, "mean_pose").mean(axis=3)[0, 0]
         axes.plot(mean, color=_DIM, linewidth=1.0, linestyle="--", label="mean training pose, true root")
         axes.set(ylabel="error, degrees", ylim=(0.0, None), title=LABELS[motion], xlim=(0, len(mean) - 1))
         _plain(axes)
-    panels[0].legend(ncols=4, **_LEGEND)
+    panels[0].legend(ncols=3, **_LEGEND)
     panels[-1].set_xlabel("frame")
     return figure
 

@@ -6,7 +6,7 @@ and view for every seed, that no motion model was fitted to; between them lie a 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -58,8 +58,16 @@ class Film:
     truth: Motion
     body: Body
     camera: Camera
-    observations: list[Observation] = field(repr=False)
     labels: list[int]  # (T,) which activity
+    rng: np.random.Generator = field(repr=False)  # of the pixels' noise
+
+    @cached_property
+    def observations(self) -> list[Observation]:
+        """The masks of every frame, taken from a film of it by the mean background of the empty scene."""
+        empty, film = _images(self.truth, self.body, self.camera, self.rng)
+        background = mean_background(empty)
+        masks = (person(*background.segment(image), None, None) for image in film)
+        return [Observation([Silhouette.of(part.mask)]) for part in masks]
 
     @property
     def switches(self) -> list[int]:
@@ -69,7 +77,7 @@ class Film:
 
 @lru_cache(maxsize=1)  # all methods follow the film of one seed before that of the next
 def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
-    """Return the film of a seed: masks taken from a film of it, by the mean background of the empty scene."""
+    """Return the film of a seed."""
     rng = np.random.default_rng(seed)
     parts = [
         built_in.motion(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
@@ -86,10 +94,7 @@ def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
     truth = Motion("patent", built_in.average_skeleton(), poses, places, FPS)
     body = Body.of(truth.skeleton)
     camera = Camera.around(np.array([0.0, 1.05, 0.0]), rng.uniform(-SIDEWAYS, SIDEWAYS), DISTANCE, SIZE)
-    empty, film = _images(truth, body, camera, rng)
-    background = mean_background(empty)
-    masks = (person(*background.segment(image), None, None) for image in film)
-    return Film(truth, body, camera, [Observation([Silhouette.of(one.mask)]) for one in masks], labels)
+    return Film(truth, body, camera, labels, rng)
 
 
 def _images(

@@ -1,0 +1,194 @@
+"""The one shape of an experiment: runs that are stored as they end, and tables, claims and figures made of them.
+
+A run gives named arrays. With a folder each is a file in `runs/`, so that the same command continues where an earlier
+one ended; every table is a Markdown file beside them, from which pages are made.
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import partial
+from math import nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal, NamedTuple
+
+import cv2
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.errors import InputError
+from posefit.files import new_file
+from posefit.statistics.means import Mean, mean_interval
+from posefit.version import posefit_build
+from posefit_reproduce.jobs import Progress, each
+
+LEVEL = 0.95  # of an interval, or of all the intervals of a table of claims together
+Arrays = Mapping[str, Any]
+Verdict = Literal["holds", "fails", "not decided"]
+
+
+class Run(NamedTuple):
+    """Names what is run."""
+
+    kind: str  # what is done
+    subject: str  # the motion or film that it is done with
+    method: str
+    view: float = 0.0  # degrees
+    seed: int = 0
+
+    @property
+    def file(self) -> str:
+        """The name of its file."""
+        return re.sub(
+            r"[^\w.+-]+", "_", "-".join(f"{part:g}" if isinstance(part, float) else str(part) for part in self)
+        )
+
+
+class Results:
+    """What runs gave."""
+
+    def __init__(self, runs: Mapping[Run, Arrays]) -> None:
+        self.runs = runs
+
+    def of(self, name: str, kind: str, subject: str, method: str) -> Array:
+        """Return a named array of all runs of a method, (views, seeds, ...)."""
+        rows = {run[3:]: arrays[name] for run, arrays in self.runs.items() if run[:3] == (kind, subject, method)}
+        views, seeds = sorted({view for view, _ in rows}), sorted({seed for _, seed in rows})
+        return np.array([[rows[view, seed] for seed in seeds] for view in views])
+
+    def has(self, kind: str, subject: str, method: str) -> bool:
+        """Return whether there is such a run."""
+        return any(run[:3] == (kind, subject, method) for run in self.runs)
+
+
+class Table(NamedTuple):
+    """A table of text, whose first columns are words."""
+
+    name: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: int = 1
+
+    def __str__(self) -> str:
+        """The table in Markdown."""
+        rule = "|" + "---|" * self.words + "---:|" * (len(self.heads) - self.words)
+        return "\n".join([f"| {' | '.join(self.heads)} |", rule, *(f"| {' | '.join(row)} |" for row in self.rows)])
+
+
+class Claim(NamedTuple):
+    """That a mean is below a bound, or above it.
+
+    `values` (strata, seeds) are paired differences or figures of runs; a single number is a fact without chance in it.
+    """
+
+    text: str
+    source: str
+    values: Array
+    unit: str = "degrees"
+    bound: float = 0.0
+    above: bool = False
+
+    def verdict(self, level: float) -> tuple[Verdict, Mean]:
+        """Return the verdict by an interval of a level, and that interval. Nothing is decided without one."""
+        mean = interval(self.values, level)
+        lower, higher = mean.high < self.bound, mean.low > self.bound
+        if lower or higher:
+            return "holds" if higher == self.above else "fails", mean
+        return "not decided", mean
+
+
+def interval(values: Array, level: float = LEVEL) -> Mean:
+    """Return the mean of values (strata, seeds) with the interval that other seeds would give; a number is its own."""
+    if values.ndim == 0:
+        return Mean(float(values), float(values), float(values))
+    strata, seeds = np.indices(values.shape)
+    if values.shape[1] < 2:
+        return Mean(float(values.mean()), nan, nan)
+    return mean_interval(values.ravel(), strata.ravel(), seeds.ravel(), level=level)
+
+
+def claims_table(name: str, claims: Sequence[Claim]) -> Table:
+    """Return claims with their verdicts. All intervals hold together at the level: Bonferroni's correction."""
+    tests = sum(claim.values.ndim > 0 for claim in claims)
+    rows = []
+    for claim in claims:
+        verdict, mean = claim.verdict(1.0 - (1.0 - LEVEL) / max(tests, 1))
+        count = str(claim.values.size) if claim.values.ndim else "-"
+        bound = f"{'above' if claim.above else 'below'} {claim.bound:.3g}"
+        rows.append([claim.text, claim.source, f"**{verdict}**", count, bounded(mean), bound, claim.unit])
+    return Table(name, ["claim", "where", "verdict", "n", "effect, interval", "holds if", "unit"], rows, 3)
+
+
+def bounded(mean: Mean, digits: int = 2) -> str:
+    """Return a mean with its interval."""
+    if np.isnan(mean.low) or mean.low == mean.high:
+        return f"{mean.value:.{digits}f}"
+    return f"{mean.value:.{digits}f} ({mean.low:.{digits}f} to {mean.high:.{digits}f})"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is run, and what is made of it."""
+
+    runs: Sequence[Run]
+    perform: Callable[[Run], Arrays]
+    tables: Callable[[Results], Iterable[Table]]
+    figures: Callable[[Results], Iterable[tuple[str, Any]]]  # by names of files: matplotlib's figures, or images
+
+
+def reproduce(experiment: Experiment, out: str | Path | None, workers: int, progress: Progress | None) -> list[Table]:
+    """Return the tables of an experiment; with a folder, write them, the figures and report.json there, too.
+
+    Runs that the folder holds are not run again. Raises InputError where it holds something else or cannot be written,
+    and ImportError where the library that draws figures is not installed.
+    """
+    if out is not None:
+        from posefit.report.figures import library
+
+        library("")
+    with nullcontext(out) if out is not None else TemporaryDirectory() as place:
+        folder = Path(place)
+        try:
+            if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
+                raise InputError(f"{folder}: expected a new folder or one of an earlier reproduction, got another one")
+            (folder / "runs").mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: expected a folder to write to, got {error.strerror}") from error
+        files = {run: folder / "runs" / f"{run.file}.npz" for run in experiment.runs}
+        jobs = {run: partial(_store, experiment.perform, run, file) for run, file in files.items() if not file.exists()}
+        if jobs:
+            each(jobs, workers, progress)
+        results = Results({run: _stored(file) for run, file in files.items()})
+        tables = list(experiment.tables(results))
+        if out is not None:
+            _write(folder, tables, results)
+            for name, figure in experiment.figures(results):
+                if isinstance(figure, np.ndarray):
+                    (folder / name).write_bytes(cv2.imencode(Path(name).suffix, figure)[1].tobytes())
+                else:
+                    figure.savefig(folder / name, dpi=130)
+    return tables
+
+
+def _store(perform: Callable[[Run], Arrays], run: Run, file: Path) -> Path:
+    """Write what a run gives, and return its file."""
+    arrays = perform(run)
+    with new_file(file) as building:
+        np.savez_compressed(building, build=posefit_build(), **arrays)
+    return file
+
+
+def _stored(file: Path) -> Arrays:
+    with np.load(file) as stored:
+        return dict(stored)
+
+
+def _write(folder: Path, tables: Sequence[Table], results: Results) -> None:
+    for table in tables:
+        (folder / f"{table.name}.md").write_text(f"{table}\n", encoding="utf-8")
+    builds = sorted({str(arrays["build"]) for arrays in results.runs.values()})
+    report = {"builds": builds, "runs": len(results.runs), "tables": [table._asdict() for table in tables]}
+    (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
