@@ -29,11 +29,13 @@ MAX_FOLDERS = 256  # of a user's cache: those of older sources are removed
 class _Announcement(event.Listener):  # type: ignore[misc]
     """Logs once that a function of posefit's is compiled, but not in a process that another one started."""
 
-    announced = multiprocessing.parent_process() is not None
+    announced = False
 
     def on_start(self, event: Any) -> None:
         """Log a warning, which is printed on stderr unless logging is configured otherwise."""
-        if not self.announced and event.data["dispatcher"].py_func.__module__.startswith("posefit"):
+        if self.announced or multiprocessing.parent_process() is not None:
+            return
+        if event.data["dispatcher"].py_func.__module__.startswith("posefit"):
             self.announced = True
             message = "compiling the kernels, once on this machine; this takes ten seconds or more ..."
             logging.getLogger("posefit").warning(message)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.profiles import Trace, attained, hits, performance_profile, targets
 from posefit.uncertainty.calibration import LEVELS
 
-if TYPE_CHECKING:
-    from posefit.report.contest import Contest
+Contest: TypeAlias = Any  # whose module imports this one
 
 POINTS = 41  # of a curve
 PROFILE = 200  # points of a performance profile
@@ -53,7 +52,7 @@ class Chart:
         return {**vars(self), "lines": [line and vars(line) for line in self.lines]}
 
 
-def track_charts(contest: "Contest", drawn: "Contest") -> list[Chart]:
+def track_charts(contest: Contest, drawn: Contest) -> list[Chart]:
     """Return the charts of tracks; curves over evaluations use the runs of `drawn`, which are fewer."""
     evaluations, charts = grid(drawn), []
     over = {"x_label": "evaluations of a frame", "log": True}
@@ -73,7 +72,7 @@ def track_charts(contest: "Contest", drawn: "Contest") -> list[Chart]:
     return [chart for chart in charts if any(chart.lines)]
 
 
-def grid(contest: "Contest") -> Array:
+def grid(contest: Contest) -> Array:
     """Return numbers of evaluations (up to 41,), evenly on a log scale, over all traces of a contest."""
     used = [used for used, _ in _traces(contest, contest.rows) if len(used)]
     if not used:
@@ -81,7 +80,7 @@ def grid(contest: "Contest") -> Array:
     return np.unique(np.rint(np.geomspace(min(map(np.min, used)), max(map(np.max, used)), POINTS)))
 
 
-def convergence(contest: "Contest", evaluations: Array) -> list[Line | None]:
+def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
     """Return each method's best cost after each number of evaluations, with its interval.
 
     It begins when all its runs have one, and ends when the last has ended; None if a run has no trace.
@@ -103,7 +102,7 @@ def convergence(contest: "Contest", evaluations: Array) -> list[Line | None]:
     return [line(rows) for rows in contest.rows]
 
 
-def reached(contest: "Contest", evaluations: Array) -> Array:
+def reached(contest: Contest, evaluations: Array) -> Array:
     """Return the shares (methods, p) of a method's runs and targets reached after each number of evaluations.
 
     The targets of an instance lie between the worst first and the best last cost of any run there.
@@ -119,7 +118,7 @@ def reached(contest: "Contest", evaluations: Array) -> Array:
     return shares
 
 
-def joint_errors(contest: "Contest") -> list[Intervals]:
+def joint_errors(contest: Contest) -> list[Intervals]:
     """Return each method's interquartile mean of every joint's error (27,) in mm, with its interval."""
     count = contest.resamples(contest.rows.size * len(JOINTS))
     joints = contest.runs.data["joint_errors"][contest.rows]
@@ -127,7 +126,7 @@ def joint_errors(contest: "Contest") -> list[Intervals]:
     return [iqm_intervals(own, contest.rng(), resamples=count) for own in errors] if np.isfinite(errors).all() else []
 
 
-def certainty(contest: "Contest") -> dict[str, Any] | None:
+def certainty(contest: Contest) -> dict[str, Any] | None:
     """Return the methods' uncertainty compared with the truth; None if no run has any.
 
     `levels` are those of intervals. `methods` has an entry for each method that takes part, None if its runs have no
@@ -139,7 +138,7 @@ def certainty(contest: "Contest") -> dict[str, Any] | None:
     return {"levels": list(LEVELS), "methods": methods} if any(methods) else None
 
 
-def _certainty_of(contest: "Contest", rows: Array) -> dict[str, Any] | None:
+def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:
     coverage, width = (
         [mean(contest.runs.figures[f"{figure}_{level}"][rows]) for level in LEVEL_NAMES]
         for figure in ("coverage", "interval")
@@ -192,5 +191,5 @@ def _coverage_chart(methods: Sequence[dict[str, Any] | None]) -> Chart:
     )
 
 
-def _traces(contest: "Contest", rows: Array) -> list[Trace]:
+def _traces(contest: Contest, rows: Array) -> list[Trace]:
     return [contest.runs.data["traces"][k] for k in map(int, rows.ravel())]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, suite_scores
 from posefit.sweep.table import search_run
 
-if TYPE_CHECKING:
-    from posefit.report.contest import Contest
-    from posefit.report.runs import Runs
+# a Contest and its Runs, whose modules import this one
+Contest: TypeAlias = Any
+Runs: TypeAlias = Any
 
 RANDOM = "random"  # the method that is the baseline
 POINTS = 61  # of a curve
@@ -74,7 +74,7 @@ class Searches:
         """Return the name of an instance."""
         return f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
 
-    def tested_errors(self, contest: "Contest") -> Array:
+    def tested_errors(self, contest: Contest) -> Array:
         """Return the errors (methods, blocks, 1) that tests compare.
 
         A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
@@ -85,7 +85,7 @@ class Searches:
         sums = np.array([np.bincount(block, row) for row in contest.of("error").mean(axis=2)])
         return np.asarray((sums / np.bincount(block))[:, :, None])
 
-    def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
+    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
         """Return each method's mean share of targets, with the interval of other instances."""
         strata, clusters = ([place[name] for place in contest.places()] for name in ("function", "instance"))
         variants = contest.runs.variants
@@ -97,13 +97,13 @@ class Searches:
             board[m] |= {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
         return board
 
-    def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
+    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
         """Return a row for random search, the best of its variants that take part; none if there is none."""
         random = [k for k, m in enumerate(contest.methods) if contest.runs.variants[m]["method"] == RANDOM]
         shares = [float(own.mean()) for own in contest.of("reached")[random]]
         return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
 
-    def place_words(self, contest: "Contest") -> str:
+    def place_words(self, contest: Contest) -> str:
         """Return what a contest was on."""
         places = contest.places()
         functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
@@ -118,7 +118,7 @@ class Searches:
             return ["That is random search: no method does better."]
         return [f"Random search reached {self.score.text(row['reached'])}." for row in rows]
 
-    def facts(self, runs: "Runs") -> dict[str, Any]:
+    def facts(self, runs: Runs) -> dict[str, Any]:
         """Return what was run."""
         return {
             "instances": f"{len(runs.instances):,}",
@@ -132,7 +132,7 @@ class Searches:
         }
 
 
-def search_charts(contest: "Contest") -> list[Chart]:
+def search_charts(contest: Contest) -> list[Chart]:
     """Return the shares of targets reached over evaluations, of all functions and of each, with their intervals.
 
     Intervals are those that other instances would give.
@@ -163,7 +163,7 @@ def search_charts(contest: "Contest") -> list[Chart]:
     return [replace(chart, most=end) for chart in charts]
 
 
-def running_times(contest: "Contest") -> list[dict[str, Any]]:
+def running_times(contest: Contest) -> list[dict[str, Any]]:
     """Return the scores of each method's shared runs, a row for each dimension and function: see `suite_scores`.
 
     There are none of all functions together, whose mean would be that of the hardest.

@@ -5,7 +5,7 @@ Label, unit, digits and meaning of figures come from `posefit.evaluation.measure
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from posefit.report.columns import NAMED, Column, Score, interquartile_mean, lis
 from posefit.statistics.intervals import iqm_intervals
 from posefit.uncertainty.calibration import BINS, LEVELS
 
-if TYPE_CHECKING:
-    from posefit.report.contest import Contest
-    from posefit.report.runs import Runs
+# a Contest and its Runs, whose modules import this one
+Contest: TypeAlias = Any
+Runs: TypeAlias = Any
 
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)  # of intervals, as rows have them
 TABLE_LEVEL = "80"  # the interval that tables show
@@ -124,11 +124,11 @@ class Tracks:
         directions = ", ".join(f"{view}°" for view in views(place))
         return ", ".join([f"{place['motion']}, view {directions}", *damage(place), f"instance {place['instance']}"])
 
-    def tested_errors(self, contest: "Contest") -> Array:
+    def tested_errors(self, contest: Contest) -> Array:
         """Return the errors (methods, blocks, 1) that tests compare: a block is an instance with a seed."""
         return np.asarray(contest.runs.figures["error"][contest.blocks][:, :, None])
 
-    def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
+    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
         """Return what each method's row has besides averages: an interval, skills, and how many tracks lost frames.
 
         A skill is 1 - the row's error / the baseline's on the same runs.
@@ -149,13 +149,13 @@ class Tracks:
             board[m]["lost_tracks"] = int((figures["lost"][own] > 0.0).sum())
         return board
 
-    def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
+    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
         """Return a row for each baseline, on the same runs as the methods: means over the methods that have a value."""
         values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
         errors = {name: interquartile_mean(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
         return [{"baseline": name, "error": error, **_skills(error, errors)} for name, error in errors.items()]
 
-    def place_words(self, contest: "Contest") -> str:
+    def place_words(self, contest: Contest) -> str:
         """Return what a contest was on."""
         motions = sorted({str(place["motion"]) for place in contest.places()})
         names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
@@ -170,7 +170,7 @@ class Tracks:
         text = f"best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°."
         return [f"The {text}" if best["error"] > first["error"] else f"It does not beat the baselines: the {text}"]
 
-    def facts(self, runs: "Runs") -> dict[str, Any]:
+    def facts(self, runs: Runs) -> dict[str, Any]:
         """Return what was run."""
         frames = np.array([place["frames"] for place in runs.places], dtype=int)[runs.instance]
         hours = float(np.nansum(runs.figures["ms"] * frames) / 3.6e6)

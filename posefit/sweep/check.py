@@ -246,9 +246,9 @@ _OPTIONS = {one.name: check for one in fields(TrackOptions) if (check := declare
 Check = Callable[[str, Any], Any]
 Checks = Mapping[str, Check]
 CHECKS: Checks = {
+    **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
     "method": _method,
     "motion": _motion,
-    **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
     "train": _train,
     "settings": flattened,
     "view_degrees": _views,

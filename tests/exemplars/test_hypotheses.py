@@ -71,7 +71,7 @@ def estimates(walk: Walk, poses: Array, others: Array) -> Iterator[Estimate]:
         walk.observations, poses, others, walk.motion.translations, strict=False
     ):
         frame_costs = FrameCosts(walk.task, observation)
-        yield Estimate(pose, place, frame_costs, np.zeros(3), alternatives=(other[None], place[None]))
+        yield Estimate(pose, place, frame_costs, 0.0, alternatives=(other[None], place[None]))
 
 
 def test_the_right_one_of_two_hypotheses_is_reported_even_where_the_path_is_turned_round(walker: Walk) -> None:

@@ -80,7 +80,7 @@ class Costs:
 
 
 def estimate(pose: Array, place: Array, frame_costs: Any = None) -> Estimate:
-    return Estimate(pose, place, frame_costs or Costs(), np.array([10.4, 0.5, 0.25]))
+    return Estimate(pose, place, frame_costs or Costs(), 10.4)
 
 
 def steady(k: float) -> Estimate:
@@ -95,8 +95,6 @@ def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
     for k, frame in enumerate(frames):
         np.testing.assert_allclose(frame.pose, 0.05 * k, atol=1e-12)
         np.testing.assert_allclose(frame.translation, [0.1 * k, 1.0, -k], atol=1e-12)
-        assert frame.seconds >= 0.5
-        assert frame.cpu_seconds is not None
         assert frame.evaluations == 12  # 10.4 rounded up, and the reported one
         assert frame.cost == pytest.approx(0.1 * k)  # of the smoothed pose
 

@@ -190,9 +190,7 @@ def test_a_pose_is_held_where_a_frame_is_not_usable(tmp_path: Path) -> None:
     np.testing.assert_array_equal(poses[5], poses[4])
     np.testing.assert_array_equal(poses[6], poses[4])
     assert (poses[7] != poses[6]).any()
-    assert result.summary["iou"] == pytest.approx(
-        np.mean([row["iou"] for row, ok in zip(result.frames, usable, strict=True) if ok])
-    )
+    assert result.summary["iou"] == pytest.approx(result.table["iou"][usable].mean())
     carried = posefit.track(path, method="annealed", view_degrees=90, evaluations=400).summary
     assert carried["evaluations"] == 9 * 400
 

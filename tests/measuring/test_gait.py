@@ -187,7 +187,7 @@ def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> No
 
 
 def test_a_track_of_no_walk_reports_why_and_a_single_frame_nothing() -> None:
-    quick: dict[str, Any] = {"size": (80, 60), "population_size": 10, "iterations": 2}
+    quick: dict[str, Any] = {"size": (80, 60), "evaluations": 30}
     summary = posefit.track("jacks", frames=(0, 20), **quick).summary
     assert summary["gait"]["walk"] is False
     assert "no figures of gait: no strikes of a foot detected" in table(summary).splitlines()

@@ -102,16 +102,15 @@ def test_an_unknown_annotation_accepts_everything() -> None:
 
 def test_a_budget_becomes_iterations_or_evaluations_whichever_an_optimiser_plans_with() -> None:
     rows: list[Any] = [
-        (SAPSO, {}, 2440, None, {"iterations": 60}),
-        (SAPSO, {}, 2440, 20, {"population_size": 20, "iterations": 121}),
-        (SAPSO, {"population_size": 61}, 2440, None, {"population_size": 61, "iterations": 39}),
-        (SAPSO, {"iterations": 5}, 2440, None, {"iterations": 5}),
-        (SAPSO, {}, 50, None, {"iterations": 1}),
-        (Particle, {"noise": 0.2}, 500, 20, {"noise": 0.2, "evaluations": 500}),
-        (lambda space, rng: None, {}, 500, 20, {}),
+        (SAPSO, {}, 2440, {"iterations": 60}),
+        (SAPSO, {"population_size": 61}, 2440, {"population_size": 61, "iterations": 39}),
+        (SAPSO, {"iterations": 5}, 2440, {"iterations": 5}),
+        (SAPSO, {}, 50, {"iterations": 1}),
+        (Particle, {"noise": 0.2}, 500, {"noise": 0.2, "evaluations": 500}),
+        (lambda space, rng: None, {}, 500, {}),
     ]
-    for optimiser, given, evaluations, size, filled in rows:
-        assert planned(optimiser, given, evaluations, size) == filled, given
+    for optimiser, given, evaluations, filled in rows:
+        assert planned(optimiser, given, evaluations) == filled, given
 
 
 def test_a_list_of_settings_is_read_from_a_docstring() -> None:

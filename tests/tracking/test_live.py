@@ -198,9 +198,11 @@ def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(
     script = "import posefit.footage.live as live; live.STALL_SECONDS = 20.0; from posefit.cli import run; run()"
     command = [sys.executable, "-c", script, *map(str, words), "--view-degrees", "45"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=False) as process:
-        for mask in walk:
-            process.stdin.write(pgm(mask))
-        process.stdin.flush()  # and the pipe stays open
+        lines = out / "frames.jsonl"
+        while process.poll() is None and not (lines.exists() and lines.stat().st_size):  # a frame is tracked
+            process.stdin.write(pgm(walk[0]))
+            process.stdin.flush()
+            time.sleep(0.02)  # and the pipe stays open
         errors = process.stderr.read().decode()
         status = process.wait()
     assert status == 2, errors
