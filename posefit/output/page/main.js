@@ -39,7 +39,7 @@ const others = D.cameras.length > 1 ? D.cameras.map(() => make("canvas", { "aria
 let last = "";
 function paint() {
   const pictured = paintPicture($("picture"), show.camera);
-  others.forEach((canvas, number) => paintPicture(canvas, number));
+  others.forEach((canvas, which) => paintPicture(canvas, which));
   paintBody();
   cursors.forEach((move) => move(show.frame));
   const text = frameText(show.frame);
@@ -97,13 +97,13 @@ function player() {
   $("frame").oninput = () => seek(+$("frame").value);
   const speeds = [1, 0.5, 0.25, 0.1].map((speed) => [String(speed), `${speed}×`]);
   choose($("speed"), speeds, "1", () => {});
-  others.forEach((canvas, number) => {
+  others.forEach((canvas, which) => {
     const act = () => {
-      show.camera = number;
+      show.camera = which;
       upright();
       paint();
     };
-    $("cameras").append(make("button", { type: "button", on: { click: act } }, canvas, `camera ${number + 1}`));
+    $("cameras").append(make("button", { type: "button", on: { click: act } }, canvas, `camera ${which + 1}`));
   });
   $("with-film").parentNode.hidden = !D.film;
   $("with-mask").checked = !D.film;

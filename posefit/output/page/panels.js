@@ -72,10 +72,10 @@ function closeness(camera) {
 }
 
 // The part of a camera's picture that is shown: its left and top, and its zoom.
-function part(number, frame) {
-  const [wide, high] = D.cameras[number].size;
-  const zoom = $("close-up").checked ? closeness(number) : 1;
-  const about = framed[number].slice(Math.max(0, frame - CALM), frame + CALM + 1).filter(given);
+function part(which, frame) {
+  const [wide, high] = D.cameras[which].size;
+  const zoom = $("close-up").checked ? closeness(which) : 1;
+  const about = framed[which].slice(Math.max(0, frame - CALM), frame + CALM + 1).filter(given);
   if (zoom === 1 || !about.length) return { left: 0, top: 0, zoom: 1 };
   const mean = (name) => about.reduce((sum, one) => sum + one[name], 0) / about.length;
   const within = (centre, side) => between(0, side - side / zoom, centre - side / zoom / 2);
@@ -134,17 +134,17 @@ function agreement(pen, size, [box, uri], body) {
 
 // Paints a camera's film, all of it coarse and the part around the person fine, and on it mask and body, put together
 // first. Returns the frame that the picture is of.
-function paintPicture(canvas, number) {
-  const camera = D.cameras[number];
+function paintPicture(canvas, which) {
+  const camera = D.cameras[which];
   const { pen, width } = sheet(canvas, camera.size[1] / camera.size[0]);
   const scale = width / camera.size[0];
-  const film = number === 0 && $("with-film").checked ? D.film : null;
-  const masks = D.masks[number];
+  const film = which === 0 && $("with-film").checked ? D.film : null;
+  const masks = D.masks[which];
   const body = $("with-body").checked;
   const masked = $("with-mask").checked;
   const every = Math.max(film ? film.every : 1, masked || !film ? masks.every : 1);
   const frame = Math.floor((show.frame * D.step) / every) * (every / D.step); // the body is that of the picture
-  const { left, top, zoom } = part(number, frame);
+  const { left, top, zoom } = part(which, frame);
   const factor = zoom * scale;
   pen.scale(factor, factor);
   pen.translate(-left, -top);
