@@ -1,12 +1,12 @@
 """A sweep under sabotage: `python -m tests.sweep.chaos --engine pool|dask --cells 300 --events 60 --seed 1`.
 
-Cells take half a second, or `--seconds`, so that there is time for all events; five are bad: they raise, exit, end their process, want all memory, or never end. While they
-run, events come at random moments: a process that runs a cell is killed, or the driver, or the driver with its whole
-group; one is stopped and goes on; a second driver comes. Whenever the driver has ended, it is started again, by the same
-command. All the while copies of the ledger's files are taken, as a power failure would leave them. At the end every cell
-must have one row, with the figures of an undisturbed run, exactly the bad ones must be in quarantine, no second driver
-may have got to run, and each copy must open. Prints one JSON object of what happened; its exit status is 1 where
-something was lost.
+Cells take half a second, or `--seconds`, so that there is time for all events; five are bad: they raise, exit, end
+their process, want all memory, or never end. While they run, events come at random moments: a process that runs a cell
+is killed, or the driver, or the driver with its whole group; one is stopped and goes on; a second driver comes. Whenever
+the driver has ended, it is started again, by the same command. All the while copies of the ledger's files are taken, as
+a power failure would leave them. At the end every cell must have one row, with the figures of an undisturbed run,
+exactly the bad ones must be in quarantine, no second driver may have got to run, and each copy must open. Prints one
+JSON object of what happened; its exit status is 1 where something was lost.
 """
 
 import argparse
