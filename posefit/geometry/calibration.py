@@ -65,7 +65,9 @@ _POLYNOMIALS = (
     *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
 )
 _OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
-_OF_LENS = re.compile(r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|k[0-9]*|kappa[0-9]*|xi")
+_OF_LENS = re.compile(
+    r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|k[0-9]*|kappa[0-9]*|xi"
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from posefit.errors import InputError
+from posefit.suites.functions import SUITE
 from posefit.sweep.cell import TIMES, SearchCell, TrackCell, run_cell
 from posefit.sweep.command import swept as sweep
 from posefit.sweep.drive import Tally, drive
@@ -145,7 +146,8 @@ PRODUCT = {
 
 
 def test_a_pool_gives_the_rows_of_this_process_bit_for_bit(tmp_path: Path) -> None:
-    searches = [SearchCell(method, "posefit-2026.3", 1, 2, 10_000, 100, seed=seed) for method in ("random", "sapso") for seed in (0, 1)]
+    methods = ("random", "sapso")
+    searches = [SearchCell(name, SUITE, 1, 9, 10_000, 100, seed=seed) for name in methods for seed in (0, 1)]
     assert swept(tmp_path, searches, Pool(2, Limits(), run_cell)).done == len(searches)
     rows = {row["key"]: row for row in Ledger(tmp_path).rows()}
     assert len({json.dumps(row["trace"]) for row in rows.values()}) == len(searches)  # no two are the same search
