@@ -41,7 +41,7 @@ CLIPS = click.option(
 @JSON
 def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> None:
     """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, by its letter and by default."""
-    from posefit_reproduce.vsmm.experiment import Scale, patent_experiment
+    from posefit_reproduce.vsmm.experiment import Scale
 
     _print(patent_experiment(Scale(films)), out, workers, as_json)
 
@@ -55,7 +55,7 @@ def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> No
 @JSON
 def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int, as_json: bool) -> None:
     """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
-    from posefit_reproduce.sapso.experiment import QUICK, Scale, paper_experiment
+    from posefit_reproduce.sapso.experiment import QUICK, Scale
 
     _print(paper_experiment(clips, QUICK if quick else Scale(seeds)), out, workers, as_json)
 
@@ -107,3 +107,35 @@ def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
             yield from _named_lines(value, f"{group}{name}.")
         else:
             yield f"{group + name:38} " + (f"{value:.4g}" if isinstance(value, float) else str(value))
+
+
+def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
+    """Return the paper's experiment on CMU clips of a folder, or of the library. Raises InputError where clips lack."""
+    from posefit_reproduce.experiment import Experiment
+    from posefit_reproduce.sapso.experiment import loaded, perform
+    from posefit_reproduce.sapso.tables import Analysis, paper_tables
+
+    motions = loaded(clips, scale.frames)
+
+    def figures(results: Any) -> Any:
+        from posefit_reproduce.sapso.figures import paper_figures
+
+        return paper_figures(Analysis(results, motions))
+
+    return Experiment(
+        list(scale.runs), partial(perform, clips, scale), lambda results: paper_tables(results, motions), figures
+    )
+
+
+def patent_experiment(scale: Any) -> "Experiment":
+    """Return the patent's experiment. Raises InputError where there are no films."""
+    from posefit_reproduce.experiment import Experiment
+    from posefit_reproduce.vsmm.experiment import perform
+    from posefit_reproduce.vsmm.tables import patent_tables
+
+    def figures(results: Any) -> Any:
+        from posefit_reproduce.vsmm.figures import patent_figures
+
+        return patent_figures(results)
+
+    return Experiment(list(scale.runs), perform, patent_tables, figures)

@@ -11,10 +11,11 @@ from click.testing import CliRunner
 
 from posefit.cli import main
 from posefit.motion import built_in
+from posefit_reproduce.commands import patent_experiment
 from posefit_reproduce.experiment import Results, Run, reproduce
 from posefit_reproduce.vsmm import activities, tables
 from posefit_reproduce.vsmm.activities import film_of
-from posefit_reproduce.vsmm.experiment import LABELS, MODELS, TUNED, Scale, patent_experiment, perform
+from posefit_reproduce.vsmm.experiment import LABELS, MODELS, TUNED, Scale, perform
 from posefit_reproduce.vsmm.tables import ELBOW, HAND, film_figures, joint_errors, switching_figures
 from posefit_vsmm.state import AT
 

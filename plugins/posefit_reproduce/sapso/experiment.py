@@ -11,7 +11,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RESTARTS
-from posefit_reproduce.experiment import Arrays, Experiment, Results, Run
+from posefit_reproduce.experiment import Arrays, Run
 from posefit_reproduce.sapso.methods import LETTER, METHODS, OTHERS, OURS, PAPER, PARTS, TURNING
 from posefit_reproduce.sapso.motions import PaperMotion, paper_motions, paper_scene
 from posefit_reproduce.sapso.paper import FRAMES, SWARMS
@@ -162,21 +162,3 @@ def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run, 
     options["settings"] = {**options["settings"], f"{name}.population_size": particles}
     options |= {"method": method or options["method"], "evaluations": particles * (iterations + 1), "seed": run.seed}
     return track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]
-
-
-def paper_experiment(clips: str | Path | None, scale: Scale) -> Experiment:
-    """Return the experiment on CMU clips of a folder, or of the library. Raises InputError where clips lack."""
-    motions = loaded(clips, scale.frames)
-
-    def tables(results: Results) -> Any:
-        from posefit_reproduce.sapso.tables import paper_tables
-
-        return paper_tables(results, motions)
-
-    def figures(results: Results) -> Any:
-        from posefit_reproduce.sapso.figures import paper_figures
-        from posefit_reproduce.sapso.tables import Analysis
-
-        return paper_figures(Analysis(results, motions))
-
-    return Experiment(list(scale.runs), partial(perform, clips, scale), tables, figures)

@@ -15,7 +15,7 @@ from posefit.fitting.tracker import Frame, Task
 from posefit.motion import built_in
 from posefit.tracking.method import prepare
 from posefit.tracking.options import EVALUATIONS, TrackOptions
-from posefit_reproduce.experiment import Arrays, Experiment, Results, Run
+from posefit_reproduce.experiment import Arrays, Run
 from posefit_reproduce.vsmm.activities import TRAINING, Film, film_of
 from posefit_vsmm.groups import read_topology
 from posefit_vsmm.motion import library
@@ -91,15 +91,3 @@ def arrays_of(frames: list[Frame]) -> Arrays:
         **{name: [frame.details[name] for frame in frames] for name in DETAILS},
     }
     return {"probabilities": probabilities, **{name: np.array(values) for name, values in series.items()}}
-
-
-def patent_experiment(scale: Scale) -> Experiment:
-    """Return the experiment. Raises InputError where there are no films."""
-    from posefit_reproduce.vsmm.tables import patent_tables
-
-    def figures(results: Results) -> Iterator[tuple[str, Any]]:
-        from posefit_reproduce.vsmm.figures import patent_figures
-
-        return patent_figures(results)
-
-    return Experiment(list(scale.runs), perform, patent_tables, figures)

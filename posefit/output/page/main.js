@@ -28,7 +28,11 @@ function frameText(frame) {
   const other = otherOf(frame);
   const states = MARKS.filter(([name]) => D.marks[name].includes(frame)).map(([, , words]) => words);
   if (other) states.push(`may be the thin bones: ${whole(100 * other.weight)} %`);
-  return [`frame ${D.first + frame * D.step} of ${D.first + D.count}, ${number(seconds(frame), 2)} s`, ...figures, ...states].join("; ");
+  return [
+    `frame ${D.first + frame * D.step} of ${D.first + D.count}, ${number(seconds(frame), 2)} s`,
+    ...figures,
+    ...states,
+  ].join("; ");
 }
 
 const others = D.cameras.length > 1 ? D.cameras.map(() => make("canvas", { "aria-hidden": "true" })) : [];
@@ -43,7 +47,8 @@ function paint() {
   last = `${show.camera} ${text}`;
   $("frame").value = show.frame;
   $("frame").setAttribute("aria-valuetext", text);
-  $("reading").textContent = pictured === show.frame ? text : `${text}; the picture is of frame ${D.first + pictured * D.step}`;
+  $("reading").textContent =
+    pictured === show.frame ? text : `${text}; the picture is of frame ${D.first + pictured * D.step}`;
   $("picture").setAttribute("aria-label", `Camera ${show.camera + 1} with the body on it, ${text}`);
   $("turning").setAttribute("aria-label", `The body in 3D, which arrow keys turn, ${text}`);
 }
