@@ -66,7 +66,7 @@ _POLYNOMIALS = (
 )
 _OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
 _OF_LENS = re.compile(
-    r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|k[0-9]*|kappa[0-9]*|xi"
+    r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|(k|kappa)[0-9]*|xi"
 )
 
 
