@@ -225,23 +225,6 @@ def _locked(file: int) -> bool:
     return True
 
 
-def create_once(path: Path, content: object) -> bool:
-    """Create a file with this content where its name is free; return whether this call did.
-
-    Bytes are written as they are, anything else as JSON. Of any number of callers exactly one gets True. Raises OSError
-    where there is no room.
-    """
-    building = _created(path)
-    try:
-        building.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
-        _named(building, path)
-    except FileExistsError:
-        return False
-    finally:
-        building.unlink(missing_ok=True)
-    return True
-
-
 @contextmanager
 def _undone(path: Path) -> Iterator[None]:
     """Remove a file or a folder where the body fails."""

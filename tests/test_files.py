@@ -1,12 +1,9 @@
 """Files and folders appear whole or not at all."""
 
 import errno
-import json
 import os
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
 
 import pytest
 
@@ -15,7 +12,6 @@ from posefit.files import (
     Unfinished,
     check_new,
     check_place,
-    create_once,
     new_file,
     new_folder,
     replaceable,
@@ -124,27 +120,6 @@ def without_links(monkeypatch):
         raise OSError(errno.EPERM, os.strerror(errno.EPERM))
 
     monkeypatch.setattr(os, "link", refuse)
-
-
-@pytest.mark.parametrize("links", [True, False])
-def test_of_many_that_create_a_file_exactly_one_does(tmp_path, monkeypatch, links):
-    if not links:
-        without_links(monkeypatch)
-    start, created = Barrier(8), []
-
-    def work(k):
-        start.wait()
-        for name in range(50):
-            if create_once(tmp_path / str(name), {"by": k}):
-                created.append((name, k))
-
-    with ThreadPoolExecutor(8) as threads:
-        list(threads.map(work, range(8)))
-    assert sorted(name for name, _ in created) == list(range(50))
-    assert all(json.loads((tmp_path / str(name)).read_text()) == {"by": k} for name, k in created)
-    assert len(list(tmp_path.iterdir())) == 50
-    assert create_once(tmp_path / "a", b"\x00\x01")
-    assert (tmp_path / "a").read_bytes() == b"\x00\x01"
 
 
 def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):

@@ -24,7 +24,7 @@ from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, acceleration, runs, standing
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
-from posefit.silhouette.mask import Mask
+from posefit.silhouette.mask import Mask, touches_border
 from posefit.uncertainty.modes import poses_apart
 
 SMOOTH_SECONDS = 0.5  # before and after a frame, to which a smooth path is fitted
@@ -32,14 +32,9 @@ MIN_SMOOTH_FRAMES = 5  # of such a fit
 SCATTER_QUANTILE = 0.9  # of frames that lie nearer to that path
 
 
-def is_cut(mask: Mask) -> bool:
-    """Return whether a mask touches the picture's border."""
-    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
-
-
 def longer_side(mask: Mask) -> int:
     """Return the longer side in pixels of a mask's bounding box, 0 where it is empty or cut by the picture's edge."""
-    return 0 if is_cut(mask) else max(cv2.boundingRect(mask.astype(np.uint8))[2:])
+    return 0 if touches_border(mask) else max(cv2.boundingRect(mask.astype(np.uint8))[2:])
 
 
 def depth_scatter(depths: Array, usable: NDArray[np.bool_], fps: float) -> float | None:
@@ -293,7 +288,7 @@ def trust_of(
     the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
     usable = table["usable"] == 1.0
-    cut = np.array([any(is_cut(view.mask) for view in each.silhouettes) for each in scene.observations])
+    cut = np.array([any(touches_border(view.mask) for view in each.silhouettes) for each in scene.observations])
     many = usable.sum() >= MIN_FRAMES
     joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
     stands = standing(joints, scene.fps) & usable[:, None]

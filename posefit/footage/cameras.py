@@ -126,7 +126,9 @@ def world_of(
     """Return how the world of calibrations is turned upright, their unit in metres, and what is guessed of both."""
     calibrations = [camera for camera in known if isinstance(camera, Calibration)]
     guesses = {"up": guess} if up is None and (guess := guessed_up(calibrations)) else {}
-    distances = [float(np.linalg.norm(one.translation)) for one in calibrations if one.translation is not None]
+    distances = [
+        float(np.linalg.norm(place)) for calibration in calibrations if (place := calibration.translation) is not None
+    ]
     if unit is None and distances:
         unit = "m" if max(distances) <= FAR else "cm" if max(distances) <= FARTHER else "mm"
         if unit != "m" or not all(calibration.upright for calibration in calibrations):  # ours are in metres
@@ -209,7 +211,7 @@ def _straightened(pictures: Callable[[], Iterator[Image]], maps: tuple[Any, Any]
 
 def listed(cameras: Sequence[Camera | Calibration | str | Path]) -> list[Camera | Calibration]:
     """Return cameras, those of files read; a file with several cameras serves for several views, in its order."""
-    each = [[one] if isinstance(one, Camera | Calibration) else read_calibrations(one) for one in cameras]
+    each = [[camera] if isinstance(camera, Camera | Calibration) else read_calibrations(camera) for camera in cameras]
     return list(chain.from_iterable(each))
 
 

@@ -11,7 +11,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import PackedMasks
 from posefit.silhouette.foreground import HOLE, NEAR, PIECE, without_holes
-from posefit.silhouette.mask import Mask, Silhouette
+from posefit.silhouette.mask import Mask, Silhouette, touches_border
 
 INVERSION_FRAMES = 40  # masks by which it is decided whether they are inverted
 BORDER_SHARE = 0.5  # of the image's border: a person covers no more of it
@@ -48,7 +48,7 @@ def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tup
             crowded += len(people) > 1
             mask = people[follower.next(people, masks.names[k])]
             mask = without_holes(mask, HOLE if holes is None else holes) & silhouette.valid
-            areas[k], cut[k] = mask.sum(), any(edge.any() for edge in (mask[0], mask[-1], mask[:, 0], mask[:, -1]))
+            areas[k], cut[k] = mask.sum(), touches_border(mask)
         else:
             follower.skip()
         masks.masks[k] = np.packbits(mask)

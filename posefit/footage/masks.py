@@ -65,8 +65,8 @@ def undistorted(masks: PackedMasks, calibration: Calibration, maps: tuple[Any, A
     """
     straight, valid = empty_planes(len(masks), masks.size), empty_planes(len(masks), masks.size)
     for k in range(len(masks)):
-        seen = masks.silhouette(k)
-        for planes, plane in ((straight, seen.mask), (valid, seen.valid)):
+        silhouette = masks.silhouette(k)
+        for planes, plane in ((straight, silhouette.mask), (valid, silhouette.valid)):
             planes[k] = np.packbits(cv2.remap(plane.astype(np.uint8), *maps, cv2.INTER_NEAREST) != 0)
     bent = masks.landmarks
     landmarks = None if bent is None else calibration.straightened(bent, masks.size)

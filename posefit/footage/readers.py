@@ -143,7 +143,7 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
     counts, shape, known = ValueCounts(), (0, 0), [file is not None for file, _ in chosen]
     stored: list[tuple[int, np.dtype[Any]]] = []
     with tempfile.SpooledTemporaryFile(SPOOLED) as spool:
-        for file, group in groupby((one for one in chosen if one[0] is not None), key=itemgetter(0)):
+        for file, group in groupby(((file, page) for file, page in chosen if file is not None), key=itemgetter(0)):
             wanted = len(stored) + len(pages := [page for _, page in group])
             for marks in read_marks(file, pages, label is not None):
                 if marks.photo:

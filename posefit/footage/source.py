@@ -100,8 +100,8 @@ def scene_of(
         known = listed(camera)
         world, metres, guesses = world_of(known, up, unit)
         cameras = [
-            one if isinstance(one, Camera) else one.in_metres(metres).camera(one.size or size or SIZE, world)
-            for one in known
+            each if isinstance(each, Camera) else each.in_metres(metres).camera(each.size or size or SIZE, world)
+            for each in known
         ]
         stated = FileOptions(asf, None if known else unit, None if known else up, rate)
         motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
@@ -172,13 +172,13 @@ def _filmed(
         tried.append((way.name, *_taken_out(videos, way, frames, progress, scene)))
         if tried[-1][2] is None:
             break
-    name, views, doubt = min(tried, key=lambda one: 0 if one[2] is None else 1 + one[2].refused)
+    name, views, doubt = min(tried, key=lambda way: 0 if way[2] is None else 1 + way[2].refused)
     if doubt and doubt.refused:
         raise InputError(doubt.text)
     first, _, before = tried[0]
     if name != first and before is not None:
-        said = f"{name} took the person out, instead of {first}: {before.text.partition(';')[0]}"
-        views[0] = replace(views[0], warnings=[*views[0].warnings, said])
+        warning = f"{name} took the person out, instead of {first}: {before.text.partition(';')[0]}"
+        views[0] = replace(views[0], warnings=[*views[0].warnings, warning])
     return views
 
 

@@ -3,7 +3,7 @@
 | looking for | file |
 |---|---|
 | the folder that appears whole, and goes on where it ended; whether two tracks are the same | folder.py, identity.py |
-| every file, a line a format | files.py |
+| every file, a line a format; what they are made of | files.py, content.py |
 | pictures: overlay.mp4 and summary.png | picture.py, drawing.py |
 | the page, track.html | page/ |
 | what is printed | text.py |

@@ -2,53 +2,34 @@
 
 import csv
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from itertools import repeat
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
 
-from posefit.arrays import Array
-from posefit.evaluation.errors import Table, unseen
 from posefit.files import opencv_name
-from posefit.fitting.tracker import Frame, Observation
+from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.footage.video import VideoWriter
-from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
+from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.c3d import write_c3d
 from posefit.measuring.centres import PLACES
-from posefit.measuring.gait import Gait
 from posefit.measuring.tables import write_angles, write_gait, write_trc
 from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
 from posefit.motion.gltf import write_glb
-from posefit.motion.motion import Motion
 from posefit.motion.opensim import write_mot, write_osim
+from posefit.output.content import Content
 from posefit.output.page import track_document
 from posefit.output.page.content import track_data
 from posefit.output.page.stills import Stills
 from posefit.output.picture import Painter
 from posefit.output.text import undetermined
 from posefit.silhouette.foreground import Image
-from posefit.uncertainty.calibration import LEVELS
-from posefit.uncertainty.intervals import angle_intervals, joint_intervals
-
-
-class Content(NamedTuple):
-    """What the files of a track are made of."""
-
-    scene: Scene
-    frames: Sequence[Frame]
-    table: Table
-    gait: Gait
-    summary: dict[str, Any]
-    motion: Motion
-    blank: set[int]  # frames of which nothing is known
-    intervals: dict[str, Array]
-
 
 FORMATS: dict[str, Callable[[Path, Content], Any]] = {
     "poses.npz": lambda path, content: _write_npz(path, content),
@@ -69,18 +50,16 @@ FORMATS: dict[str, Callable[[Path, Content], Any]] = {
 FILES = (*FORMATS, "overlay.mp4", "summary.png", "track.html")
 
 
-def write_files(
-    folder: Path, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]
-) -> None:
+def write_files(folder: Path, content: Content) -> None:
     """Write all `FILES` of a track to a folder."""
-    intervals = intervals_of(scene.body.skeleton, frames)
-    content = Content(scene, frames, table, gait, summary, scene.motion(frames), unseen(table), intervals)
+    scene, table, summary = content.scene, content.table, content.summary
     for name, write in FORMATS.items():
         write(folder / name, content)
     stills, painter = Stills(scene), Painter(scene, table["usable"] == 1.0)
     writer: VideoWriter | None = None
-    radii = intervals.get("joint_radii", repeat(None))
-    for k, (frame, observation, picture, spread) in enumerate(zip(frames, *_filmed(scene), radii, strict=False)):
+    radii = content.intervals.get("joint_radii", repeat(None))
+    filmed = zip(content.frames, *_filmed(scene), radii, strict=False)
+    for k, (frame, observation, picture, spread) in enumerate(filmed):
         stills.add(frame, observation, picture)
         row = {name: float(values[k]) for name, values in table.items()}
         image = painter.add(frame, observation, row, picture, spread)
@@ -92,37 +71,21 @@ def write_files(
     notes = ("" if summary["trust"] is None else summary["trust"]["sentence"], undetermined(summary))
     if not cv2.imwrite(opencv_name(folder / "summary.png"), painter.summary(table, [*filter(None, notes)])):
         raise OSError("no room for summary.png")
-    page = track_document(track_data(scene, frames, table, summary, intervals, stills))
+    page = track_document(track_data(content, stills))
     (folder / "track.html").write_text(page, encoding="utf-8", newline="\n")
 
 
-def page_of(scene: Scene, frames: Sequence[Frame], table: Table, summary: dict[str, Any]) -> str:
+def page_of(content: Content) -> str:
     """Return the page of a track, `track.html`."""
-    stills = Stills(scene)
-    for frame, observation, picture in zip(frames, *_filmed(scene), strict=False):
+    stills = Stills(content.scene)
+    for frame, observation, picture in zip(content.frames, *_filmed(content.scene), strict=False):
         stills.add(frame, observation, picture)
-    return track_document(track_data(scene, frames, table, summary, intervals_of(scene.body.skeleton, frames), stills))
+    return track_document(track_data(content, stills))
 
 
 def _filmed(scene: Scene) -> tuple[Iterable[Observation], Iterable[Image | None]]:
     """Return what was observed in each frame, and the footage of each, None where there is none."""
     return scene.observations, repeat(None) if scene.pictures is None else scene.pictures()
-
-
-def intervals_of(skeleton: Skeleton, frames: Sequence[Frame]) -> dict[str, Array]:
-    """Return how far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
-
-    `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
-    """
-    if all(frame.posterior is None for frame in frames):
-        return {}
-    radii = np.full((len(frames), len(LEVELS), len(JOINTS)), np.nan)
-    halves = np.full((len(frames), len(LEVELS), ANGLES), np.nan)
-    for k, frame in enumerate(frames):
-        if frame.posterior is not None:
-            radii[k] = joint_intervals(skeleton, frame.posterior, frame.pose)
-            halves[k] = angle_intervals(frame.posterior, frame.pose)
-    return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
 
 
 def _write_npz(path: Path, content: Content) -> None:

@@ -7,18 +7,16 @@ early, because a disk is full or it is stopped, those frames are kept, and the s
 import json
 import os
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from posefit.errors import InputError
-from posefit.evaluation.errors import Table
 from posefit.files import MARK, Unfinished, opencv_name, other_entries
 from posefit.fitting.tracker import Frame
-from posefit.footage.scene import Scene
-from posefit.measuring.gait import Gait
+from posefit.output.content import Content
 from posefit.output.files import FILES, write_files
 from posefit.output.identity import Digest, difference
 from posefit.reading import cut, parsed_json, read_text
@@ -45,7 +43,7 @@ class Recorder:
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
 
-    def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
+    def finish(self, content: Content) -> None:
         """Write everything."""
 
 
@@ -63,7 +61,7 @@ class OutputFolder(Recorder):
         spec: Mapping[str, Digest],
         say: Callable[[str], None],
     ) -> None:
-        self.path, self._spec, self._say, self._resume = Path(path), dict(spec), say, resume
+        self.path, self._spec, self._say = Path(path), dict(spec), say
         opencv_name(self.path)  # a name that it cannot write is refused before the work
         if os.path.lexists(self.path):
             if self.path.is_symlink() or not self.path.is_dir():
@@ -164,9 +162,9 @@ class OutputFolder(Recorder):
             file.write(b"%08x %s\n" % (zlib.crc32(text), text))
         self._recorded += 1
 
-    def finish(self, scene: Scene, frames: Sequence[Frame], table: Table, gait: Gait, summary: dict[str, Any]) -> None:
+    def finish(self, content: Content) -> None:
         """Write everything."""
-        write_files(self.building, scene, frames, table, gait, summary)
+        write_files(self.building, content)
 
 
 def _unmarked(folder: Path) -> list[str]:

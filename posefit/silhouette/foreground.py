@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.errors import InputError
-from posefit.silhouette.mask import Mask, padded_box
+from posefit.silhouette.mask import Mask, padded_box, touches_border
 
 Image = NDArray[np.uint8]  # (height, width, 3)
 
@@ -183,8 +183,7 @@ def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
     dark = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
     mask, pieces, rival = _largest(_cleaned(changed | dark, height) & inside)
     mask = without_holes(mask)
-    touches = bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
-    return Person(mask, known | mask, int(mask.sum()), pieces, rival, touches)
+    return Person(mask, known | mask, int(mask.sum()), pieces, rival, touches_border(mask))
 
 
 def _cleaned(mask: Mask, height: int) -> Mask:

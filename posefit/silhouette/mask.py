@@ -42,6 +42,11 @@ def box_of(mask: Mask) -> tuple[int, int, int, int]:
     return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
+def touches_border(mask: Mask) -> bool:
+    """Return whether a mask touches the picture's border."""
+    return bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
+
+
 def padded_box(mask: Mask, margin: int) -> tuple[slice, slice]:
     """Return the rows and columns of a mask's pixels, and so many about them; the first pixel where it has none."""
     left, top, wide, tall = cv2.boundingRect(mask.astype(np.uint8))

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from posefit.arrays import Array
     from posefit.footage.scene import Scene
 
-TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
@@ -27,7 +26,7 @@ UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has un
 
 @dataclass(frozen=True)
 class CellResult:
-    """What a cell measured; but for `TIMES`, the same bits wherever it ran."""
+    """What a cell measured; but for the times, the same bits wherever it ran."""
 
     row: dict[str, Any]  # as JSON holds it: the key, the spec, and the figures
     joints: bytes = field(repr=False)  # an .npz of `estimate` and `truth` (T, 27, 3), float32, metres; b"" of a search

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Self
 from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import counted, cut, quoted
-from posefit.sweep.cell import Cell, CellResult, cell_from, other_version
+from posefit.sweep.cell import Cell, CellResult, cell_from
 from posefit.sweep.row import checked_row
 from posefit.version import posefit_build
 
@@ -95,12 +95,10 @@ class Ledger:
     @property
     def version(self) -> str:
         """The versions of posefit whose results these are, with digests of its source; that of today without rows."""
-        builds = {version.partition(", ")[0] for version in self._versions()} or {posefit_build()}
+        query = "SELECT DISTINCT json_extract(spec, '$.version') FROM cells WHERE status = 'done'"
+        versions = [str(version) for k in range(len(self._open)) for (version,) in self._query(k, query)]
+        builds = {version.partition(", ")[0] for version in versions} or {posefit_build()}
         return ", ".join(sorted(build.removeprefix("posefit ") for build in builds))
-
-    def outdated(self) -> Counter[str]:
-        """Return how many rows are of each version of posefit and plugins that is not the one installed."""
-        return Counter({one: n for one, n in self._versions().items() if any(map(other_version, one.split(", ")))})
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield every finished row, as `posefit.sweep.cell.run_cell` describes it, in the order of the plans."""
@@ -154,13 +152,6 @@ class Ledger:
         """Close its files."""
         for _, database in self._open:
             database.close()
-
-    def _versions(self) -> Counter[str]:
-        query = "SELECT json_extract(spec, '$.version'), count(*) FROM cells WHERE status = 'done' GROUP BY 1"
-        counts = Counter[str]()
-        for k in range(len(self._open)):
-            counts.update({str(version): count for version, count in self._query(k, query)})
-        return counts
 
     def _rows(self, status: str) -> Iterator[dict[str, Any]]:
         for k in range(len(self._open)):

@@ -88,7 +88,7 @@ def track(
         setup = replace(track.setup, source=names, frames_chosen=list(chosen.frames), view_degrees=view_degrees)
         track = replace(track, setup=setup)
         with progress.phase("write"):
-            recorder.finish(scene, track.frames, track.table, track.gait, track.summary)
+            recorder.finish(track.content)
         return track
 
 

@@ -123,33 +123,32 @@ def prepare(options: TrackOptions, task: Task) -> Method:
             return _tracker_method(_offered("tracker", chosen), options.settings)
         optimiser, given_prior = _offered("optimiser", names.optimiser), names.prior
     prior = registry().offer("prior", given_prior) if isinstance(given_prior, str) else None
-    mine = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
-    mine.setdefault("prior", {})
-    given = mine["optimiser"]
-    mine["optimiser"] = settings.planned(optimiser.factory, given, task.evaluations)
-    mine["optimiser"] = settings.check(optimiser.name, optimiser.factory, mine["optimiser"])
+    plugin_settings = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
+    plugin_settings.setdefault("prior", {})
+    planned = settings.planned(optimiser.factory, plugin_settings["optimiser"], task.evaluations)
+    plugin_settings["optimiser"] = settings.check(optimiser.name, optimiser.factory, planned)
     if prior is not None:
         with _rules(prior):
-            learned = prior.factory(**mine["prior"]).fit(task.angles, task.body.skeleton)
+            learned = prior.factory(**plugin_settings["prior"]).fit(task.angles, task.body.skeleton)
             _check_prior(learned, task.angles, prior)
         learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
         learned, name = given_prior, type(given_prior).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
-    prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **mine["tracker"]})
+    prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **plugin_settings["tracker"]})
     tilt = prediction.tilted(learned, task.training)
 
     def build(task: Task) -> Tracker:
         def optimiser_of(space: Space, rng: np.random.Generator) -> Optimiser:
             with _rules(optimiser):
-                made = optimiser.factory(space, rng, **mine["optimiser"])
+                made = optimiser.factory(space, rng, **plugin_settings["optimiser"])
             return CheckedOptimiser(made, space, optimiser.label, task.evaluations)
 
         return SynthesisTracker(task, learned, optimiser_of, optimiser.next_frame, prediction, tilt)
 
     label = f"{optimiser.name}@{name}"
     audit = Audit(label, prediction.beta)
-    return Method(label, learned, mine, False, prediction.relocalise_gap, audit, build)
+    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build)
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
@@ -164,9 +163,8 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
     """Return settings by the kind of plugin that they are of.
 
     They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
-    left out where it alone has such a setting. Raises InputError where a
-    text has another form, names a plugin that is not among `offers` or a setting that it does not know, or where a
-    value does not fit.
+    left out where it alone has such a setting. Raises InputError where a text has another form, names a plugin that is
+    not among `offers` or a setting that it does not know, or where a value does not fit.
     """
     places = places_of(offers)
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
@@ -193,18 +191,20 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
 
 
 def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> Method:
-    mine = parsed_settings([offer], given)["tracker"]
+    plugin_settings = parsed_settings([offer], given)["tracker"]
     defaults = {setting.name: setting.default for setting in offer.settings}
-    beta = {"beta": BETA, **defaults, **mine}["beta"]  # of the costs that it gives
+    beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]  # of the costs that it gives
     beta = float(beta) if isinstance(beta, float | int) else BETA
 
     def build(task: Task) -> Tracker:
         with _rules(offer):
-            tracker: Tracker = offer.factory(task, **mine)
+            tracker: Tracker = offer.factory(task, **plugin_settings)
         return tracker
 
     gap = 0 if offer.looks_ahead else None
-    return Method(offer.name, None, {"tracker": mine}, offer.looks_ahead, gap, Audit(offer.label, beta), build)
+    return Method(
+        offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, Audit(offer.label, beta), build
+    )
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:

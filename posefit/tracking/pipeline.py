@@ -104,9 +104,9 @@ def follow(
     In footage, a tracker that looks ahead begins with the first frame that shows the whole person, and goes back first;
     unless more is known of the very first one than its masks show.
     """
-    earlier, state = recorder.earlier()
-    start, shown = 0, next((each.yaw for each in scene.observations if each.usable), None)
-    if scene.truth is None and first.yaw == shown and method.looks_ahead:
+    recorded, state = recorder.earlier()
+    start, first_yaw = 0, next((each.yaw for each in scene.observations if each.usable), None)
+    if scene.truth is None and first.yaw == first_yaw and method.looks_ahead:
         start = first_shown_whole(scene.observations)
     gap = (GAP if scene.truth is None else 0) if method.relocalise_gap is None else method.relocalise_gap
     count, total = scene.count, options.hypotheses
@@ -115,9 +115,9 @@ def follow(
         name, task = SEARCHED, first
         if number:
             usable = (k for k in range(start, count) if scene.observations[k].usable)
-            sure = hypotheses[0][1][next(usable, 0)]
-            name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", sure)
-        frames = list(earlier[number * count : (number + 1) * count])
+            reference = hypotheses[0][1][next(usable, 0)]
+            name, task = initial_guess(number, task, scene.yaw, options.first_pose == "given", reference)
+        frames = list(recorded[number * count : (number + 1) * count])
         rng = stream(options.seed, "hypothesis", number) if number else np.random.default_rng(options.seed)
         which = f" of track {number + 1} of {total}, {name}" if total > 1 else ""
         if state is not None and 0 < len(frames) < count:
@@ -132,21 +132,21 @@ def follow(
         elif which and not frames:
             progress.log(f"track {number + 1} of {total}: {name}")
         hypotheses.append((name, frames))
-        behind: list[Frame] = []
+        back: list[Frame] = []
         if start and not frames:
-            seen = (scene.observations[k] for k in range(start, -1, -1))
-            back = method.follow(backwards(task), seen, stream(options.seed, "back", number))
-            behind = list(progress.steps(back, start + 1))
-            for frame in behind[:0:-1]:
+            reversed_observations = (scene.observations[k] for k in range(start, -1, -1))
+            going_back = method.follow(backwards(task), reversed_observations, stream(options.seed, "back", number))
+            back = list(progress.steps(going_back, start + 1))
+            for frame in back[:0:-1]:
                 recorder.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
-            task = after(task, behind[0])
+            task = after(task, back[0])
         if len(frames) < count:
             rest = (scene.observations[k] for k in range(len(frames), count))
             ahead: Iterator[Frame] = relocalised(task, method.follow, rest, rng, gap)
             for frame in progress.steps(ahead, count - len(frames)):
                 recorder.record(frame, dict(rng.bit_generator.state))
                 frames.append(frame)
-        if behind:
-            frames[:start] = joined(scene.body.skeleton, behind, frames[start])[:0:-1]
+        if back:
+            frames[:start] = joined(scene.body.skeleton, back, frames[start])[:0:-1]
     return hypotheses

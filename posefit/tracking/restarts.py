@@ -106,19 +106,21 @@ def best_restart(
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
-    trial, shown = replace(task, fps=task.fps / TRIAL_STRIDE), chosen  # for models of motion
+    trial, compared = replace(task, fps=task.fps / TRIAL_STRIDE), chosen  # for models of motion
     if factor > 1:
         trial = replace(trial, cameras=[coarser_camera(camera, factor) for camera in task.cameras])
-        masks = [[coarser_silhouette(silhouette, factor) for silhouette in seen.silhouettes] for seen in chosen]
-        shown = [replace(seen, silhouettes=small) for seen, small in zip(chosen, masks, strict=True)]
+        masks = [
+            [coarser_silhouette(silhouette, factor) for silhouette in observation.silhouettes] for observation in chosen
+        ]
+        compared = [replace(observation, silhouettes=small) for observation, small in zip(chosen, masks, strict=True)]
     prefix = [seed] if isinstance(seed, int) else [*seed]
     best, least, tried = going_on or task, np.inf, list[Frame]()
     if going_on is not None:
         on = replace(going_on, fps=trial.fps, cameras=trial.cameras)
-        tried += follow(on, shown, np.random.default_rng([*prefix, restarts + 1]))
+        tried += follow(on, compared, np.random.default_rng([*prefix, restarts + 1]))
         least = _trial_cost(tried)
     for k in range(restarts):
-        frames = list(follow(trial, shown, np.random.default_rng([*prefix, k])))
+        frames = list(follow(trial, compared, np.random.default_rng([*prefix, k])))
         tried += frames
         if (cost := _trial_cost(frames)) < least:
             best, least = after(task, frames[0]), cost
@@ -284,11 +286,11 @@ def joined(skeleton: Skeleton, behind: Sequence[Frame], ahead: Frame) -> list[Fr
 
     Each of its trajectories goes on as the nearest one there.
     """
-    mine, others = ahead.posterior, behind[0].posterior
-    if mine is None or others is None:
+    here, there = ahead.posterior, behind[0].posterior
+    if here is None or there is None:
         return list(behind)
-    near = skeleton.joints(others.poses)
-    rows = np.array([((near - joints) ** 2).sum(axis=(1, 2)).argmin() for joints in skeleton.joints(mine.poses)])
+    near = skeleton.joints(there.poses)
+    rows = np.array([((near - joints) ** 2).sum(axis=(1, 2)).argmin() for joints in skeleton.joints(here.poses)])
     frames = []
     for frame in behind:
         if (posterior := frame.posterior) is not None:

@@ -25,6 +25,7 @@ from posefit.geometry.body import Body
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
+from posefit.output.content import Content
 from posefit.output.files import page_of
 from posefit.output.folder import OutputFolder
 from posefit.output.text import brief, table
@@ -110,6 +111,11 @@ class Track:
         trust, gait = None if self.trust is None else asdict(self.trust), self.gait.as_dict()
         values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.course), "trust": trust, "gait": gait}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+    @property
+    def content(self) -> Content:
+        """What its files are made of."""
+        return Content(self.scene, self.frames, self.table, self.gait, self.summary)
 
     @property
     def verdict(self) -> str:
@@ -203,12 +209,12 @@ class Track:
 
     def page(self) -> str:
         """Return the page that `show` opens and that `save` writes as track.html."""
-        return page_of(self.scene, self.frames, self.table, self.summary)
+        return page_of(self.content)
 
     def save(self, folder: str | Path, force: bool = False) -> None:
         """Write every file of a track to a new folder, or with `force` over earlier ones."""
         with OutputFolder(folder, force, False, {}, QUIET.log) as output:
-            output.finish(self.scene, self.frames, self.table, self.gait, self.summary)
+            output.finish(self.content)
 
 
 @dataclass(frozen=True, eq=False)

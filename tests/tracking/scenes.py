@@ -89,7 +89,7 @@ def tracked(scene: Scene, frames: Sequence[Frame], recorder: Recorder | None = N
         patch.setattr(method.Method, "follow", follow)
         track = track_scene(scene, [built_in.motion("walk-b", frames=20)], recorder=recorder)
     if recorder is not None:
-        recorder.finish(track.scene, track.frames, track.table, track.gait, track.summary)
+        recorder.finish(track.content)
     return track
 
 

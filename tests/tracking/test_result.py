@@ -114,6 +114,15 @@ def test_files_and_the_page_come_afterwards_too(
     assert opened == [page.as_uri()]
 
 
+def test_the_files_of_a_track_have_the_build_that_was_fitted(tmp_path: Path) -> None:
+    motion = built_in.motion("walk", frames=6)
+    masks = [project(BODY, CAMERA, *pose) for pose in zip(motion.poses, motion.translations, strict=True)]
+    track = posefit.track(masks, camera=CAMERA, fps=25, out=tmp_path / "out", **{**QUICK, "body_frames": 6})
+    assert track.course.build is not None
+    with np.load(tmp_path / "out" / "poses.npz") as stored:
+        np.testing.assert_array_equal(stored["radii"], track.scene.body.radii)
+
+
 def test_methods_are_compared(tmp_path: Path) -> None:
     compared = posefit.compare(["random@pca", "sapso@pca"], seeds=1, frames=2, evaluations=80, out=tmp_path / "kept")
     assert list(compared.to_pandas()["method"]) == ["random@pca", "sapso@pca"]

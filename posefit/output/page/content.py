@@ -1,7 +1,7 @@
 """The data of a track's page: bodies, figures, intervals, and words."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
 from posefit.motion.motion import Motion
+from posefit.output.content import Content
 from posefit.output.page.stills import Stills
 from posefit.output.picture import MIN_OTHER_WEIGHT
 from posefit.output.text import brief, held_frames, undetermined
@@ -38,20 +39,14 @@ ANGLE_NAMES = (
 )
 
 
-def track_data(
-    scene: Scene,
-    frames: Sequence[Frame],
-    table: Table,
-    summary: dict[str, Any],
-    intervals: Mapping[str, Array],
-    stills: Stills,
-) -> dict[str, Any]:
-    """Return the data of the page; `intervals` come from `posefit.output.folder.intervals_of`.
+def track_data(content: Content, stills: Stills) -> dict[str, Any]:
+    """Return the data of the page.
 
     Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
     track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
-    step, estimate = stills.step, scene.motion(frames)
+    scene, frames, table, summary = content.scene, content.frames, content.table, content.summary
+    step, estimate, intervals = stills.step, content.motion, content.intervals
     joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, estimate.skeleton.free

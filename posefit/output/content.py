@@ -1,0 +1,55 @@
+"""What the files of a track are made of, and its page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.evaluation.errors import Table, unseen
+from posefit.fitting.tracker import Frame
+from posefit.footage.scene import Scene
+from posefit.geometry.skeleton import ANGLES, JOINTS
+from posefit.measuring.gait import Gait
+from posefit.motion.motion import Motion
+from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.intervals import angle_intervals, joint_intervals
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What the files of a track are made of."""
+
+    scene: Scene
+    frames: Sequence[Frame]
+    table: Table
+    gait: Gait
+    summary: dict[str, Any]
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The estimated motion."""
+        return self.scene.motion(self.frames)
+
+    @cached_property
+    def blank(self) -> set[int]:
+        """The frames of which nothing is known."""
+        return unseen(self.table)
+
+    @cached_property
+    def intervals(self) -> dict[str, Array]:
+        """How far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
+
+        `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
+        """
+        if all(frame.posterior is None for frame in self.frames):
+            return {}
+        radii = np.full((len(self.frames), len(LEVELS), len(JOINTS)), np.nan)
+        halves = np.full((len(self.frames), len(LEVELS), ANGLES), np.nan)
+        for k, frame in enumerate(self.frames):
+            if frame.posterior is not None:
+                radii[k] = joint_intervals(self.scene.body.skeleton, frame.posterior, frame.pose)
+                halves[k] = angle_intervals(frame.posterior, frame.pose)
+        return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
