@@ -58,6 +58,7 @@ RESULT = {
     ),
     "trace": ("", "of a single frame only: evaluations so far and best cost, after each population"),
     "warnings": ("", "what to look at before the result is trusted"),
+    "guesses": ("", "what the source does not state and posefit assumed, such as the camera, the rate or a height"),
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
     "none_of_modes": (
         "",

@@ -61,9 +61,10 @@ def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
     """
     if not waiting:
         raise InputError("tell must follow ask, got costs before proposals")
-    for name, values in (("costs", costs), ("proposals", proposals)):
-        if np.shape(values)[:1] != (waiting,):
-            came = len(values) if np.ndim(values) else "one number"
+    for name, values, dimensions in (("costs", costs, 1), ("proposals", proposals, 2)):
+        shape = np.shape(values)
+        if len(shape) != dimensions or shape[0] != waiting:
+            came = "one number" if not shape else shape[0] if len(shape) == dimensions else f"an array of shape {shape}"
             raise InputError(f"tell must get {waiting} {name}, got {came}")
 
 

@@ -105,7 +105,7 @@ def scene_of(
         ]
         stated = FileOptions(asf, None if known else unit, None if known else up, rate)
         motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
-        return synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()])
+        return _logged(synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()]), progress)
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
     body, notes = body_of(asf, height, None if camera else unit)
@@ -129,9 +129,14 @@ def scene_of(
     result = scene(views)
     of_height = [f"a person of {body.stature:.2f} m"] if height is None and asf is None else []
     result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
-    if result.guesses:
-        progress.log(f"guessed: {'; '.join(result.guesses)}")
-    return result
+    return _logged(result, progress)
+
+
+def _logged(scene: Scene, progress: Progress) -> Scene:
+    """Return a scene whose guesses are logged."""
+    if scene.guesses:
+        progress.log(f"guessed: {'; '.join(scene.guesses)}")
+    return scene
 
 
 def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:

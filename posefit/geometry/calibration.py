@@ -65,7 +65,9 @@ _POLYNOMIALS = (
     *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
 )
 _OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
-_OF_LENS = re.compile(r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|k[1-9]|xi")
+_OF_LENS = re.compile(
+    r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|(k|kappa)[0-9]*|xi"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,8 +263,9 @@ def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> C
     lens = _first(known, LENS)
     if lens is None or (isinstance(lens, dict) and "k1" in lens):
         lens = [(known if lens is None else lens).get(key, 0.0) for key in numbered]
+    others = *LENS, *MODEL, *numbered, next(key for key in MATRIX if key in known)
     for key, value in values.items():
-        if _OF_LENS.fullmatch(plain := _plain(key)) and plain not in (*LENS, *MODEL, *numbered) and _counts(value):
+        if _OF_LENS.fullmatch(plain := _plain(key)) and plain not in others and _counts(value):
             raise InputError(f"the lens key {quoted(key)} of {quoted(name)}, which is not known")
     size = _first(known, SIZE) or [_first(known, names) for names in SIDES]
     rotation, translation = _first(known, ROTATION), _first(known, TRANSLATION)

@@ -78,6 +78,7 @@ def evaluate(
         retracked_outside=stay,
         backwards_share=round(float(walks_back.mean()), 6),
         warnings=warnings,
+        guesses=[*scene.guesses],
     )
     gait = gait_of(motion, unseen(table))
     return Track(motion, frames, table, measures, trust, gait, setup, course, modes, scene)

@@ -81,6 +81,7 @@ class Course:
     retracked_outside: tuple[int, int] | None
     backwards_share: float
     warnings: list[str]
+    guesses: list[str]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from posefit.footage.source import scene_of
 from posefit.geometry.units import METRES, UNIT_NAMES
 from posefit.progress import Progress
 from tests.cases import each
-from tests.commands import error_of
+from tests.commands import error_of, printed
 from tests.footage.conftest import NOBODY, camera, film, truth, walk
 from tests.footage.test_footage import toml
 
@@ -56,6 +56,8 @@ def test_the_unit_of_one_camera_is_recognised_by_its_distance(tmp_path: Path, un
     drawn = scene_of(["walk"], camera=[path], up="y", frames=(0, 2))
     assert drawn.observations[0].silhouettes[0].mask.any()
     assert drawn.guesses == scene.guesses
+    words = ["--camera", path, "--up", "y", "--frames", "0:2", "--method", "random", "--evaluations", "40"]
+    assert printed("track", "walk", *words)["guesses"] == list(scene.guesses)
 
 
 def test_a_height_half_or_twice_the_usual_is_no_other_unit() -> None:

@@ -239,6 +239,7 @@ def test_a_fisheye_is_one(tmp_path: Path, name: str, value: str) -> None:
         ("dist_foo: [0.1, 0.2, 0, 0]", "the lens key 'dist_foo' of 'a', which is not known"),
         ("lens_coefs: [0.1, 0, 0, 0]", "the lens key 'lens_coefs' of 'a', which is not known"),
         ("xi: 1.2", "the lens key 'xi' of 'a', which is not known"),
+        ("kappa: 0.1", "the lens key 'kappa' of 'a', which is not known"),
         ("k4: 0.2\nk1: 0.1", "the lens key 'k4' of 'a', which is not known"),
         ("distortion_model: double_sphere", "the lens model 'double_sphere', which is not known"),
         ("model: omnidirectional", "the lens model 'omnidirectional', which is not known"),
@@ -253,6 +254,9 @@ def test_a_lens_that_is_not_known_is_named(tmp_path: Path, line: str, message: s
     assert not read_calibrations(tmp_path / "a.yml")[0].distorted
     (tmp_path / "a.yml").write_text(f"{fine}{line}\n")
     with pytest.raises(ValueError, match=message):
+        read_calibrations(tmp_path / "a.yml")
+    (tmp_path / "a.yml").write_text(fine.replace("K:", "camera_matrix:") + "k: [0.1, 0, 0, 0]\n")
+    with pytest.raises(ValueError, match="the lens key 'k' of 'a', which is not known"):
         read_calibrations(tmp_path / "a.yml")
 
 

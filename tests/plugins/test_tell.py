@@ -26,8 +26,9 @@ def test_costs_that_nobody_asked_for_are_refused(name: str) -> None:
     ):
         with pytest.raises(InputError, match=f"tell must get {message}$"):
             optimiser.tell(told, np.zeros(count))
-    with pytest.raises(InputError, match=f"tell must get {n} costs, got one number"):
-        optimiser.tell(proposals, np.float64(3.0))
+    for costs, came in ((np.float64(3.0), "one number"), (np.zeros((n, 1)), rf"an array of shape \({n}, 1\)")):
+        with pytest.raises(InputError, match=f"tell must get {n} costs, got {came}$"):
+            optimiser.tell(proposals, costs)
     optimiser.tell(proposals, sphere(proposals))
     with pytest.raises(InputError, match="tell must follow ask"):
         optimiser.tell(proposals, sphere(proposals))

@@ -1,5 +1,6 @@
 """What a cell can do wrong ends with that cell, in processes of this machine and on Dask's workers."""
 
+import json
 import os
 import socket
 import subprocess
@@ -13,7 +14,8 @@ from typing import Any
 import pytest
 
 from posefit.errors import InputError
-from posefit.sweep.cell import TIMES, TrackCell, run_cell
+from posefit.suites.functions import SUITE
+from posefit.sweep.cell import TIMES, SearchCell, TrackCell, run_cell
 from posefit.sweep.command import swept as sweep
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Outcome
@@ -141,6 +143,19 @@ PRODUCT = {
     "methods": ["sapso@pca", "cma@pca", "particle@full"], "motions": ["walk"], "corruptions": [{}, {"dropped": 0.5}],
     "views": [[0, 90]], "seeds": 2,
 }  # fmt: skip
+
+
+def test_a_pool_gives_the_rows_of_this_process_bit_for_bit(tmp_path: Path) -> None:
+    methods = ("random", "sapso")
+    searches = [SearchCell(name, SUITE, 1, 9, 10_000, 100, seed=seed) for name in methods for seed in (0, 1)]
+    assert swept(tmp_path, searches, Pool(2, Limits(), run_cell)).done == len(searches)
+    rows = {row["key"]: row for row in Ledger(tmp_path).rows()}
+    assert len({json.dumps(row["trace"]) for row in rows.values()}) == len(searches)  # no two are the same search
+    for search in searches:
+        expected = json.loads(json.dumps(run_cell(search).row))
+        assert {name: rows[search.key][name] for name in expected if name not in TIMES} == {
+            name: value for name, value in expected.items() if name not in TIMES
+        }
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """What people do with masks in Python: arrays in, joints, angles, tables, pictures and files out."""
 
+import pickle
 import time
 import webbrowser
 from pathlib import Path
@@ -57,6 +58,15 @@ def test_the_same_masks_give_the_same_track(kind: str, track: posefit.Track, tmp
 def test_arrays_that_are_no_masks_are_named(masks: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         posefit.track(masks, **QUICK)
+
+
+def test_a_track_of_masks_and_one_of_a_motion_pickle(track: posefit.Track) -> None:
+    for result in (track, posefit.track("walk", frames=(0, 2), size=(80, 60), **QUICK)):
+        copied = pickle.loads(pickle.dumps(result))
+        assert copied.summary == result.summary
+        np.testing.assert_array_equal(copied.joints, result.joints)
+        before, after = (each.scene.observations[1].silhouettes[0].mask for each in (result, copied))
+        np.testing.assert_array_equal(after, before)
 
 
 def test_warnings_are_shown_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
