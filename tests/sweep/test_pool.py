@@ -15,7 +15,7 @@ import pytest
 
 from posefit.errors import InputError
 from posefit.suites.functions import SUITE
-from posefit.sweep.cell import TIMES, SearchCell, TrackCell, run_cell
+from posefit.sweep.cell import SearchCell, TrackCell, run_cell
 from posefit.sweep.command import swept as sweep
 from posefit.sweep.drive import Tally, drive
 from posefit.sweep.engine import Engine, Limits, Outcome
@@ -25,6 +25,7 @@ from posefit.sweep.pool import Pool
 from tests.sweep import fake
 from tests.sweep.fake import behave, cells, swept
 
+TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
 LIMITS = Limits(seconds=300.0, gigabytes=0.6)  # a slow machine takes seconds to start a worker
 PATIENCE = 300.0  # seconds for workers to come; these tests mean something else
 ROOT = Path(__file__).parents[2]
