@@ -28,10 +28,7 @@ LINES = 1000  # that are printed at a time
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
 @QUIET
 @JSON
-@click.pass_context
 def sweep(
-    context: click.Context,
-    /,
     plan: str,
     out: str | None,
     shard: str | None,
@@ -73,7 +70,7 @@ def sweep(
         [json.dumps({"out": out, **vars(tally)})] if as_json else map(printable, command.tally_lines(tally, out))
     ):
         click.echo(line)
-    context.exit(130 if tally.stopped else 1 if tally.quarantined else 0)
+    click.get_current_context().exit(130 if tally.stopped else 1 if tally.quarantined else 0)
 
 
 @click.command()
