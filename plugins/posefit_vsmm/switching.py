@@ -24,7 +24,7 @@ _LOWER = [AT[name] for name in ("left knee", "right knee", "left foot", "right f
 Structure = Literal["variable", "all"]
 MOST = 3  # of the four lower limbs. Interpretation V15
 FIRST_CYCLES = 10  # over all models before a group is chosen, to the letter
-FIRST_SECONDS = 1.0  # by default: within ten cycles the filter has not settled yet. Interpretation V19
+FIRST_SECONDS = 1.0  # by default: within ten cycles the filter has not converged yet. Interpretation V19
 ENDED = 0.9  # the ratio, new to old, below which a new group ends
 
 

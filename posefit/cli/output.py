@@ -31,7 +31,7 @@ class _Messages(io.TextIOWrapper):
 
 
 class _Results(io.TextIOWrapper):
-    """Standard output: that a result cannot be written to it is a mistake. Whoever closes a pipe wants no more."""
+    """Standard output: a result that cannot be written there is a user's mistake, and a closed pipe ends the output."""
 
     def write(self, text: str) -> int:
         """Write a text. Raises InputError where there is no room."""

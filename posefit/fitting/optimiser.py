@@ -57,7 +57,7 @@ def finite_costs(costs: Array) -> Array:
 def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
     """Return nothing. Raises InputError where `tell` gets anything else than a cost for each proposal of `ask`.
 
-    So many proposals wait for their costs; 0 before `ask`, and once they are told.
+    So many proposals wait for their costs; 0 before `ask` and after `tell`.
     """
     if not waiting:
         raise InputError("tell must follow ask, got costs before proposals")

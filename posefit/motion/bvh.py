@@ -116,12 +116,12 @@ def _upright(rig: Rig, up: Up | None) -> tuple[str, Array]:
         if up not in TURNS:
             raise InputError(f"an axis up of x, y or z, got {quoted(up)}")
         return up, np.array(TURNS[up], dtype=np.float64)
-    number, alike = upward(rig)
+    number, cosine = upward(rig)
     name: Up = ("x", "y", "z")[number]
-    if abs(alike) < STANDING:
+    if abs(cosine) < STANDING:
         return "y", np.eye(3)
     turn = np.array(TURNS[name], dtype=np.float64)
-    return (name, turn) if alike > 0.0 else (f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn)
+    return (name, turn) if cosine > 0.0 else (f"-{name}", np.diag([1.0, -1.0, -1.0]) @ turn)
 
 
 @dataclass
@@ -205,6 +205,8 @@ def _parsed(path: Path) -> _Content:
             opened.append(waiting)
             numbers.append(len(nodes) - 1)
             waiting = None
+    if not moving:
+        raise mistake(path, max(number, 1), "MOTION after the joints", "the end of the file")
     if not rows or rows != count:
         raise mistake(path, max(number, 1), f"{max(count, 1)} frames", f"{rows}")
     values = np.array(data).reshape(rows, width)

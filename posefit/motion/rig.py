@@ -29,7 +29,7 @@ from posefit.motion.joint_names import Joints
 
 SAME_PLACE = 1e-4  # share of a leg within which two joints are at one point
 AS_IN_FILE = 20.0  # degrees: a foot, a clavicle or a bone of the spine that is so near to CMU's rest stays as it is
-ALIKE = 0.5  # degrees: of other bones
+SAME_DIRECTION = 0.5  # degrees: of other bones
 UPRIGHT = 60.0  # degrees that legs and trunk may be off in a pose of rest
 SQUARE = 25.0  # degrees: a root's axes that are so near to left, up and ahead are these
 STANDING = 0.7  # the mean cosine between legs, trunk and the axis that is up
@@ -167,7 +167,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
             at[joint] = at[above] + world[above] @ vector
             continue
         off = np.degrees(geodesic(np.eye(3), shortest_turn(expected, vector))) if length > 0.0 else 0.0
-        aligned = off > (ALIKE if name[1:] in _STEADY else AS_IN_FILE)
+        aligned = off > (SAME_DIRECTION if name[1:] in _STEADY else AS_IN_FILE)
         aligned = aligned and not name.endswith("hipjoint")  # which does not turn
         turned[joint] = before @ shortest_turn(expected, vector) if aligned else before
         if not own and name[1:] in _HINGES:

@@ -168,7 +168,7 @@ class OutputFolder(Recorder):
 
 
 def _unmarked(folder: Path) -> list[str]:
-    """Return the files of a folder, unless its summary is one of a track: those are nobody's whom we know."""
+    """Return the files of a folder whose summary is not one of a track: somebody else's."""
     names = sorted(entry.name for entry in folder.iterdir())
     try:
         summary = parsed_json(read_text(folder / SUMMARY, MAX_SUMMARY_BYTES))

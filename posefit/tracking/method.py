@@ -172,8 +172,11 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
         left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
         name, dot, setting = left.partition(".")
         if not dot:  # the name may be left out where one plugin alone has the setting
-            having = [name for name, (_, factory) in places.items() if left in settings.names(factory)]
-            name, setting = (having[0], left) if len(having) == 1 else ("", "")
+            offered = [f"{name}.{each}" for name, (_, factory) in places.items() for each in settings.names(factory)]
+            having = [each.partition(".")[0] for each in offered if each.partition(".")[2] == left]
+            if equals and len(having) != 1:
+                raise InputError(f"a setting must be one of {', '.join(offered)}, got {quoted(left)}")
+            name, setting = (having or [""])[0], left
         if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:

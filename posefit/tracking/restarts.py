@@ -177,7 +177,7 @@ def relocalised(
             latest, unseen = frame, 0
             costs.append(frame.cost)
 
-    if len(task.before) > 1:  # a single one is what the track was begun with
+    if len(task.before) > 1:  # a single one is what the track starts from
         for earlier in task.before:
             add(earlier, earlier.evaluations > 0)
     for observation in coming:

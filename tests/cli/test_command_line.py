@@ -473,7 +473,7 @@ def test_settings_are_given_by_plugin_and_name() -> None:
 def test_a_setting_that_makes_no_sense_is_one_line() -> None:
     for text, message in [
         ("sapso", "a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got 'sapso'"),
-        ("sapso=3", "a setting must be NAME.SETTING=VALUE"),
+        ("sapso=3", "tracker.relocalise_gap, tracker.variant, got 'sapso'"),
         (
             "lens.phi=4.2",
             "a setting must name one of annealed, pca, tracker, which are in use here, got 'lens.phi=4.2'",

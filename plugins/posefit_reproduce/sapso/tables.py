@@ -35,8 +35,8 @@ ANGLES = turns_of(("lfemur", "rfemur", "ltibia", "rtibia"))
 # bounds that are ours, where the paper gives none
 HIGH_FRAMES, FEW_JOINTS = 0.9, 3  # the quantile from which a frame's error is high, and how many joints are a few
 SWAPPED = 0.01  # share of frames with left and right exchanged that still counts as none
-ALIKE_DEGREES = 1.0  # by which views, or a hidden part, may change an error that stays the same
-ALIKE_COST = 1.0  # by which costs may differ that have converged or are alike; costs go from 0 to 100
+SAME_DEGREES = 1.0  # by which views, or a hidden part, may change an error that stays the same
+SAME_COST = 1.0  # by which costs may differ that have converged or are equal; costs go from 0 to 100
 TURNED_ROUND = 90.0  # degrees: a yaw that is more off is a person seen the wrong way round
 
 
@@ -177,10 +177,10 @@ def claims(analysis: Analysis) -> Iterator[Claim]:
         usual = history[:, :, SWARMS.index(40)]
         fall = usual[:, :, min(CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
         text = f"after 30 iterations the cost falls by less than 1, {motion}{form}"
-        yield Claim(text, "figure 6", fall, "cost", ALIKE_COST)
+        yield Claim(text, "figure 6", fall, "cost", SAME_COST)
         ends = np.abs(history[:, :, 0, -1] - history[:, :, -1, -1])
         text = f"N = 20 and N = 100 differ by less than 1, {motion}{form}"
-        yield Claim(text, "figure 6", ends, "cost", ALIKE_COST)
+        yield Claim(text, "figure 6", ends, "cost", SAME_COST)
     for motion in all_three:
         away = analysis.away(motion, OURS, "image")
         small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < SMALL_DEGREES).mean(axis=2)
@@ -196,10 +196,10 @@ def claims(analysis: Analysis) -> Iterator[Claim]:
         hidden = analysis.errors(motion, OURS, "hidden", free=True)
         worse = hidden - analysis.errors(motion, OURS, "image", free=True)[: len(hidden)]  # of the same views
         text = f"a hidden part adds less than 1 degree, {motion}"
-        yield Claim(text, "figure 8", worse, bound=ALIKE_DEGREES)
+        yield Claim(text, "figure 8", worse, bound=SAME_DEGREES)
     for motion in all_three:
         around = np.ptp(analysis.errors(motion, OURS, "image", free=True), axis=0)[None]
-        yield Claim(f"eight views have the same error to 1 degree, {motion}", "5.3", around, bound=ALIKE_DEGREES)
+        yield Claim(f"eight views have the same error to 1 degree, {motion}", "5.3", around, bound=SAME_DEGREES)
     for motion in all_three:
         swapped = 100.0 * analysis.share("swapped", motion, OURS, "image")
         yield Claim(f"left and right are never exchanged, {motion}", "5.3", swapped, "% of frames", 100.0 * SWAPPED)

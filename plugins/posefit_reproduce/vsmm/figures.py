@@ -112,7 +112,11 @@ def _still(film: Film, frame: Arrays, k: int) -> Image:
     height = drawn.shape[0] // 2
     small = [cv2.resize(part, (round(part.shape[1] / 2), height), interpolation=cv2.INTER_AREA) for part in parts]
     widest = max(int(part.shape[1]) for part in small)
-    return np.asarray(np.vstack([np.pad(part, ((0, 0), (0, widest - part.shape[1]), (0, 0))) for part in small]))
+    columns = []
+    for part in small:  # in the middle, on a background of its own
+        free = widest - part.shape[1]
+        columns.append(cv2.copyMakeBorder(part, 0, 0, free // 2, free - free // 2, cv2.BORDER_REPLICATE))
+    return np.asarray(np.vstack(columns))
 
 
 def _pixel(point: Array) -> tuple[int, int]:
