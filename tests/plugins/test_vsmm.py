@@ -213,7 +213,9 @@ def test_a_senseless_setting_is_one_line_and_status_2(method: str, setting: str,
 @each("settings", [{"structure": "all"}, {"variant": "patent"}, {"variant": "patent", "recovery": True}])
 def test_other_forms_run(settings: dict[str, Any]) -> None:
     task, observations = seen(frames=40)
-    follow(task, observations, **settings)
+    poses = np.array([frame.pose for frame in follow(task, observations, **settings)])
+    assert poses.shape == (40, 66)
+    assert len(np.unique(poses, axis=0)) > 20  # it moves, and is not held
 
 
 def test_the_rules_of_a_frame_look_at_the_joints_detected_in_it(monkeypatch: pytest.MonkeyPatch) -> None:  # VSMM 7
