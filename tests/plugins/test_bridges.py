@@ -34,7 +34,7 @@ def check(searched: Problem, proposals: Iterable[object], costs: Iterable[float]
 def test_a_study_of_optuna_has_the_trace_of_a_plain_loop() -> None:
     optuna = pytest.importorskip("optuna")
     pytest.importorskip("optunahub")
-    from posefit_bridges import optunahub_problem
+    from posefit_bridges.problems import optunahub_problem
 
     posed = optunahub_problem(problem())
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0), directions=posed.directions)
@@ -58,7 +58,7 @@ def test_pymoo_minimises_with_the_trace_of_a_plain_loop() -> None:
     from pymoo.algorithms.soo.nonconvex.pso import PSO
     from pymoo.optimize import minimize
 
-    from posefit_bridges import pymoo_problem
+    from posefit_bridges.problems import pymoo_problem
 
     seen: list[tuple[np.ndarray, np.ndarray]] = []
     posed = pymoo_problem(problem())
@@ -72,7 +72,7 @@ def test_pymoo_minimises_with_the_trace_of_a_plain_loop() -> None:
 
 def test_an_optimiser_of_nevergrad_has_the_trace_of_a_plain_loop() -> None:
     nevergrad = pytest.importorskip("nevergrad")
-    from posefit_bridges import nevergrad_function
+    from posefit_bridges.problems import nevergrad_function
 
     posed = nevergrad_function(1, 10_000, 9).copy()
     posed.parametrization.random_state = np.random.RandomState(0)

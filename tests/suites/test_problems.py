@@ -21,7 +21,7 @@ from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import suite_instance
 from posefit.suites.problem import BudgetSpentError, Problem
 from posefit.suites.running import run_on
-from posefit_bridges import ioh_problem
+from posefit_bridges.problems import ioh_problem
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
