@@ -133,12 +133,12 @@ def _numbers(start: int | None, stop: int | None) -> range:
 
 def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
-    from posefit.report.export import suite_runs, write_iohprofiler
+    from posefit.report.export import write_iohprofiler
     from posefit.suites.running import score_lines, suite_scores
 
     scores = suite_scores(runs)
     if out is not None:
-        write_iohprofiler(suite_runs(runs), out)
+        write_iohprofiler(runs, out)
         say(f"written to {out}: IOHprofiler's files")
     for line in [json.dumps([asdict(one) for one in scores])] if as_json else map(printable, score_lines(scores)):
         click.echo(line)

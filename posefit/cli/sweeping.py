@@ -77,7 +77,6 @@ def sweep(
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
-@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @JSON
 def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.report.runs import Runs
-from posefit.statistics.improvement import improvement_interval, probability_of_improvement
 from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
 from posefit.statistics.pairing import Shared, most_shared
 from posefit.statistics.ranks import LEVEL, Comparison, compact_letters, wilcoxon
 
 BOOTSTRAP_SEED = 2013
 WORK = 1e8  # numbers that the resamples of one study may come to
-MIN_SEEDS = 3  # for the interval of a probability of improvement
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -139,21 +137,10 @@ def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
 def paired_tests(contest: Contest) -> dict[str, Any] | None:
     """Return the paired tests of a contest; None where there are not two methods and two blocks.
 
-    `pairs` lists first, second, median difference of errors and its interval, p, p after Holm, and the probability that
-    the first is better than the second with its interval, nan where that is not cheap: a difference below 0 is in
-    favour of the first. Tests use all `blocks`, the probabilities equally many seeds of every instance.
+    `pairs` lists first, second, median difference of errors and its interval, p, and p after Holm: a difference below 0
+    is in favour of the first.
     """
     if not contest.testable:
         return None
-    errors, rng = contest.of("error"), contest.rng()
-    pairs = [list(astuple(comparison)) for comparison in contest.comparisons]
-    better = probability_of_improvement(errors)
-    count = int(min(WORK / (errors[0].size * errors.shape[2] * len(pairs)), RESAMPLES))
-    bounded = errors.shape[2] >= MIN_SEEDS and count >= MIN_RESAMPLES
-    for pair in pairs:
-        first, second = pair[:2]
-        ends: Sequence[float] = (np.nan, np.nan)
-        if bounded:
-            ends = improvement_interval(errors[first], errors[second], rng, resamples=count)[1:]
-        pair += [better[first, second], *ends]
+    pairs = [astuple(comparison) for comparison in contest.comparisons]
     return {"methods": contest.methods, "blocks": contest.tested_errors()[0].size, "pairs": pairs}

@@ -61,7 +61,7 @@ def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_pat
     manager = iohinspector.DataManager()
     manager.add_folder(str(tmp_path / "ioh"))
     assert set(manager.overview["dimension"]) == {9}
-    assert set(manager.overview["function_name"]) == {"f2 next frame"}
+    assert set(manager.overview["function_name"]) == {"next frame"}
     data = manager.load(monotonic=False)
     problems = posefit.Suite(functions=[2], dimensions=[9], instances=range(10_000, 10_003))
     runs = [run_on(problem, "random", evaluations=45) for problem in problems]
