@@ -151,33 +151,25 @@ def preview(plan: str, out: str | None, shard: str | None, start: Callable[[], E
 
 
 def engine(
-    limits: Limits,
-    run: Run = run_cell,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    dask_local: int | None = None,
+    limits: Limits, run: Run = run_cell, *, workers: int | None = None, scheduler: str | None = None
 ) -> Callable[[], Engine]:
-    """Return a function that starts the engine asked for: processes of this machine, or Dask workers.
+    """Return a function that starts the engine asked for: processes of this machine, or the workers of a scheduler.
 
-    Raises ValueError where more than one is asked for.
+    Raises ValueError where both are asked for.
     """
-    places = {"workers": workers, "scheduler": scheduler, "dask-local": dask_local}
-    chosen = [name for name, value in places.items() if value]
-    if len(chosen) > 1:
-        raise InputError(f"--{chosen[0]} must not be given with --{chosen[1]}: cells run in one place")
-    for name, value in (("workers", workers), ("dask-local", dask_local)):
-        if value is not None and value < 1:
-            raise InputError(f"--{name} must be at least 1, got {value}")
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers must not be given with --scheduler: cells run in one place")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers must be at least 1, got {workers}")
 
     def start() -> Engine:
         from posefit.silhouette.cost import compile_kernels
 
         compile_kernels()
-        if scheduler is not None or dask_local is not None:
+        if scheduler is not None:
             from posefit.sweep.cluster import Cluster
 
-            return Cluster(scheduler, dask_local, limits, run)
+            return Cluster(scheduler, limits, run)
         return Pool(workers or cores(), limits, run)
 
     return start

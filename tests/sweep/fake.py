@@ -1,6 +1,6 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR pool|dask|ADDRESS CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
+`python -m tests.sweep.fake DIR pool|ADDRESS CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
@@ -160,10 +160,7 @@ def main() -> int:
     chosen = cells(int(many), SLOW)
 
     def start() -> "Engine":
-        if kind == "pool":
-            return Pool(2, limits, behave)
-        here = {"workers": 2} if kind == "dask" else {"scheduler": kind}
-        return Cluster(**here, limits=limits, run=behave, patience=300.0)  # type: ignore[arg-type]
+        return Pool(2, limits, behave) if kind == "pool" else Cluster(kind, limits, behave, patience=300.0)
 
     tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], start)
     return 1 if tally.quarantined else 130 if tally.stopped else 0

@@ -1,4 +1,4 @@
-"""Dask's workers on other machines: three network namespaces of this one, where root may make them; and other users."""
+"""Dask's workers on other machines: three network namespaces of this one, where root may make them."""
 
 import contextlib
 import os
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from posefit.sweep.ledger import Ledger
-from tests.sweep.fake import SLOW, STARTS, behave, cells, starts
+from tests.sweep.fake import SLOW, STARTS, cells, starts
 from tests.sweep.test_chaos import wait_for
 
 ROOT = Path(__file__).parents[2]
@@ -119,32 +119,3 @@ def test_a_host_of_workers_that_dies_and_comes_back_costs_no_row(hosts: Hosts, t
     assert len(rows) == len(set(rows)) == COUNT
     assert set(rows) == {cell.key for cell in cells(COUNT, SLOW)}
     assert len(ledger.quarantined()) == 5
-
-
-CLIENT = """
-import os, sys
-import distributed
-if os.getuid() == 0:  # another user of the machine
-    os.setgroups([])
-    os.setgid(65534)
-    os.setuid(65534)
-for place in sys.argv[1:]:
-    for address, security in ((f"tcp://{place}", None), (f"tls://{place}", distributed.Security.temporary())):
-        try:
-            print(distributed.Client(address, security=security, timeout=2.0).submit(os.getpid).result())
-        except (OSError, TimeoutError):
-            print("refused")
-"""
-
-
-def test_workers_of_this_machine_run_nothing_for_who_has_no_certificate_nor_for_another_user() -> None:
-    pytest.importorskip("distributed")
-    from posefit.sweep.cluster import Cluster
-
-    with contextlib.closing(Cluster(workers=1, run=behave, patience=300.0)) as engine:
-        assert engine.window() == 1
-        places = [engine._address, next(iter(engine._client.nthreads()))]  # the scheduler's and a worker's
-        assert all(place.startswith("tls://127.0.0.1:") for place in places)
-        command = [sys.executable, "-c", CLIENT, *(place.removeprefix("tls://") for place in places)]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["refused"] * 4

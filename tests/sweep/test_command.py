@@ -139,8 +139,7 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
     [
         (["PLAN"], "--out must name a folder for the results, got none"),
         (["PLAN", "--out", "OUT", "--workers", "0"], "--workers must be at least 1, got 0"),
-        (["PLAN", "--out", "OUT", "--dask-local", "-1"], "--dask-local must be at least 1, got -1"),
-        (["PLAN", "--out", "OUT", "--workers", "1", "--dask-local", "1"], "--workers must not be given with --dask-local"),
+        (["PLAN", "--out", "OUT", "--workers", "1", "--scheduler", "tcp://a:1"], "--workers must not be given with --scheduler"),
         (["PLAN", "--out", "OUT", "--shard", "3/2"], "--shard must be I/N such as 2/8, got 3/2"),
         (["PLAN", "--out", "OUT", "--shard", "2"], "--shard must be I/N such as 2/8, got 2"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must lie in 0.001 to 1e+08, got 0.0"),
@@ -173,5 +172,5 @@ def test_without_distributed_dask_says_what_to_install(
     plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    line = error_of("sweep", plan, "--out", tmp_path / "out", "--dask-local", 2)
+    line = error_of("sweep", plan, "--out", tmp_path / "out", "--scheduler", "tcp://a:1")
     assert line.endswith("python -m pip install 'posefit[dask]'")
