@@ -11,7 +11,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import mean
 from posefit.report.tracks import LEVEL_NAMES
 from posefit.statistics.intervals import Intervals, iqm_intervals
-from posefit.statistics.profiles import Trace, attained, hits, performance_profile, targets
+from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
 
 Contest: TypeAlias = Any  # whose module imports this one
@@ -55,18 +55,14 @@ class Chart:
 def track_charts(contest: Contest, drawn: Contest) -> list[Chart]:
     """Return the charts of tracks; curves over evaluations use the runs of `drawn`, which are fewer."""
     evaluations, charts = grid(drawn), []
-    over = {"x_label": "evaluations of a frame", "log": True}
     if len(evaluations):
-        title, lines = "Convergence: best cost of a frame", convergence(drawn, evaluations)
-        charts.append(Chart(name="convergence", title=title, y_label="best cost", lines=lines, **over))  # type: ignore[arg-type]
-        shares = [Line(evaluations, share) for share in reached(drawn, evaluations)]
-        title, y = "Targets reached, of all runs and 51 costs an instance", "share of targets reached"
-        charts.append(Chart(name="attainment", title=title, y_label=y, lines=shares, most=1.0, stepped=True, **over))  # type: ignore[arg-type]
+        title, x, lines = "Convergence: best cost of a frame", "evaluations of a frame", convergence(drawn, evaluations)
+        charts.append(Chart(name="convergence", title=title, x_label=x, y_label="best cost", lines=lines, log=True))
     errors = contest.of("error")
     levels = np.linspace(0.0, float(errors.max()), PROFILE)
     profiles = [Line(levels, share) for share in performance_profile(errors, levels)]
-    about = {"title": "Runs within an error", "x_label": "error, degrees", "y_label": "share of runs"}
-    charts.append(Chart(name="profile", lines=profiles, most=1.0, stepped=True, **about))  # type: ignore[arg-type]
+    title, x, y = "Runs within an error", "error, degrees", "share of runs"
+    charts.append(Chart(name="profile", title=title, x_label=x, y_label=y, lines=profiles, most=1.0, stepped=True))
     if sure := certainty(contest):
         charts += [_reliability_chart(sure["methods"]), _coverage_chart(sure["methods"])]
     return [chart for chart in charts if any(chart.lines)]
@@ -100,22 +96,6 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
         return Line(points, part.values, part.low, part.high)
 
     return [line(rows) for rows in contest.rows]
-
-
-def reached(contest: Contest, evaluations: Array) -> Array:
-    """Return the shares (methods, p) of a method's runs and targets reached after each number of evaluations.
-
-    The targets of an instance lie between the worst first and the best last cost of any run there.
-    """
-    methods, instances, seeds = contest.rows.shape
-    shares = np.zeros((methods, len(evaluations)))
-    for i in range(instances):
-        traces = _traces(contest, contest.rows[:, i])
-        if usable := [trace for trace in traces if len(trace[0])]:
-            costs = targets(usable)
-            times = np.reshape([hits(trace, costs) for trace in traces], (methods, seeds, -1))
-            shares += np.array([attained(times_of_method, evaluations) for times_of_method in times]) / instances
-    return shares
 
 
 def joint_errors(contest: Contest) -> list[Intervals]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefit.report.charts import certainty, convergence, grid, joint_errors, reached
+from posefit.report.charts import certainty, convergence, grid, joint_errors
 from posefit.report.contest import contest_of, leaderboard, paired_tests
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -107,20 +107,15 @@ def test_curves_start_and_end_with_the_traces(tmp_path: Path) -> None:
     assert (curve.y[0], curve.y[-1]) == pytest.approx((4.0 * 1.055, 1.055), rel=1e-6)
     assert curve.low is not None
     assert np.isnan(curve.low).all()  # of four runs
-    shares = reached(contest, evaluations)
-    assert (np.diff(shares) >= 0.0).all()
-    assert (shares[0] >= shares[1]).all()
-    assert shares[0, -1] > 0.9
     assert joint_errors(contest)[0].values[10] == pytest.approx(10.55, rel=1e-6)
 
 
-def test_a_method_without_a_trace_has_no_curve_and_reaches_no_target(tmp_path: Path) -> None:
+def test_a_method_without_a_trace_has_no_curve(tmp_path: Path) -> None:
     empty = {"evaluations": [], "cost": []}
     made = [result(replace(FIRST, method="a", seed=s), 1.0) for s in (0, 1)]
     made += [result(replace(FIRST, method="b", seed=s), 2.0, trace=empty) for s in (0, 1)]
     contest = contest_of_results(tmp_path, made)
     assert [curve is None for curve in convergence(contest, grid(contest))] == [False, True]
-    assert reached(contest, grid(contest))[1].max() == 0.0
 
 
 def test_certainty_is_pooled_over_runs_frame_by_frame(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_it_opens_without_errors_and_is_accessible_in_every_width_and_scheme(
 ) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install posefit[browser]")
     figures = {
-        tracks: ("standing", "convergence", "attainment", "profile", "joint-errors", "coverage"),
+        tracks: ("standing", "convergence", "profile", "joint-errors", "coverage"),
         searches: ("standing", "chart-0"),
     }
     for path, names in figures.items():
@@ -154,7 +154,7 @@ def test_tables_sort_and_compare_and_mark_warnings(chromium: Any, tracks: Path) 
 
 
 def test_buttons_show_and_hide_methods_and_their_intervals_in_every_chart(chromium: Any, tracks: Path) -> None:
-    charts = ("convergence", "attainment", "joint-errors", "reliability", "coverage")
+    charts = ("convergence", "profile", "joint-errors", "reliability", "coverage")
     with shown(chromium, tracks) as page:
 
         def counts() -> list[int]:
@@ -176,9 +176,9 @@ def test_buttons_show_and_hide_methods_and_their_intervals_in_every_chart(chromi
         assert button.get_attribute("aria-pressed") == "false"
         assert counts() == [0, 0, 0, 0, 0]
         page.locator("#none").click()
-        assert page.locator("#attainment path").count() == 0
+        assert page.locator("#profile path").count() == 0
         page.locator("#all").click()
-        assert page.locator("#attainment .curve").count() == METHODS
+        assert page.locator("#profile .curve").count() == METHODS
 
 
 @pytest.mark.slow

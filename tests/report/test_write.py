@@ -137,7 +137,7 @@ def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> Non
     pytest.importorskip("matplotlib")
     figures, rows = tmp_path / "figures", tmp_path / "rows.csv"
     written(results, "--figures", figures, "--csv", rows)
-    names = ("attainment", "convergence", "profile")
+    names = ("convergence", "profile")
     drawn = {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
     assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.tex", "leaderboard.csv"}
     assert "sapso@pca & 1.06" in (figures / "leaderboard.tex").read_text()
