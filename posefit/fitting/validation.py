@@ -136,10 +136,6 @@ class CheckedPrior:
         """Return which latents (n, m) are poses at all (n,)."""
         return self._call("feasible", latents)
 
-    def save(self, path: str | Path) -> None:
-        """Write what it learned to an .npz file."""
-        self._call("save", path)
-
     def _call(self, method: str, *arguments: Any) -> Any:
         try:  # not `plugin_errors`, which takes as long as a few poses
             return getattr(self._prior, method)(*arguments)
