@@ -10,7 +10,6 @@ budget is the tool's, since that of a problem ends the tool's loop by an error.
 | OptunaHub | optunahub_problem | a benchmark for studies of Optuna |
 | pymoo | pymoo_problem | a problem, evaluated a population at a time |
 | Nevergrad | nevergrad_function | a function of its benchmarks |
-| Nevergrad's benchmark command | posefit_suite | a plan of experiments |
 
 >>> import posefit
 >>> from posefit_bridges.problems import pymoo_problem
@@ -18,25 +17,21 @@ budget is the tool's, since that of a problem ends the tool's loop by an error.
 9
 """
 
-from collections.abc import Iterator
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE
-from posefit.suites.problem import EVALUATIONS, Infeasible, Problem, suite
+from posefit.suites.functions import SUITE
+from posefit.suites.problem import Infeasible, Problem, suite
 
 if TYPE_CHECKING:
     from ioh import problem as problems
-    from nevergrad.benchmark.xpbase import Experiment
     from nevergrad.functions import ExperimentFunction
     from optunahub.benchmarks import BaseProblem
     from pymoo.core.problem import Problem as PymooProblem
 
 FIRST_IOH_ID = 26_300  # function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
-OPTIMISERS = ("CMA", "OnePlusOne", "PSO", "RandomSearch", "TwoPointsDE")  # of the plan, by Nevergrad's names
 
 
 def ioh_problem(problem: Problem) -> "problems.RealSingleObjective":
@@ -138,15 +133,3 @@ def nevergrad_function(
             super().__init__(self.problem, box.set_name(""))
 
     return SilhouetteFunction(function, instance, dimension, infeasible)
-
-
-def posefit_suite(seed: int | None = None) -> "Iterator[Experiment]":
-    """Yield experiments of Nevergrad: each function, dimension and optimiser on three held-out instances."""
-    from nevergrad.benchmark.xpbase import Experiment
-
-    rng = np.random.default_rng(seed)
-    for function, instance in product(FUNCTIONS, HELD_OUT[:3]):
-        for dimension in function.dimensions:
-            problem = nevergrad_function(function.number, instance, dimension)
-            for optimiser in OPTIMISERS:
-                yield Experiment(problem, optimiser, budget=EVALUATIONS * dimension, seed=int(rng.integers(2**32)))

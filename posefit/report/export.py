@@ -1,7 +1,7 @@
-"""Runs for other tools: IOHprofiler's and COCO's folders, rows as CSV, and tables as LaTeX that needs no package.
+"""Runs for other tools: IOHprofiler's folders, rows as CSV, and tables as LaTeX that needs no package.
 
 IOHprofiler: Doerr et al., IOHprofiler, 2018; the layout is that of IOHexperimenter's Analyzer logger. Readers: the
-library iohinspector, the web page IOHanalyzer. COCO: Hansen et al., 2021; reader: the library cocopp.
+library iohinspector, the web page IOHanalyzer.
 """
 
 import csv
@@ -19,7 +19,7 @@ from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.statistics.profiles import Trace
 from posefit.suites.functions import suite_function
-from posefit.suites.running import SuiteRun, budgets_differ, method_name
+from posefit.suites.running import SuiteRun, budgets_differ
 from posefit.version import __version__
 
 FORMAT = "0.3.18"  # the IOHexperimenter that the layout is of
@@ -104,36 +104,6 @@ def _write_function(folder: Path, algorithm: Mapping[str, str], runs: list[Suite
         "scenarios": scenarios,
     }
     (folder / f"IOHprofiler_{name}.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-
-
-def write_coco(runs: Iterable[SuiteRun], path: str | Path) -> None:
-    """Write a new folder `path` with a folder a method, as COCO's logger of bbob has them; its reader is cocopp.
-
-    Costs are above the true pose's, and at least 0. A run's way with infeasible proposals and its budget are not
-    distinguished. Raises ValueError where the folder exists or cannot be written.
-    """
-    groups: dict[str, list[SuiteRun]] = {}
-    for run in sorted(runs, key=lambda run: (run.function, run.dimension, run.instance, run.seed)):
-        groups.setdefault(method_name(run), []).append(run)
-    with new_folder(path) as folder:
-        for (name, own), place in zip(groups.items(), _file_names(list(groups)), strict=True):
-            for (number, dimension), here in groupby(own, key=lambda run: (run.function, run.dimension)):
-                data = folder / place / f"data_f{number}"
-                data.mkdir(parents=True, exist_ok=True)
-                stem, text, ends = data / f"bbobexp_f{number}_DIM{dimension}", "", ""
-                for run in here:
-                    text += f"% f evaluations | g evaluations | best cost above the true pose's, {run.truth_cost!r}\n"
-                    used, best = _rows((run.evaluations, run.costs - run.truth_cost))
-                    text += "".join(f"{e} 0 {max(y, 0.0):+.9e}\n" for e, y in zip(used, best, strict=True))
-                    ends += f", {run.instance}:{used[-1]}|{max(best[-1], 0.0):.1e}"
-                for ending in (".dat", ".tdat"):  # by costs and by evaluations: here the same rows
-                    stem.with_suffix(ending).write_text(text, encoding="ascii")
-                with (folder / place / f"bbobexp_f{number}.info").open("a", encoding="utf-8") as info:
-                    info.write(
-                        f"suite = 'bbob', funcId = {number}, DIM = {dimension}, Precision = 1.000e-08, "
-                        f"algId = '{name}', coco_version = '2.8', logger = 'bbob', data_format = 'bbob-new2'\n"
-                        f"% {run.suite}\ndata_f{number}/{stem.name}.dat{ends}\n"
-                    )
 
 
 def _rows(run: Trace) -> tuple[list[int], list[float]]:

@@ -1,9 +1,6 @@
 """Problems in other tools: each tool's own loop and checker runs on them, with the costs and the trace of a plain loop."""
 
-import importlib.util
 import os
-import subprocess
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -82,19 +79,3 @@ def test_an_optimiser_of_nevergrad_has_the_trace_of_a_plain_loop() -> None:
     check(posed.problem, [x for x, _ in seen], [cost for _, cost in seen])
     assert posed.copy().problem.evaluations == 0  # an experiment's copy counts for itself
     assert posed.descriptors["function"] == 1
-
-
-@pytest.mark.slow
-def test_nevergrads_benchmark_command_runs_the_plan_of_the_page(tmp_path: Path) -> None:
-    page = (ROOT / "docs" / "howto" / "bridges.md").read_text("utf-8")
-    for library in ("torchvision", "pyproj", "gym"):
-        if importlib.util.find_spec(library) is None:
-            pytest.skip(f"no {library}, which nevergrad.benchmark imports")
-    plan = tmp_path / "plan.py"
-    plan.write_text(next(block for block in page.split("```python\n") if "registry" in block).split("```")[0], "utf-8")
-    command = ["-m", "nevergrad.benchmark", "posefit_suite", "--seed=1", "--cap_index=2", f"--imports={plan}"]
-    paths = os.pathsep.join((PATHS, os.environ.get("PYTHONPATH", "")))
-    subprocess.run([sys.executable, *command], cwd=tmp_path, env={**os.environ, "PYTHONPATH": paths}, check=True)
-    head, *rows = [line.split(",") for line in (tmp_path / "posefit_suite.csv").read_text("utf-8").splitlines()]
-    assert [row[head.index("error")] for row in rows] == ["", ""]
-    assert all(0.0 <= float(row[head.index("loss")]) < 40.0 for row in rows)

@@ -100,7 +100,7 @@ class Chaos:
         }
 
     def _begun(self) -> subprocess.Popen[bytes]:
-        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), "pool", str(self.count), str(LIMIT)]
+        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), str(self.count), str(LIMIT)]
         environment = {
             **os.environ,
             STARTS: str(self._starts),

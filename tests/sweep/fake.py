@@ -1,6 +1,6 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR pool|ADDRESS CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
+`python -m tests.sweep.fake DIR CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
@@ -151,18 +151,14 @@ def bad(seed: int) -> list[TrackCell]:
 
 def main() -> int:
     """Drive a sweep as the command line says, and return its exit status."""
-    from posefit.sweep.cluster import Cluster
     from posefit.sweep.pool import Pool
     from tests.sweep.fake import behave  # by a name that other processes can import
 
-    where, kind, many, seconds = sys.argv[1:5]
+    where, many, seconds = sys.argv[1:4]
     limits = Limits(float(seconds), 1.0)
     chosen = cells(int(many), SLOW)
 
-    def start() -> "Engine":
-        return Pool(2, limits, behave) if kind == "pool" else Cluster(kind, limits, behave, patience=300.0)
-
-    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], start)
+    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], Pool(2, limits, behave))
     return 1 if tally.quarantined else 130 if tally.stopped else 0
 
 

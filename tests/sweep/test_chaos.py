@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 @contextmanager
 def driver(folder: Path, count: int) -> Iterator[subprocess.Popen[bytes]]:
     """Start a driver of its own process group; nothing of it is left over afterwards."""
-    words = [sys.executable, "-m", "tests.sweep.fake", str(folder / "results"), "pool", str(count), "300"]
+    words = [sys.executable, "-m", "tests.sweep.fake", str(folder / "results"), str(count), "300"]
     environment = {**os.environ, STARTS: str(folder / "starts"), "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(words, cwd=ROOT, env=environment, start_new_session=True)
     try:
