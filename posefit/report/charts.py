@@ -2,19 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import mean
+from posefit.report.kind import Contest
 from posefit.report.tracks import LEVEL_NAMES
 from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
-
-Contest: TypeAlias = Any  # whose module imports this one
 
 POINTS = 41  # of a curve
 PROFILE = 200  # points of a performance profile

@@ -13,7 +13,7 @@ from posefit.files import new_file, new_folder
 from posefit.report.charts import Chart, track_charts
 from posefit.report.contest import contest_of, leaderboard
 from posefit.report.export import latex_table, write_csv
-from posefit.report.runs import Runs
+from posefit.report.kind import Runs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
