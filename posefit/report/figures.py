@@ -35,20 +35,16 @@ def save(figure: "Figure", path: str | Path) -> None:
 
 
 def chart_figure(methods: Sequence[str], chart: Chart) -> "Figure":
-    """Return a chart as the page has it: a line for each method, with its band and its dots."""
+    """Return a chart as the page has it: a line for each method, with its band."""
     figure: Figure = library("figure").Figure(figsize=_SIZE, layout="constrained")
     axes = figure.add_subplot(xlabel=chart.x_label, ylabel=chart.y_label)
     axes.spines[["top", "right"]].set_visible(False)
-    for x, y, end, top in chart.guides:
-        axes.plot([x, end], [y, top], color="0.7", linewidth=1, linestyle="--")
     for k, line in enumerate(chart.lines):
         if line is None:
             continue
-        colour, marker = COLOURS[k % len(COLOURS)], "o" if line.dots else None
-        style: dict[str, Any] = {"color": colour, "linestyle": STYLES[k // len(COLOURS) % len(STYLES)]}
-        label = methods[k].replace("$", r"\$")  # no mathematics
-        step = "steps-post" if chart.stepped else None
-        axes.plot(line.x, line.y, marker=marker, drawstyle=step, label=label, **style)
+        colour, style = COLOURS[k % len(COLOURS)], STYLES[k // len(COLOURS) % len(STYLES)]
+        label, step = methods[k].replace("$", r"\$"), "steps-post" if chart.stepped else None  # no mathematics
+        axes.plot(line.x, line.y, color=colour, linestyle=style, drawstyle=step, label=label)
         if line.low is not None and line.high is not None:
             axes.fill_between(line.x, line.low, line.high, color=colour, alpha=0.18, linewidth=0)
     axes.set_xscale("log" if chart.log else "linear")

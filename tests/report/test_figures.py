@@ -32,7 +32,6 @@ def every():
             [Line(GRID, b.values, b.low, b.high) for b in bands([9, 5, 3], [9, 8, 7], [9, 9, 9])], log=True
         ),
         "shares": chart([Line(GRID, share) for share in SHARES], stepped=True, most=1.0),
-        "dots": chart([Line(GRID, share, dots=["few", "more", "most"]) for share in SHARES], guides=[(0, 0.5, 9, 0.8)]),
     }
 
 
@@ -40,7 +39,7 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
     starts = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
     once, again = every(), every()
     for name, figure in once.items():
-        for suffix in starts if name == "dots" else (".png",):
+        for suffix in starts if name == "shares" else (".png",):
             paths = [tmp_path / f"{name}{k}{suffix}" for k in range(2)]
             for path, drawn in zip(paths, (figure, again[name]), strict=True):
                 figures.save(drawn, path)
@@ -53,16 +52,14 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
             assert (np.abs(image - pixel).max(axis=1) < 3).sum() > 50, (name, colour)
 
 
-def test_lines_bands_and_dots_have_their_values():
+def test_lines_and_bands_have_their_values():
     axes = {name: figure.axes[0] for name, figure in every().items()}
     assert axes["curves"].lines[0].get_ydata().tolist() == [9, 5, 3]
     band = axes["curves"].collections[0].get_paths()[0].vertices
     assert (band[:, 1].min(), band[:, 1].max()) == (2.5, 10.0)
     assert axes["curves"].get_xscale() == "log"
-    guide, line, *_ = axes["dots"].lines
-    assert (guide.get_xdata().tolist(), guide.get_ydata().tolist()) == ([0, 9], [0.5, 0.8])
+    line = axes["shares"].lines[0]
     assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (GRID.tolist(), [0.1, 0.5, 1.0])
-    assert line.get_marker() == "o"
     assert axes["shares"].lines[0].get_drawstyle() == "steps-post"
 
 

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,14 +102,14 @@ def result(cell: TrackCell) -> CellResult:
     return CellResult(row, packed_joints(estimate=joints, truth=joints))
 
 
-def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine | Callable[[], Engine]") -> "Tally":
-    """Return how a sweep ended, of an engine or of one that is started once the ledger is open."""
+def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
+    """Return how a sweep by an engine ended."""
     from posefit.sweep.drive import drive
     from posefit.sweep.ledger import FILE, Writer
 
     with Writer(out / FILE) as ledger:
         ledger.plan(chosen)
-        return drive(ledger, engine() if callable(engine) else engine, print)
+        return drive(ledger, engine, print)
 
 
 class Instant:
