@@ -1,6 +1,6 @@
 """The table of the joints: their names, where on a person they are, and where a pose holds their angles."""
 
-from posefit.geometry.skeleton import ANGLES, JOINTS, PARENTS, angle_index, kind, side
+from posefit.geometry.skeleton import ANGLES, JOINTS, angle_index, kind, side
 from posefit.measuring.centres import PLACES
 
 WHERE = {
@@ -27,13 +27,12 @@ WHERE = {
 def page() -> str:
     """Return the table, as Markdown."""
     lines = [
-        "| number | joint | where it is | in tables and markers | its bone begins at | angles in a pose |",
-        "|---:|---|---|---|---|---|",
+        "| number | joint | where it is | in tables and markers | angles in a pose |",
+        "|---:|---|---|---|---|",
     ]
     for number, name in enumerate(JOINTS):
         place = WHERE[kind(name)] if side(name) == "middle" else f"{side(name)} {WHERE[kind(name)]}"
-        begins = "" if number == 0 else f"`{JOINTS[PARENTS[number]]}`"
-        lines.append(f"| {number} | `{name}` | {place} | `{PLACES[number]}` | {begins} | {_angles(number)} |")
+        lines.append(f"| {number} | `{name}` | {place} | `{PLACES[number]}` | {_angles(number)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -32,12 +32,13 @@ def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
     said, settings = settings_in(text), settings_of(factory)
     if not settings:
         return f"{text}{more}\n\nIt has no settings."
-    lines = ["| `--set` | symbol | type | default | meaning and source |", "|---|---|---|---|---|"]
+    lines = ["| `--set` | default | symbol, meaning and source |", "|---|---|---|"]
     for setting in settings:
         symbol, meaning = said[setting.name]
         default = (
             "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
         )
-        cells = [f"`{name}.{setting.name}`", symbol, setting.type, default, meaning]
+        choices = f" One of {setting.type}." if isinstance(setting.default, str) and " | " in setting.type else ""
+        cells = [f"`{name}.{setting.name}`", default, f"{symbol}: {meaning}{choices}" if symbol else meaning + choices]
         lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return f"{without_settings(text)}{more}\n\n" + "\n".join(lines)
