@@ -27,18 +27,15 @@ def _method(offer: Offer) -> str:
 
 
 def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
-    """Return what a docstring says of a method, and the table of its settings. Raises KeyError where it lacks one."""
+    """Return what a docstring says of a method, and the list of its settings. Raises KeyError where it lacks one."""
     text = inspect.getdoc(factory) or ""
     said, settings = settings_in(text), settings_of(factory)
     if not settings:
         return f"{text}{more}\n\nIt has no settings."
-    lines = ["| `--set` | default | symbol, meaning and source |", "|---|---|---|"]
+    lines = []
     for setting in settings:
         symbol, meaning = said[setting.name]
-        default = (
-            "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
-        )
+        default = "" if setting.default is inspect.Parameter.empty else f"={setting_text(setting.default)}"
         choices = f" One of {setting.type}." if isinstance(setting.default, str) and " | " in setting.type else ""
-        cells = [f"`{name}.{setting.name}`", default, f"{symbol}: {meaning}{choices}" if symbol else meaning + choices]
-        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}{choices}")
     return f"{without_settings(text)}{more}\n\n" + "\n".join(lines)
