@@ -85,8 +85,9 @@ def page() -> str:
         "`coverage` holds a share for each of `50`, `80` and `95`, and `interval_mm` a radius. A figure that needs the "
         "truth is `null` where it is unknown, and a figure of a method is `null` where the method does not report it.",
         "## Columns of `frames.csv`",
-        "One row a frame; those that need the truth are there only where it is known.",
-        _table("column", [*_measured(FRAME.values()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
+        "One row a frame; those that need the truth are there only where it is known. "
+        f"{_shared()} are as above, of one frame. Then there are",
+        _table("column", [*_measured(_frame_only()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
         "## Columns of a sweep's CSV",
         "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
@@ -106,6 +107,14 @@ def _measured(measures: Iterable[Measure]) -> list[tuple[str, str, str]]:
 
 def _described(values: Descriptions) -> list[tuple[str, str, str]]:
     return [(name, unit, meaning) for name, (unit, meaning) in values.items()]
+
+
+def _frame_only() -> list[Measure]:
+    return [measure for name, measure in FRAME.items() if name not in MEASURES]
+
+
+def _shared() -> str:
+    return ", ".join(f"`{name}`" for name in FRAME if name in MEASURES)
 
 
 def _joints() -> str:
