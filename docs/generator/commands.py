@@ -9,7 +9,7 @@ from posefit.cli import main
 
 WIDTH = 78  # columns: what click takes of a terminal of 80 or more
 FEW = 4  # options that a command may share with `posefit track` and list all the same
-_HELP = re.compile(r"(\n\nOptions:)?\n  -h, --help +Show this message and exit\.(?=\n|\Z)")
+_HELP = re.compile(r"(\n\n[A-Z][\w ]*:)?\n  -h, --help +Show this message and exit\.(?=\n|\Z)")
 
 
 def page() -> str:
