@@ -39,7 +39,10 @@ def _method(offer: Offer) -> str:
 
 
 def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
-    """Return what a docstring says of a method, and the list of its settings. Raises KeyError where it lacks one."""
+    """Return the first paragraph of a method's docstring and the list of its settings.
+
+    Raises KeyError where the docstring lacks a setting.
+    """
     text = inspect.getdoc(factory) or ""
     said, settings = settings_in(text), settings_of(factory)
     if not settings:
@@ -48,6 +51,8 @@ def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
     for setting in settings:
         symbol, meaning = said[setting.name]
         default = "" if setting.default is inspect.Parameter.empty else f"={setting_text(setting.default)}"
-        choices = f" One of {setting.type}." if isinstance(setting.default, str) and " | " in setting.type else ""
-        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}{choices}")
-    return f"{without_settings(text)}{more}\n\n" + "\n".join(lines)
+        choices = setting.type.split(" | ") if isinstance(setting.default, str) else []
+        listed = "" if all(choice in meaning for choice in choices) else f" One of {', '.join(choices)}."
+        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}{listed}")
+    summary = without_settings(text).split("\n\n")[0]
+    return f"{summary}{more}\n\n" + "\n".join(lines)
