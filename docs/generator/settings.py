@@ -51,9 +51,6 @@ def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
     for setting in settings:
         symbol, meaning = said[setting.name]
         default = "" if setting.default is inspect.Parameter.empty else f"={setting_text(setting.default)}"
-        choices = setting.type.split(" | ")
-        is_choice = isinstance(setting.default, str) and not all(choice in meaning for choice in choices[1:])
-        listed = f" One of {', '.join(choices)}." if is_choice else ""
-        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}{listed}")
+        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}")
     summary = without_settings(text).split("\n\n")[0]
     return f"{summary}{more}\n\n" + "\n".join(lines)
