@@ -16,6 +16,7 @@ from posefit.fitting.prior import Prior
 from posefit.geometry.skeleton import Skeleton
 from posefit.silhouette.drawn import PoseCount
 
+FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
 POSEFIT = Path(__file__).parents[1]  # whose lines are not a plugin's
 
 
@@ -145,3 +146,36 @@ class CheckedPrior:
             return getattr(self._prior, method)(*arguments)
         except (Exception, SystemExit) as error:
             raise _broken_by(self._name, method, error) from error
+
+
+def check_prior(prior: Prior, training: Array, name: str) -> None:
+    """Return nothing. Raises BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
+
+    `training` (T, 63) are the joint angles that it has learned from.
+    """
+
+    def broken(rule: str) -> BrokenRuleError:
+        return BrokenRuleError(f"{name}: {rule}")
+
+    low, high = np.asarray(prior.low), np.asarray(prior.high)
+    if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
+        raise broken(f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}")
+    for k in np.flatnonzero(low > high):
+        raise broken(f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}")
+    angles = training[:3]
+    latents = np.asarray(prior.transform(angles))
+    back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
+    for method, value, shape in (
+        ("transform", latents, (len(angles), len(low))),
+        ("inverse_transform", back, angles.shape),
+        ("feasible", feasible, (len(angles),)),
+    ):
+        if np.shape(value) != shape:
+            raise broken(f"{method} must return shape {shape}, got {np.shape(value)}")
+        if not np.isfinite(value).all():
+            raise broken(f"{method} must return finite numbers, got some that are not")
+    sample = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
+    drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
+    if not (np.any(feasible) or any(np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn))):
+        came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
+        raise broken(f"feasible must allow some poses, got {came}")

@@ -22,7 +22,7 @@ from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
-from posefit.tracking.method import resolved
+from posefit.tracking.defaults import completed
 from posefit.tracking.options import VIEW, TrackOptions, declared
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
@@ -45,7 +45,7 @@ def track(
     `source` is masks, an array (T, H, W), a list of image files, a folder of them, or an .npz or .npy file; a video; a
     list of any of these, that several cameras took at the same time; a built-in motion's name, a recorded one's, a
     `Motion`, an .amc or .bvh file; or a `Scene` of a known motion, as it is. All other options are listed below, with
-    the defaults that depend on the source in `posefit.tracking.method.resolved`.
+    the defaults that depend on the source in `posefit.tracking.defaults.completed`.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
@@ -62,10 +62,8 @@ def track(
     kind = kind_of(sources[0])
     check_used(kind, chosen.view)
     _check_truth(chosen, kind == "motion", [*sources, *chosen.train])
-    if chosen.asf is not None and chosen.body_frames is None:
-        chosen = chosen.changed(body_frames=0)
-    chosen = resolved(sources[0], chosen)
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
+    chosen = completed(chosen, followed if kind == "motion" else None)
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:

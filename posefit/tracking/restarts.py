@@ -35,7 +35,6 @@ TRIAL_STRIDE = 3  # frames between these, so that they show which way the person
 TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
 WALKED = 0.3  # metres; a person who goes so far in the trial goes where they face
 BACKWARDS_PENALTY = 1.1  # on the cost of a restart that walks backwards
-GAP = 5  # frames without the person after which a track relocalises: about a sixth of a second
 COST_RISE = 1.5  # times the typical cost of the track: costs above it are high
 TYPICAL_COST_SECONDS = 1.0  # of frames that show the typical cost
 HIGH_COST_SECONDS = 0.5  # for which costs are high before a track relocalises
@@ -149,7 +148,7 @@ def after(task: Task, frame: Frame) -> Task:
 
 
 def relocalised(
-    task: Task, follow: Follow, observations: Iterable[Observation], rng: np.random.Generator, gap: int = GAP
+    task: Task, follow: Follow, observations: Iterable[Observation], rng: np.random.Generator, gap: int
 ) -> Iterator[Frame]:
     """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
 

@@ -16,7 +16,7 @@ from posefit.output.folder import Recorder
 from posefit.progress import Progress
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.pipeline import follow
+from posefit.tracking.pipeline import follow_all
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
     facing_consensus,
@@ -201,7 +201,7 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
         relocalise_gap=0,
         follow=lambda task, observations, rng: Tracker(task).track(observations, rng),
     )
-    (_, frames), _ = follow(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())
+    frames = follow_all(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())[0].frames
     (back, behind), (onward, ahead), (again, _), _ = calls
     assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])
     assert back.backwards
@@ -210,5 +210,5 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
     assert [np.degrees(f.pose[0]) for f in frames] == pytest.approx(range(10))
     assert again.yaw == initial_guess(1, TASK, None, False, frames[5])[1].yaw  # a guess is of the frame it is for
     calls.clear()
-    follow(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
+    follow_all(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
     assert [rows for _, rows in calls] == [list(range(10))]  # what is known of the first frame is kept
