@@ -64,18 +64,14 @@ def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
     return float(costs[usable].mean() if usable.any() else costs.mean())
 
 
-def effort_of(frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return the evaluations and the time of several frames together."""
-    return {name: sum(getattr(frame, name) for frame in frames) for name in ("evaluations", "seconds", "cpu_seconds")}
-
-
 def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
     """Return a frame with the evaluations and the time of several together.
 
     The course of its search is given as if all went on abreast: its evaluations are stretched to those of all.
     """
-    effort = effort_of(together)
-    return replace(with_evaluations(frame, effort.pop("evaluations")), **effort)
+    seconds, cpu_seconds = (sum(getattr(each, name) for each in together) for name in ("seconds", "cpu_seconds"))
+    frame = with_evaluations(frame, sum(each.evaluations for each in together))
+    return replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
 
 
 def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:

@@ -161,7 +161,7 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
     drawn = {path.name for path in figures.iterdir()}
     assert drawn >= {f"{name}.{kind}" for name in ("reliability", "coverage") for kind in ("png", "pdf")}
     head, first, *_ = (figures / "leaderboard.csv").read_text().splitlines()
-    assert "said unknown,80 % interval holds,80 % interval (mm)" in head
+    assert "flagged unknown,80 % interval holds,80 % interval (mm)" in head
     assert ",0.8,60.0," in first
     with rows.open(newline="", encoding="utf-8") as file:
         row = next(csv.DictReader(file))
