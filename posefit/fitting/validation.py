@@ -38,27 +38,13 @@ class CheckedOptimiser:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
         with self._called("ask"):
             proposals = self._optimiser.ask()
-        self._check(proposals)
+        check_population(proposals, self._space, self._name)
         count, budget = len(proposals), self._evaluations
         if self._first and not count:
             raise self._broken("ask must return a first population of one proposal or more, got none")
         if self._first and budget is not None and count > budget:
             raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {budget}")
         return proposals
-
-    def _check(self, proposals: Array) -> None:
-        """Raise BrokenRuleError where proposals are not (n, d) numbers in the box."""
-        plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
-        if not plain or proposals.shape[1:] != (self._space.dimensions,):
-            came = f"shape {proposals.shape}" if plain else type(proposals).__name__
-            raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
-        if proposals.dtype.kind != "f":
-            raise self._broken(f"ask must return numbers of type float64, got {proposals.dtype}")
-        farthest = np.abs(proposals).max(initial=0.0)
-        if np.isnan(farthest):
-            raise self._broken("ask must return finite proposals, got nan")
-        if farthest > 1.0:
-            raise self._broken(f"ask must return proposals in [-1, 1], got {proposals.flat[abs(proposals).argmax()]}")
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs on."""
@@ -82,6 +68,23 @@ class CheckedOptimiser:
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")
+
+
+def check_population(proposals: Any, space: Space, name: str) -> None:
+    """Return nothing. Raises BrokenRuleError, which begins with `name`, where proposals are not (n, d) in the box."""
+    plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
+    rule = ""
+    if not plain or proposals.shape[1:] != (space.dimensions,):
+        came = f"shape {proposals.shape}" if plain else type(proposals).__name__
+        rule = f"an array of shape (n, {space.dimensions}), got {came}"
+    elif proposals.dtype.kind != "f":
+        rule = f"numbers of type float64, got {proposals.dtype}"
+    elif np.isnan(farthest := np.abs(proposals).max(initial=0.0)):
+        rule = "finite proposals, got nan"
+    elif farthest > 1.0:
+        rule = f"proposals in [-1, 1], got {proposals.flat[np.abs(proposals).argmax()]}"
+    if rule:
+        raise BrokenRuleError(f"{name}: ask must return {rule}")
 
 
 @contextmanager

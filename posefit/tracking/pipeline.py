@@ -102,26 +102,22 @@ def follow_all(
     count, total, start = scene.count, options.hypotheses, _start(scene, first, method)
     followed: list[Hypothesis] = []
     for number in range(total):
-        guess, task, rng = SEARCHED, first, np.random.default_rng(options.seed)
-        if number:
-            usable = (k for k in range(start, count) if scene.observations[k].usable)
-            reference = followed[0].frames[next(usable, 0)]
-            guess, task = initial_guess(number, first, scene.yaw, options.first_pose == "given", reference)
-            rng = stream(options.seed, "hypothesis", number)
+        usable = (k for k in range(start, count) if scene.observations[k].usable)
+        reference = followed[0].frames[next(usable, 0)] if number else None
+        hypothesis = _begun(number, scene, first, options, reference)
         frames = recorded[number * count : (number + 1) * count]
-        hypothesis, done = Hypothesis(guess, task, rng, stream(options.seed, "back", number), frames), len(frames)
-        if state is not None and 0 < done < count:
-            hypothesis = _resumed(hypothesis, state)
-            which = f" of track {number + 1} of {total}, {guess}" if total > 1 else ""
-            progress.log(f"going on from frame {done} of {count}{which}")
-        elif total > 1 and not done:
-            progress.log(f"track {number + 1} of {total}: {guess}")
-        frames = list(hypothesis.frames)
+        done, which = len(frames), f"track {number + 1} of {total}"
+        if 0 < done < count and state is not None:
+            hypothesis = _resumed(hypothesis, frames, state)
+            progress.log(f"going on from frame {done} of {count}" + f" of {which}, {hypothesis.guess}" * (total > 1))
+        elif not done and total > 1:
+            progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
             back = (scene.observations[k] for k in range(start, -1, -1)) if start and not done else None
             ahead = (scene.observations[k] for k in range(done or start, count))
+            frames = list(hypothesis.frames)
             for frame in progress.steps(follow(hypothesis, method, ahead, gap, back), count - done):
-                recorder.record(frame, dict(rng.bit_generator.state))
+                recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
                 frames.append(frame)
         followed.append(replace(hypothesis, frames=frames))
     return followed
@@ -157,21 +153,29 @@ def _start(scene: Scene, task: Task, method: Method) -> int:
     In footage, a tracker that looks ahead begins with the first frame that shows the whole person; unless more is known
     of the very first one than its masks show.
     """
+    if scene.truth is not None or not method.looks_ahead:
+        return 0
     first_yaw = next((observation.yaw for observation in scene.observations if observation.usable), None)
-    from_within = scene.truth is None and task.yaw == first_yaw and method.looks_ahead
-    return first_shown_whole(scene.observations) if from_within else 0
+    return first_shown_whole(scene.observations) if task.yaw == first_yaw else 0
 
 
-def _resumed(hypothesis: Hypothesis, state: dict[str, Any]) -> Hypothesis:
-    """Return a hypothesis that goes on from its frames, after which the random generator had some state.
+def _begun(number: int, scene: Scene, first: Task, options: TrackOptions, reference: Frame | None) -> Hypothesis:
+    """Return a hypothesis before its first frame, guessed by a frame of the first hypothesis, if it is another."""
+    back_rng = stream(options.seed, "back", number)
+    if reference is None:
+        return Hypothesis(SEARCHED, first, np.random.default_rng(options.seed), back_rng)
+    guess, task = initial_guess(number, first, scene.yaw, options.first_pose == "given", reference)
+    return Hypothesis(guess, task, stream(options.seed, "hypothesis", number), back_rng)
+
+
+def _resumed(hypothesis: Hypothesis, recorded: Sequence[Frame], state: dict[str, Any]) -> Hypothesis:
+    """Return a hypothesis that goes on from recorded frames, after which the random generator had some state.
 
     What follows has other trajectories than the earlier frames.
     """
     hypothesis.rng.bit_generator.state = state
-    frames = [
-        replace(frame, posterior=frame.posterior and replace(frame.posterior, coherent=False))
-        for frame in hypothesis.frames
-    ]
+    posteriors = [frame.posterior and replace(frame.posterior, coherent=False) for frame in recorded]
+    frames = [replace(frame, posterior=posterior) for frame, posterior in zip(recorded, posteriors, strict=True)]
     pose = frames[-1].pose
     task = replace(hypothesis.task, yaw=float(pose[0]), first_pose=pose[3:], before=tuple(frames))
     return replace(hypothesis, task=task, frames=frames)
