@@ -28,20 +28,20 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
     if method is None and name is None and not set_names - {DEFAULT_TRACKER} and DEFAULT_TRACKER in offers["tracker"]:
         method = DEFAULT_TRACKER
     elif method is None or isinstance(method, str):
-        optimiser = next(iter(set_names & {*offers["optimiser"]}), None)
+        optimiser = next(iter(set_names & {*offers["optimiser"]}), "@")
         method = str(method_names(method or optimiser, DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR))
-    by_default = method == DEFAULT_TRACKER
+    by_default, styles = method == DEFAULT_TRACKER, built_in.other_styles(name or "walk")
+    body_frames = BODY_FRAMES if footage and options.asf is None else 0
     restarts = RESTARTS if footage and not offers_of(method)[0].looks_ahead else 0
-    defaults = {
-        "train": [recorded.LIBRARY] if by_default else built_in.other_styles(name or "walk"),
-        "evaluations": DEFAULT_TRACKER_EVALUATIONS if by_default else EVALUATIONS,
-        "translation": "aligned" if footage else "known",
-        "restarts": restarts,
-        "body_frames": BODY_FRAMES if footage and options.asf is None else 0,
-        "smooth": footage,
-    }
-    left_open = {name: value for name, value in defaults.items() if getattr(options, name) in (None, ())}
-    options = options.changed(method=method, **left_open)
+    options = options.changed(
+        method=method,
+        train=options.train or ([recorded.LIBRARY] if by_default else styles),
+        evaluations=options.evaluations or (DEFAULT_TRACKER_EVALUATIONS if by_default else EVALUATIONS),
+        translation=options.translation or ("aligned" if footage else "known"),
+        restarts=restarts if options.restarts is None else options.restarts,
+        body_frames=body_frames if options.body_frames is None else options.body_frames,
+        smooth=footage if options.smooth is None else options.smooth,
+    )
     if options.smooth and options.translation == "known":
         raise InputError("smooth must be given where the translation is searched or aligned, got known")
     return options

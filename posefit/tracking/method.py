@@ -35,9 +35,9 @@ class MethodNames(NamedTuple):
         return self.tracker or f"{self.optimiser}@{self.prior}"
 
 
-def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> MethodNames:
+def method_names(method: str, default_prior: str = DEFAULT_PRIOR) -> MethodNames:
     """Return the plugins that a method such as `sapso@pca` names. Raises InputError listing those that are known."""
-    optimiser, at, prior = (method or "@").partition("@")
+    optimiser, at, prior = method.partition("@")
     if at:
         return MethodNames(optimiser or DEFAULT_OPTIMISER, prior or default_prior)
     offers, family = registry().offers, optimiser.partition(":")[0]
