@@ -111,8 +111,8 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
     # where the plugin raised it, or passed it on from a library
     frames = [frame for frame in extract_tb(error.__traceback__) if POSEFIT not in Path(frame.filename).parents]
-    own = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
-    place = f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+    of_plugin = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
+    place = f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})" if of_plugin else ""
     return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}")
 
 

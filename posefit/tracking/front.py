@@ -57,8 +57,9 @@ def track(
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     sources = _sources(source)
-    if scene is not None and (given := [name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)]):
-        raise InputError(f"a scene must be tracked as it is, got {', '.join(given)}")
+    changed = [name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)]
+    if scene is not None and changed:
+        raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
     kind = kind_of(sources[0])
     check_used(kind, chosen.view)
     _check_truth(chosen, kind == "motion", [*sources, *chosen.train])
@@ -146,11 +147,11 @@ def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence
 
 def _documented(function: Callable[..., Any]) -> None:
     """Show the options of a track in a function's signature and docstring, as if it declared them itself."""
-    own = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
+    parameters = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
     listed = [option for option in fields(TrackOptions) if function is track or option.name != "frames"]
     kind = inspect.Parameter.KEYWORD_ONLY
     more = [inspect.Parameter(option.name, kind, default=option.default, annotation=option.type) for option in listed]
-    function.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
+    function.__signature__ = inspect.Signature([*parameters, *more])  # type: ignore[attr-defined]
     lines = "\n".join(f"    {option.name}: {declared(option).help}" for option in listed)
     function.__doc__ = f"{(function.__doc__ or '').rstrip()}\n\n    Options:\n{lines}\n"
 

@@ -98,8 +98,8 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         rng = np.random.default_rng(chosen.seed)
         for frame in follow(Hypothesis(SEARCHED, task, rng, rng), method, coming(), method.relocalise_gap):
             live = waiting.popleft()
-            came, began = live.source.arrived, first[0].source.arrived
-            yield LiveFrame(live.source.number, came - began, time.perf_counter() - came, live.usable, frame)
+            arrived, start = live.source.arrived, first[0].source.arrived
+            yield LiveFrame(live.source.number, arrived - start, time.perf_counter() - arrived, live.usable, frame)
 
 
 def _scene_of(
@@ -110,11 +110,11 @@ def _scene_of(
         raise InputError(f"{name}: expected a person in the first {len(first)} frames, got none")
     size = (first[0].mask.shape[1], first[0].mask.shape[0])
 
-    def packed(seen: Sequence[LiveMask]) -> PackedMasks:
-        names = [f"{name}, frame {live.source.number}" for live in seen]
-        masks = np.packbits([live.mask.ravel() for live in seen], axis=1)
-        valid = np.packbits([live.valid.ravel() for live in seen], axis=1)
-        usable, landmarks = np.array([live.usable for live in seen]), np.array([live.landmarks for live in seen])
+    def packed(frames: Sequence[LiveMask]) -> PackedMasks:
+        names = [f"{name}, frame {live.source.number}" for live in frames]
+        masks = np.packbits([live.mask.ravel() for live in frames], axis=1)
+        valid = np.packbits([live.valid.ravel() for live in frames], axis=1)
+        usable, landmarks = np.array([live.usable for live in frames]), np.array([live.landmarks for live in frames])
         known = landmarks if landmarks[..., 2].any() else None
         return PackedMasks(names, size, masks, valid, usable, landmarks=known)
 

@@ -94,10 +94,10 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     Raises InputError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
     BrokenRuleError where a plugin does not do what its kind has to.
     """
-    optimiser, given_prior = offers_of(options.method)
-    if given_prior is None:
+    optimiser, prior_choice = offers_of(options.method)
+    if prior_choice is None:
         return _tracker_method(optimiser, options.settings)
-    prior = registry().offer("prior", given_prior) if isinstance(given_prior, str) else None
+    prior = registry().offer("prior", prior_choice) if isinstance(prior_choice, str) else None
     plugin_settings = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     plugin_settings.setdefault("prior", {})
     planned = settings.planned(optimiser.factory, plugin_settings["optimiser"], task.evaluations)
@@ -108,7 +108,7 @@ def prepare(options: TrackOptions, task: Task) -> Method:
             check_prior(learned, task.angles, prior.label)
         learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
-        learned, name = given_prior, type(given_prior).__name__
+        learned, name = prior_choice, type(prior_choice).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
     prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **plugin_settings["tracker"]})
     tilt = prediction.tilted(learned, task.training)
@@ -134,7 +134,7 @@ def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any
     return places if offers[0].kind == "tracker" else places | {"tracker": ("tracker", Prediction)}
 
 
-def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
+def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
     They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
@@ -143,33 +143,33 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
     """
     places = places_of(offers)
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
-    for item in given:
-        left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
-        name, dot, setting = left.partition(".")
+    for item in values:
+        key, equals, value = (item, "=", values[item]) if isinstance(values, Mapping) else item.partition("=")
+        name, dot, setting = key.partition(".")
         if not dot:  # the name may be left out where one plugin alone has the setting
             offered = [f"{name}.{each}" for name, (_, factory) in places.items() for each in settings.names(factory)]
-            having = [each.partition(".")[0] for each in offered if each.partition(".")[2] == left]
-            if equals and len(having) != 1:
-                raise InputError(f"a setting must be one of {', '.join(offered)}, got {quoted(left)}")
-            name, setting = (having or [""])[0], left
+            matching = [each.partition(".")[0] for each in offered if each.partition(".")[2] == key]
+            if equals and len(matching) != 1:
+                raise InputError(f"a setting must be one of {', '.join(offered)}, got {quoted(key)}")
+            name, setting = (matching or [""])[0], key
         if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
             known = ", ".join(places)
             raise InputError(f"a setting must name one of {known}, which are in use here, got {quoted(item)}")
         if setting in each[name]:
-            raise InputError(f"a setting must be given once, got {quoted(left)} twice")
+            raise InputError(f"a setting must be given once, got {quoted(key)} twice")
         each[name][setting] = value
     for name, (_, factory) in places.items():
-        if isinstance(given, Mapping):
+        if isinstance(values, Mapping):
             each[name] = settings.check(name, factory, each[name])
         else:
             each[name] = settings.parse(name, factory, each[name])
     return {kind: each[name] for name, (kind, _) in places.items()}
 
 
-def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> Method:
-    plugin_settings = parsed_settings([offer], given)["tracker"]
+def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> Method:
+    plugin_settings = parsed_settings([offer], values)["tracker"]
     defaults = {setting.name: setting.default for setting in offer.settings}
     beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]  # of the costs that it gives
     beta = float(beta) if isinstance(beta, float | int) else BETA

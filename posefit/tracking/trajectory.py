@@ -74,9 +74,9 @@ def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
     return replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
 
 
-def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:
+def with_total_effort(tracks: Sequence[Sequence[Frame]], best: int) -> list[Frame]:
     """Return the frames of the track that is kept, with the evaluations and the time of all tracks."""
-    return [with_effort_of(together[kept], together) for together in zip(*tracks, strict=True)]
+    return [with_effort_of(together[best], together) for together in zip(*tracks, strict=True)]
 
 
 def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]) -> Tracked:
@@ -86,12 +86,12 @@ def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[
     usable, speed = [observation.usable for observation in scene.observations], typical_speed(training)
     tracks = [hypothesis.frames for hypothesis in hypotheses]
     costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
-    kept = min(range(len(costs)), key=lambda k: costs[k].total)
+    best = min(range(len(costs)), key=lambda k: costs[k].total)
     table = [
-        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == kept}
+        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == best}
         for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
     ]
-    return Tracked(with_total_effort(tracks, kept), table)
+    return Tracked(with_total_effort(tracks, best), table)
 
 
 def typical_speed(training: Sequence[Motion]) -> float:

@@ -19,11 +19,11 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import follow_all
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
+    best_ends,
     facing_consensus,
     initial_guess,
     retrack_spins,
     spin_mask,
-    surest_ends,
 )
 from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import Posterior
@@ -115,12 +115,12 @@ def test_a_frame_has_a_vote_for_each_camera_that_sees_the_person() -> None:
 def test_what_stays_lies_between_the_surest_frames_near_both_ends(start: int, stop: int, ends: tuple[int, int]) -> None:
     costs = {4: 0.5, 32: 0.6, 33: 0.4, 57: 0.5}
     frames = [frame(0.0, costs.get(k, 1.0)) for k in range(60)]
-    assert surest_ends(frames, start, stop, FPS) == ends
+    assert best_ends(frames, start, stop, FPS) == ends
 
 
 def test_the_surest_frame_is_one_that_most_cameras_see() -> None:
     frames = [frame(0.0, 9.0 if k in (5, 50) else 1.0, cameras=1 + (k in (5, 50))) for k in range(60)]
-    assert surest_ends(frames, 1, 59, FPS) == (5, 50)
+    assert best_ends(frames, 1, 59, FPS) == (5, 50)
 
 
 def posterior(offset: float) -> Posterior:
