@@ -179,6 +179,24 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         assert (again.method, again.train) == (expected, train), (source, given)
 
 
+@each(
+    ("motion", "options", "evaluations", "restarts", "body_frames", "translation", "smooth"),
+    [
+        ("walk", {}, 2440, 0, 0, "known", False),
+        ("16_15", {}, 9760, 0, 0, "known", False),
+        (None, {}, 9760, 0, 12, "aligned", True),  # its tracker looks ahead, and searches the first pose by itself
+        (None, {"method": "vsmm"}, 2440, 8, 12, "aligned", True),
+        (None, {"method": ("sapso", "pca"), "asf": "a.asf"}, 2440, 8, 0, "aligned", True),  # the build is known
+        (None, {"evaluations": 99, "restarts": 0, "body_frames": 0, "smooth": False}, 99, 0, 0, "aligned", False),
+        ("walk", {"translation": "searched", "restarts": 2, "smooth": True}, 2440, 2, 0, "searched", True),
+    ],
+)
+def test_every_default_is_completed(motion: Any, options: dict[str, Any], **expected: Any) -> None:
+    done = completed(TrackOptions(**options), motion)
+    assert {name: getattr(done, name) for name in expected} == expected
+    assert completed(done, motion) == done
+
+
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
