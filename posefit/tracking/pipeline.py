@@ -3,7 +3,7 @@
 | step | what it returns | file |
 |---|---|---|
 | `initialise` | the first pose and the person's build | initialise.py |
-| `follow` | the frames of one hypothesis, by the method's own tracker | this one |
+| `follow_all`, `follow` | the frames of each hypothesis, and of one, by the method's own tracker | this one |
 | `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
 | `smooth` | of footage: a smooth path, feet that stand, poses fitted to the contours | smoothing/ |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
