@@ -147,11 +147,12 @@ def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequenc
         key, equals, value = (item, "=", values[item]) if isinstance(values, Mapping) else item.partition("=")
         name, dot, setting = key.partition(".")
         if not dot:  # the name may be left out where one plugin alone has the setting
-            offered = [f"{name}.{each}" for name, (_, factory) in places.items() for each in settings.names(factory)]
-            matching = [each.partition(".")[0] for each in offered if each.partition(".")[2] == key]
-            if equals and len(matching) != 1:
-                raise InputError(f"a setting must be one of {', '.join(offered)}, got {quoted(key)}")
-            name, setting = (matching or [""])[0], key
+            names = {name: settings.names(factory) for name, (_, factory) in places.items()}
+            owners = [name for name in names if key in names[name]]
+            if equals and len(owners) != 1:
+                known = ", ".join(f"{name}.{each}" for name in names for each in names[name])
+                raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
+            name, setting = (owners or [""])[0], key
         if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
