@@ -365,6 +365,8 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
         (["plugins", "check"], "check", "posefit check"),
         (["plugins", "docter"], "docter", "posefit plugins doctor"),
         (["suite", "rn"], "rn", "posefit suite run"),
+        (["optimizers"], "optimizers", "posefit plugins"),
+        (["segmenter"], "segmenter", "posefit plugins"),
     ):
         assert error_of(*words) == f"posefit: No such command {name!r}; did you mean {path!r}?"
     assert error_of("zebra") == "posefit: No such command 'zebra'"
