@@ -64,6 +64,7 @@ class Stream:
 
     def __init__(self, source: str, pipe: BinaryIO | None = None) -> None:
         self.name, self.fps, self.count = source, FPS, 0
+        self.rate: float | None = None  # frames a second, where the source states them
         self._latest: LiveImage | None = None
         self._ended = False
         self._error: InputError | None = None
@@ -81,7 +82,8 @@ class Stream:
             if not capture.isOpened():
                 raise InputError(f"live must be a device or an address that can be opened, or -, got {quoted(source)}")
             rate = capture.get(cv2.CAP_PROP_FPS)
-            self.fps = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else FPS
+            self.rate = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else None
+            self.fps = self.rate or FPS
             frames = _captured(capture)
         threading.Thread(target=self._read, args=(frames,), daemon=True).start()
 

@@ -5,7 +5,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
 from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of
+from posefit.footage.source import body_of, logged
 from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
 from posefit.motion.clips import training_clips, training_motions
@@ -73,10 +73,10 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     chosen = chosen.changed(method=chosen.method or METHOD, train=chosen.train or built_in.other_styles("walk"))
     clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
-    fps = chosen.fps or stream.fps
     masks = live_masks(stream, chosen.extraction, progress.log)
     first = list(islice(masks, TRIAL_FRAMES * TRIAL_STRIDE))
-    scene, observed = _scene_of(first, source, fps, chosen)
+    scene, observed = _scene_of(first, source, chosen.fps or stream.rate, chosen)
+    logged(scene, progress)
     waiting: deque[LiveMask] = deque()
 
     def coming() -> Iterator[Observation]:
@@ -88,7 +88,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
             yield observed(live)
 
     with threadpool_limits(1):
-        task = task_of(scene, chosen, training_motions(clips, fps))
+        task = task_of(scene, chosen, training_motions(clips, scene.fps))
         method = prepare(chosen, task)
         if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
             progress.log(f"looking for the first pose, {restarts} times")
@@ -101,7 +101,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
 
 
 def _scene_of(
-    first: Sequence[LiveMask], name: str, fps: float, options: TrackOptions
+    first: Sequence[LiveMask], name: str, fps: float | None, options: TrackOptions
 ) -> tuple[Scene, Callable[[LiveMask], Observation]]:
     """Return the scene of the first frames, and the function that makes an observation of a later one."""
     if not any(live.usable for live in first):
@@ -118,9 +118,10 @@ def _scene_of(
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
-    body, notes = body_of(options.asf, options.height, options.unit)
+    body, notes, of_height = body_of(options.asf, options.height, None if known else options.unit)
     view = CameraView(packed(first), notes, name)
-    scene = combined([view], name, body, known, facing, options.up, fps)
+    scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
+    scene = replace(scene, guesses=[*scene.guesses, *of_height])
     bent = next(((each, each.maps(size)) for each in known if isinstance(each, Calibration) and each.distorted), None)
 
     def observed(live: LiveMask) -> Observation:
