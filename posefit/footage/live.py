@@ -19,8 +19,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS
-from posefit.footage.quality import FrameQuality
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.segmentation import Extraction, PersonSegmenter
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.clips import FPS
@@ -180,13 +179,9 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    segmentation = Segmentation(Video.of_images(learned, Path(stream.name), stream.fps), how, (None, None))
-    segmenter = segmentation.learned()
-    quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))
+    segmenter = PersonSegmenter(Video.of_images(learned, Path(stream.name), stream.fps), how)
     for live in images:
-        image = scaled(live.image, segmentation.size)
-        person, row = segmentation.person(segmenter, image, quality, live.number)
-        landmarks = segmentation.landmarks_of(segmenter)
+        person, row, _, landmarks = segmenter.frame(scaled(live.image, segmenter.size), live.number)
         yield LiveMask(live, person.mask, person.valid, bool(row["usable"]), landmarks)
 
 
