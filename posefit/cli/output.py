@@ -3,8 +3,9 @@
 import io
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
+from functools import partial
 from typing import Any
 
 import click
@@ -18,34 +19,23 @@ MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 class _Messages(io.TextIOWrapper):
     """Standard error: what cannot be written to it is lost, and the work goes on."""
 
+    writing: Callable[[], AbstractContextManager[None]] = staticmethod(partial(suppress, OSError))
+
     def write(self, text: str) -> int:
-        """Write a text, or lose it."""
-        with suppress(OSError):
+        """Write a text."""
+        with self.writing():
             super().write(text)
         return len(text)
 
     def flush(self) -> None:
-        """Write what is buffered, or lose it."""
-        with suppress(OSError):
-            super().flush()
-
-
-class _Results(io.TextIOWrapper):
-    """Standard output: a result that cannot be written there is a user's mistake, and a closed pipe ends the output."""
-
-    def write(self, text: str) -> int:
-        """Write a text. Raises InputError where there is no room."""
-        with _room():
-            return super().write(text)
-
-    def flush(self) -> None:
-        """Write what is buffered. Raises InputError where there is no room."""
-        with _room():
+        """Write what is buffered."""
+        with self.writing():
             super().flush()
 
 
 @contextmanager
 def _room() -> Iterator[None]:
+    """Raise InputError where the body has no room to write to; a closed pipe ends the output."""
     try:
         yield
     except BrokenPipeError:
@@ -54,6 +44,12 @@ def _room() -> Iterator[None]:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115, as long as the process lives
         reason = error.strerror or error
         raise InputError(f"standard output: expected room to write results to, got {reason}") from None
+
+
+class _Results(_Messages):
+    """Standard output: a result that cannot be written there is a user's mistake."""
+
+    writing = staticmethod(_room)
 
 
 def open_streams() -> None:
