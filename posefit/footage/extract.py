@@ -46,7 +46,7 @@ def extract(
             writer = csv.DictWriter(file, list(segmentation.rows[0]))
             writer.writeheader()
             writer.writerows(segmentation.rows)
-    return {"video": str(source), "method": how.name, **segmentation.summary}
+    return {"video": str(source), "method": how.name, **segmentation.summary, "guesses": [*video.guesses]}
 
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:

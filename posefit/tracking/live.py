@@ -28,6 +28,7 @@ from posefit.progress import QUIET, Progress
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions, declared
+from posefit.tracking.pipeline import with_notes
 from posefit.tracking.restarts import GAP, RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart, relocalised
 
 METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
@@ -76,7 +77,10 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     masks = live_masks(stream, chosen.extraction, progress.log)
     first = list(islice(masks, TRIAL_FRAMES * TRIAL_STRIDE))
     scene, observed = _scene_of(first, source, chosen.fps or stream.rate, chosen)
-    logged(scene, progress)
+    training = training_motions(clips, scene.fps)
+    scene = with_notes(logged(scene, progress), training)
+    for warning in scene.warnings:
+        progress.warn(warning)
     waiting: deque[LiveMask] = deque()
 
     def coming() -> Iterator[Observation]:
@@ -88,7 +92,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
             yield observed(live)
 
     with threadpool_limits(1):
-        task = task_of(scene, chosen, training_motions(clips, scene.fps))
+        task = task_of(scene, chosen, training)
         method = prepare(chosen, task)
         if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
             progress.log(f"looking for the first pose, {restarts} times")

@@ -11,7 +11,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -46,6 +45,14 @@ from posefit.tracking.trajectory import Hypothesis, cheapest
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
 
 
+def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
+    """Return a scene whose warnings say, too, what was guessed where the files to learn from were read."""
+    notes = list(dict.fromkeys(note for motion in training for note in motion.notes if note not in scene.warnings))
+    if len(notes) > MAX_NOTES:
+        notes[MAX_NOTES:] = [f"and {len(notes) - MAX_NOTES} more of files to learn from"]
+    return replace(scene, warnings=[*scene.warnings, *notes])
+
+
 def track_scene(
     scene: Scene,
     training: Sequence[Motion],
@@ -60,10 +67,7 @@ def track_scene(
     """
     options = options or TrackOptions()
     options = options.changed(smooth=scene.truth is None if options.smooth is None else options.smooth)
-    notes = dict.fromkeys(note for motion in training for note in motion.notes if note not in scene.warnings)
-    if len(notes) > MAX_NOTES:
-        notes = dict.fromkeys([*islice(notes, MAX_NOTES), f"and {len(notes) - MAX_NOTES} more of files to learn from"])
-    scene = replace(on_device(scene, options.device), warnings=[*scene.warnings, *notes])
+    scene = with_notes(on_device(scene, options.device), training)
     task = task_of(scene, options, training)
     if options.smooth and task.translation == "known":
         raise InputError("smooth must be given where the translation is searched or aligned, got known")
