@@ -207,7 +207,9 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(out)
     force = ["track", "walk", "--frames", "0:2", "--force", *QUICK, "--out"]
-    assert "link: expected a folder to write to, got a link" in error_of(*force, link)
+    (tmp_path / "nowhere").symlink_to(tmp_path / "nothing")
+    for path in (link, tmp_path / "nowhere"):
+        assert f"{path.name}: expected a folder to write to, got a link" in error_of(*force, path)
     before = sorted(path.name for path in out.iterdir())
     (out / "precious.txt").write_text("mine")
     assert "got one with precious.txt, which is none of posefit's" in error_of(*force, out)

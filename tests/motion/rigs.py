@@ -18,39 +18,22 @@ from posefit.measuring.segments import bone_rotations
 from posefit.motion.motion import Motion
 from tests.geometry.turns import about
 
-AT = {  # where each bone of a rig starts: after which of posefit's joints
-    "hips": "root",
-    "thigh": "{}hipjoint",
-    "shin": "{}femur",
-    "foot": "{}tibia",
-    "toe": "{}foot",
-    "spine": "root",
-    "spine1": "lowerback",
-    "chest": "upperback",
-    "neck": "thorax",
-    "neck1": "lowerneck",
-    "head": "upperneck",
-    "clavicle": "thorax",
-    "arm": "{}clavicle",
-    "forearm": "{}humerus",
-    "hand": "{}radius",
-}
-TURNS = {  # which of posefit's bones a rig's joint turns as
-    "hips": "root",
-    "thigh": "{}femur",
-    "shin": "{}tibia",
-    "foot": "{}foot",
-    "toe": "{}toes",
-    "spine": "lowerback",
-    "spine1": "upperback",
-    "chest": "thorax",
-    "neck": "lowerneck",
-    "neck1": "upperneck",
-    "head": "upperneck",
-    "clavicle": "{}clavicle",
-    "arm": "{}humerus",
-    "forearm": "{}radius",
-    "hand": "{}wrist",
+BONES = {  # of each joint of a rig: after which of posefit's joints its bone starts, and which bone it turns as
+    "hips": ("root", "root"),
+    "thigh": ("{}hipjoint", "{}femur"),
+    "shin": ("{}femur", "{}tibia"),
+    "foot": ("{}tibia", "{}foot"),
+    "toe": ("{}foot", "{}toes"),
+    "spine": ("root", "lowerback"),
+    "spine1": ("lowerback", "upperback"),
+    "chest": ("upperback", "thorax"),
+    "neck": ("thorax", "lowerneck"),
+    "neck1": ("lowerneck", "upperneck"),
+    "head": ("upperneck", "upperneck"),
+    "clavicle": ("thorax", "{}clavicle"),
+    "arm": ("{}clavicle", "{}humerus"),
+    "forearm": ("{}humerus", "{}radius"),
+    "hand": ("{}radius", "{}wrist"),
 }
 LEG = ("thigh", "shin", "foot", "toe")
 ARM = ("clavicle", "arm", "forearm", "hand")
@@ -167,7 +150,7 @@ def joint_after(role: str, style: Style) -> str:
     """Return after which of posefit's joints a role's joint is where a rig has fewer of neck and spine than posefit."""
     if role == "head" and "neck1" not in style.names:
         return "lowerneck"
-    return "lowerback" if role == "chest" and "spine1" not in style.names else AT[role]
+    return "lowerback" if role == "chest" and "spine1" not in style.names else BONES[role][0]
 
 
 @dataclass
@@ -195,7 +178,7 @@ def write_rig(
 
     def add(role: str, side: str, parent: int) -> int:
         letter = side[:1].lower()
-        starts, turning = (JOINTS.index(name.format(letter)) for name in (joint_after(role, style), TURNS[role]))
+        starts, turning = (JOINTS.index(name.format(letter)) for name in (joint_after(role, style), BONES[role][1]))
         axes = _axes(rest, role, skeleton.offsets[turning - 1])
         joints.append(
             _Joint(side + role, style.names[role].format(side), parent, turns[:, turning], at_rest[starts], axes)
