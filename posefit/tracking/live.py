@@ -20,7 +20,7 @@ from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
 from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of, logged
+from posefit.footage.source import body_of, check_used, logged
 from posefit.geometry.calibration import Calibration
 from posefit.motion import built_in
 from posefit.motion.clips import training_clips, training_motions
@@ -108,6 +108,7 @@ def _scene_of(
     first: Sequence[LiveMask], name: str, fps: float | None, options: TrackOptions
 ) -> tuple[Scene, Callable[[LiveMask], Observation]]:
     """Return the scene of the first frames, and the function that makes an observation of a later one."""
+    check_used("masks" if first and first[0].source.image.ndim == 2 else "pictures", options.view)
     if not any(live.usable for live in first):
         raise InputError(f"{name}: expected a person in the first {len(first)} frames, got none")
     size = (first[0].mask.shape[1], first[0].mask.shape[0])

@@ -211,6 +211,20 @@ def test_options_that_need_all_frames_are_refused(options, expected):
         next(track_live(**options))
 
 
+@each(
+    "options, expected",
+    [
+        ({"extraction": Extraction("median")}, "extraction must be given for video only, got .* for masks"),
+        ({"unit": "cm"}, "unit must be given for calibrations and files of motions only, got 'cm' for masks"),
+        ({"up": "z"}, "up must be given for calibrations and files of motions only, got 'z' for masks"),
+    ],
+)
+def test_options_that_masks_have_no_use_for_are_refused(options, expected, monkeypatch, every_frame, walk):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"".join(map(pgm, walk[:8])))))
+    with pytest.raises(InputError, match=expected):
+        next(track_live(**QUICK, **options))
+
+
 def test_images_of_another_size_are_refused(every_frame, walk):
     stream = Stream("-", io.BytesIO(pgm(walk[0]) + pgm(walk[0][:60])))
     masks = live_masks(stream, None, lambda _: None)
