@@ -147,7 +147,6 @@ def slowly_aligned(cameras: list[Camera], silhouettes: list[Silhouette], joints:
     return place
 
 
-@pytest.mark.pure
 @each("azimuths", [(0.8,), (0.3, 1.9)])
 def test_aligning_near_a_camera_is_that_of_a_slow_twin(azimuths: tuple[float, ...]) -> None:
     # so near that a joint's depth decides which one is outermost
