@@ -18,7 +18,7 @@ from posefit_exemplars import hypotheses, markov
 from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
+from posefit_exemplars.lost_model import reported, stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
@@ -102,7 +102,7 @@ class ExemplarTracker:
         estimates = self._path(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
-        frames = smoothed(estimates, self.smoothing, self.ahead)
+        frames = map(reported, smoothed(estimates, self.smoothing, self.ahead))
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
@@ -236,7 +236,7 @@ class ExemplarTracker:
         """Return the estimate of a frame: the weighted mean of the states like that of the path."""
         beam, frame_costs, alternatives = frame.beam, frame.frame_costs, None
         if self.hypotheses is not None:
-            count = self.hypotheses.diverse_count(frame_costs.camera_count)
+            count = self.hypotheses.counts(frame_costs.camera_count).diverse
             diverse = beam.rows(beams.diverse_best(self.exemplars, beam, beam.totals, count))
             alternatives = self._poses(diverse), diverse.places
         codes = self.exemplars.codes[beam.states]
