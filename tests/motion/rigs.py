@@ -256,7 +256,7 @@ def write_rig(
 
 
 def places_of(path: Path) -> dict[str, Array]:
-    """Return where the joints of a file are (T, 3) in its own unit and world, by name."""
+    """Return where the joints of a file are (T, 3) in its own unit and world, by name; an End Site is its `NAME end`."""
     head, table = path.read_text().split("MOTION\n")
     rows = np.array([line.split() for line in table.splitlines()[2:]], dtype=np.float64)
     places: dict[str, Array] = {}
@@ -264,13 +264,14 @@ def places_of(path: Path) -> dict[str, Array]:
     name, offset, column = "", np.zeros(3), 0
     for words in map(str.split, head.splitlines()):
         if words[0] in ("ROOT", "JOINT", "End"):
-            name = "" if words[0] == "End" else " ".join(words[1:])
+            name = f"{name} end" if words[0] == "End" else " ".join(words[1:])
         elif words[0] == "OFFSET":
             offset = np.array(words[1:], dtype=np.float64)
-            if not name:
+            if name.endswith(" end"):
+                places[name] = stack[-1][0] + stack[-1][1] @ offset
                 stack.append(stack[-1])
         elif words[0] == "CHANNELS":
-            above, turn = stack[-1]
+            start, turn = stack[-1]
             moved = np.tile(offset, (len(rows), 1))
             for channel in words[2:]:
                 axis, values = "XYZ".index(channel[0]), rows[:, column]
@@ -279,7 +280,7 @@ def places_of(path: Path) -> dict[str, Array]:
                     moved[:, axis] = values
                 else:
                     turn = turn @ np.array([about(axis, angle) for angle in np.radians(values)])
-            places[name] = above + np.einsum("tij,tj->ti", stack[-1][1], moved)
+            places[name] = start + np.einsum("tij,tj->ti", stack[-1][1], moved)
             stack.append((places[name], turn))
         elif words[0] == "}":
             stack.pop()
