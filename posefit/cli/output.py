@@ -1,9 +1,10 @@
 """Where commands say what they do: messages and progress go to stderr, results alone to stdout."""
 
 import io
+import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
 from functools import partial
 from typing import Any
@@ -69,6 +70,12 @@ def open_streams() -> None:
 def say(message: str) -> None:
     """Print a message on stderr."""
     click.echo("\n".join(map(printable, message.split("\n"))), err=True)
+
+
+def print_result(lines: Iterable[str], value: Any, as_json: bool) -> None:
+    """Print lines, or else a value, as one line of JSON."""
+    for line in [json.dumps(value)] if as_json else map(printable, lines):
+        click.echo(line)
 
 
 class Command(click.Command):
