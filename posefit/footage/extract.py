@@ -14,8 +14,6 @@ from posefit.footage.segmentation import Extraction, Progress, Segmentation
 from posefit.footage.video import Video, VideoWriter
 from posefit.silhouette.foreground import Image, Person
 
-FILES = ("masks.npz", "preview.mp4", "quality.csv")
-
 
 def extract(
     source: str | Path,
