@@ -116,6 +116,8 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
 
     how = extraction_of(options, video, settings)
     result = run(video, out, how, frames=frames, progress=progress)
+    if result["guesses"]:
+        say(f"guessed: {'; '.join(result['guesses'])}")
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:

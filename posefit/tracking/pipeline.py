@@ -44,6 +44,14 @@ from posefit.tracking.trajectory import Hypothesis, cheapest
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
 
 
+def with_notes(scene: Scene, training: Sequence[Motion]) -> Scene:
+    """Return a scene whose warnings say, too, what was guessed where the files to learn from were read."""
+    notes = list(dict.fromkeys(note for motion in training for note in motion.notes if note not in scene.warnings))
+    if len(notes) > MAX_NOTES:
+        notes[MAX_NOTES:] = [f"and {len(notes) - MAX_NOTES} more of files to learn from"]
+    return replace(scene, warnings=[*scene.warnings, *notes])
+
+
 def track_scene(
     scene: Scene,
     training: Sequence[Motion],
@@ -56,7 +64,7 @@ def track_scene(
 
     The options are those that `posefit.tracking.defaults.completed` returns. `recorder` gets every frame as it comes.
     """
-    scene = replace(on_device(scene, options.device), warnings=[*scene.warnings, *_notes(training, scene.warnings)])
+    scene = with_notes(on_device(scene, options.device), training)
     for warning in scene.warnings:
         progress.warn(warning)
     task = task_of(scene, options, training)
@@ -84,13 +92,6 @@ def track_scene(
     for warning in track.course.warnings[len(scene.warnings) :]:
         progress.warn(warning)
     return track
-
-
-def _notes(training: Sequence[Motion], warnings: Sequence[str]) -> list[str]:
-    """Return what the files that are learned from left open, and `warnings` do not have yet; the first few of many."""
-    notes = list(dict.fromkeys(note for motion in training for note in motion.notes if note not in warnings))
-    more = len(notes) - MAX_NOTES
-    return notes if more <= 0 else [*notes[:MAX_NOTES], f"and {more} more of files to learn from"]
 
 
 def follow_all(
