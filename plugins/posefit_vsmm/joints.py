@@ -41,7 +41,8 @@ def detect(
 
     They are pixels near where they are expected (17, 2); one that is not detected is there, with a confidence of 0.
     What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
-    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out; `nearest` is the patent's assignment of end points and crossings.
+    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out; `nearest` is the patent's assignment of
+    end points and crossings.
     """
     points, confidence = expected.copy(), np.zeros(len(POINTS))
 

@@ -13,13 +13,16 @@ from click.testing import CliRunner, Result
 
 from posefit.cli import main
 from posefit.evaluation.measures import BASELINES
+from posefit.fitting.tracker import Follower, Prediction
 from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
 from posefit.tracking.front import track
+from posefit.tracking.initialise import task_of
+from posefit.tracking.options import TrackOptions
 from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Results, Run
-from posefit_reproduce.sapso.experiment import COMPARED, Scale, baseline, estimate_images, follow, perform
+from posefit_reproduce.sapso.experiment import COMPARED, Scale, baseline, estimate_images, follow, options_of, perform
 from posefit_reproduce.sapso.figures import watched_swarm
 from posefit_reproduce.sapso.methods import LETTER, OURS, PARTS, ConstantInertia, UnclusteredPCA, WidePCA
 from posefit_reproduce.sapso.motions import CLIPS, PaperMotion, paper_motions, paper_scene
@@ -240,6 +243,16 @@ def test_a_single_image_is_estimated_by_itself_whichever_way_the_person_faces(wa
     other = paper_scene(replace(walk, test=round_about), 45.0)
     turned_frames = estimate_images(other, dict(enumerate(other.observations)), walk.training, OURS, 4, 3)
     assert not np.array_equal(poses_of(frames), poses_of(turned_frames))
+
+
+def test_the_first_yaw_is_searched_within_45_degrees_of_the_true_one(walk: PaperMotion) -> None:  # Interpretation S17
+    scene = paper_scene(walk, 45.0)
+    assert scene.yaw == walk.test.poses[0, 0]
+    options = TrackOptions(**options_of(OURS, walk.training, 4))
+    space = Follower(task_of(scene, options, walk.training), UnclusteredPCA().fit(walk.angles), Prediction(tilt="box"))
+    first = space.space(scene.observations[0])
+    assert first.root_centre[0] == scene.yaw
+    assert np.degrees(first.root_range[0]) == pytest.approx(45.0)
 
 
 def test_the_yaw_of_a_single_image_is_unknown(walk: PaperMotion) -> None:  # section 5.3, Interpretation S17
