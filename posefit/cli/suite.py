@@ -1,6 +1,5 @@
 """`posefit suite`."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,8 @@ import click
 
 from posefit.cli.group import Group
 from posefit.cli.options import parsed_by
-from posefit.cli.output import progress, results_alone, say
-from posefit.errors import InputError, printable
+from posefit.cli.output import print_result, progress, results_alone, say
+from posefit.errors import InputError
 from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
@@ -26,14 +25,12 @@ def suite(context: click.Context, as_json: bool) -> None:
         return
     from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 
-    if as_json:
-        click.echo(json.dumps([asdict(one) for one in FUNCTIONS]))
-        return
-    click.echo(f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100")
-    click.echo(f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out\n")
+    lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
+    lines += [f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out", ""]
     for one in FUNCTIONS:
         dimensions = ", ".join(map(str, one.dimensions))
-        click.echo(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+        lines.append(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+    print_result(lines, [asdict(one) for one in FUNCTIONS], as_json)
 
 
 @suite.command("run")
@@ -134,5 +131,4 @@ def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     if out is not None:
         write_iohprofiler(runs, out)
         say(f"written to {out}: IOHprofiler's files")
-    for line in [json.dumps([asdict(one) for one in scores])] if as_json else map(printable, score_lines(scores)):
-        click.echo(line)
+    print_result(score_lines(scores), [asdict(one) for one in scores], as_json)

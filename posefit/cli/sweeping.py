@@ -1,6 +1,5 @@
 """`posefit sweep` and `posefit report`."""
 
-import json
 from contextlib import nullcontext
 from itertools import islice
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import click
 
 from posefit.cli.options import ENGINE, JSON, QUIET, options
-from posefit.cli.output import results_alone, say
+from posefit.cli.output import print_result, results_alone, say
 from posefit.errors import printable
 
 LINES = 1000  # that are printed at a time
@@ -66,10 +65,7 @@ def sweep(
         command.file_of(shard)
         cells, tell = Plan.read(plan), (lambda _: None) if quiet else say
         tally = command.swept(cells, out, start(), tell, shard=shard, **how)  # without an engine there is no folder
-    for line in (
-        [json.dumps({"out": out, **vars(tally)})] if as_json else map(printable, command.tally_lines(tally, out))
-    ):
-        click.echo(line)
+    print_result(command.tally_lines(tally, out), {"out": out, **vars(tally)}, as_json)
     click.get_current_context().exit(130 if tally.stopped else 1 if tally.quarantined else 0)
 
 
@@ -91,5 +87,4 @@ def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: An
     from posefit.report.write import leaderboard_lines, write_report
 
     summary = write_report(ledger, out, warn=say, **others)
-    for line in [json.dumps(summary)] if as_json else map(printable, leaderboard_lines(summary)):
-        click.echo(line)
+    print_result(leaderboard_lines(summary), summary, as_json)

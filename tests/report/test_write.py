@@ -154,7 +154,7 @@ def test_methods_with_an_uncertainty_have_figures_of_it(tmp_path: Path) -> None:
     figures, rows = tmp_path / "figures", tmp_path / "rows.csv"
     _, page = written(ledger(tmp_path / "results", made), "--figures", figures, "--csv", rows)
     head, first, *_ = (figures / "leaderboard.csv").read_text().splitlines()
-    assert "said unknown,80 % interval holds,80 % interval (mm)" in head
+    assert "flagged unknown,80 % interval holds,80 % interval (mm)" in head
     assert ",0.8,60.0," in first
     with rows.open(newline="", encoding="utf-8") as file:
         row = next(csv.DictReader(file))
