@@ -96,25 +96,19 @@ def suite_run(
 @suite.command("table")
 @click.argument("ledger", metavar="DIR")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
-@click.option("--coco", metavar="DIR", help="New folder for COCO's files, which cocopp reads.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
-def suite_table(ledger: str, iohprofiler: str | None, coco: str | None, as_json: bool) -> None:
+def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
     from posefit.files import check_free
     from posefit.reading import counted
-    from posefit.report.export import write_coco
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.table import search_runs
 
     check_free(iohprofiler)
-    check_free(coco)
     results = Ledger(ledger)
     runs = list(search_runs(results.rows(), results.path))
     if failed := len(results.quarantined()):
         say(f"{counted(failed, 'cell')} failed, left out of all figures")
-    if coco is not None:
-        write_coco(runs, coco)
-        say(f"written to {coco}: COCO's files")
     _print(runs, iohprofiler, as_json)
 
 
@@ -130,11 +124,11 @@ def _numbers(start: int | None, stop: int | None) -> range:
 
 def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
-    from posefit.report.export import suite_runs, write_iohprofiler
+    from posefit.report.export import write_iohprofiler
     from posefit.suites.running import score_lines, suite_scores
 
     scores = suite_scores(runs)
     if out is not None:
-        write_iohprofiler(suite_runs(runs), out)
+        write_iohprofiler(runs, out)
         say(f"written to {out}: IOHprofiler's files")
     print_result(score_lines(scores), [asdict(one) for one in scores], as_json)

@@ -21,7 +21,7 @@ LINES = 1000  # that are printed at a time
 @click.option(
     "--dry-run",
     is_flag=True,
-    help="Print what cells there are and about how long all take, and run none; with --json each cell.",
+    help="Print what cells there are, and run none; with --json each cell.",
 )
 @click.option("--keep-old", is_flag=True, help="Rows of another version of posefit or a plugin count, too.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
@@ -49,9 +49,9 @@ def sweep(
     from posefit.sweep.plan import Plan
 
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
-    start = command.engine(Limits(min(seconds, command.TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
+    start = command.engine(Limits(seconds, gigabytes), **places)
     if dry_run:
-        lines, some = command.preview(plan, out, shard, start, as_json), ""
+        lines, some = command.preview(plan, out, shard, as_json), ""
         while True:
             with results_alone() if as_json else nullcontext():  # a plugin may print, too
                 some = "\n".join(line if as_json else printable(line) for line in islice(lines, LINES))
@@ -73,7 +73,6 @@ def sweep(
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
-@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @JSON
 def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:

@@ -122,7 +122,7 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     assert summary["frames"] == 1
     fit = posefit.fit("walk", frame=7, evaluations=50, size=(120, 90))
     np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
-    assert fit.trace.shape[1] == 2
+    assert fit.frame.trace.shape[1] == 2
 
 
 def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
