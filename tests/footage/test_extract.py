@@ -1,6 +1,5 @@
 """Masks from video: synthetic ones with a known person, and video whose frames come at uneven times."""
 
-import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +19,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.files import arrays
+from tests.files import arrays, csv_rows
 from tests.footage.conftest import EMPTY, FRAMES, SIZE, Box, iou, truth
 from tests.footage.matroska import write_matroska
 
@@ -39,8 +38,7 @@ def test_each_method_finds_the_person(
     overlaps = [iou(a > 0, b) for a, b, ok in zip(stored["masks"], masks[EMPTY:], stored["usable"], strict=True) if ok]
     assert np.mean(overlaps) > 0.8  # a person of 900 pixels: half a pixel all along the edge costs 0.15
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"masks.npz", "preview.mp4", "quality.csv"}
-    with (tmp_path / "out" / "quality.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(tmp_path / "out" / "quality.csv")
     assert [int(row["frame"]) for row in rows] == list(range(EMPTY, EMPTY + FRAMES))
     assert sum(int(row["usable"]) for row in rows) == result["usable"]
 
