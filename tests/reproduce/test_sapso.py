@@ -18,7 +18,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
-from posefit.tracking.options import TrackOptions
+from posefit.tracking.options import TrackOptions, completed
 from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Results, Run
@@ -248,7 +248,7 @@ def test_a_single_image_is_estimated_by_itself_whichever_way_the_person_faces(wa
 def test_the_first_yaw_is_searched_within_45_degrees_of_the_true_one(walk: PaperMotion) -> None:  # Interpretation S17
     scene = paper_scene(walk, 45.0)
     assert scene.yaw == walk.test.poses[0, 0]
-    options = TrackOptions(**options_of(OURS, walk.training, 4))
+    options = completed(TrackOptions(**options_of(OURS, walk.training, 4)), scene.truth)
     space = Follower(task_of(scene, options, walk.training), UnclusteredPCA().fit(walk.angles), Prediction(tilt="box"))
     first = space.space(scene.observations[0])
     assert first.root_centre[0] == scene.yaw
