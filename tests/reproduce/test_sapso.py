@@ -16,9 +16,10 @@ from posefit.evaluation.measures import BASELINES
 from posefit.fitting.tracker import Follower, Prediction
 from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
+from posefit.tracking.defaults import completed
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
-from posefit.tracking.options import TrackOptions, completed
+from posefit.tracking.options import TrackOptions
 from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Results, Run
