@@ -100,7 +100,7 @@ def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
         return f"no figures of gait: {gait['why']}"
     speed = "" if gait["speed"] is None else f", {gait['speed']:.2f} m/s"
     sides = ", ".join(f"{label} {left} and {right} {unit}" for label, unit, left, right in gait_rows(gait))
-    parts = [f"gait: {gait['cadence']:.0f} steps a minute{speed}, over {gait['steps']} steps"]
+    parts = [f"{'gait: ' if by_side else ''}{gait['cadence']:.0f} steps a minute{speed}, over {gait['steps']} steps"]
     parts += [f"left and right: {sides}"] if by_side else []
     parts += [f"no lengths: {gait['why_no_lengths']}"] if gait["why_no_lengths"] else []
     return "; ".join(parts)
