@@ -153,7 +153,7 @@ def test_errors_are_those_of_poses() -> None:
     joints = replace(test, poses=test.poses + np.eye(1, 66)[0] * np.pi).joints
     expected = nearer_mirrored(test.joints, joints).mean()
     analysis = Analysis(shifted(motions, 180.0, slice(0, 1)), motions)
-    assert analysis.share("swapped", "walk")[0, 0] == expected
+    assert analysis.swapped("walk")[0, 0] == expected
 
 
 def test_a_part_that_is_left_out_is_left_out(walk: PaperMotion) -> None:
