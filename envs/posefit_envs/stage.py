@@ -44,7 +44,7 @@ class Stage:
         bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
         self._width, self._height, self.threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
-        self._chain = body_of(world.motion).skeleton.chain
+        self._chain = body_of(world.motion[0]).skeleton.chain
         self._silhouettes: list[Sequence[Silhouette]] = [()] * rows
         self._scenes = Scenes(
             np.empty((rows, bones, 3)),
