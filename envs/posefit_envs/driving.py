@@ -73,10 +73,11 @@ def drive(
     """Return the minimum of an optimiser that steps `posefit/FitImage-v0`, a single one or a vector.
 
     A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
-    proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the search. Actions are float64, so the result is the library's, bit for bit. With
-    `dtype` numpy.float32, that of the action space, a proposal is rounded to 7 digits; a pixel at a silhouette's edge
-    may then change, and with it the rest of the search. Raises gymnasium.error.Error for another environment, where the
-    budget does not hold one population, and where the environments have several instances: `drive_each` is for those.
+    proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the
+    search. Actions are float64, so the result is the library's, bit for bit. With `dtype` numpy.float32, that of the
+    action space, a proposal is rounded to 7 digits; a pixel at a silhouette's edge may then change, and with it the
+    rest of the search. Raises gymnasium.error.Error for another environment, where the budget does not hold one
+    population, and where the environments have several instances: `drive_each` is for those.
     """
     objective = EnvObjective(env, dtype)
     (space, *_), numbers = objective.begin(seed, instance)
