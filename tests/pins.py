@@ -32,7 +32,6 @@ LABELS = ("kind", "name")  # columns of a row that no result depends on, and tha
 ENVIRONMENTS = (
     ("FitImage", {}),
     ("FitImage", {"noise": {"holes": 0.3, "shadow": 0.5}}),
-    ("FitState", {}),
     ("Track", {"frames": 4, "evaluations_per_frame": 5}),
     ("Race", {}),
 )

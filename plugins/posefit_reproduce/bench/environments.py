@@ -9,7 +9,7 @@ from posefit_reproduce.bench.kernel import fastest
 
 ENVIRONMENTS = 40
 EPISODE = 40  # steps of a learner's episodes
-ENDLESS: dict[str, Any] = {"max_evaluations": 10**9, "target_cost": -1.0}
+ENDLESS: dict[str, Any] = {"max_evaluations": 10**9}
 # by name: the environment, and its arguments; without an instance each environment has one of its own
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "fit_shared": ("FitImage-v0", ENDLESS | {"instance": 3}),
@@ -18,7 +18,7 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "race_each": ("Race-v0", {"generations": (10**9, 10**9)}),
 }
 LEARNING: dict[str, tuple[str, dict[str, Any]]] = {
-    "fit_learning": ("FitImage-v0", {"max_evaluations": EPISODE, "target_cost": -1.0}),
+    "fit_learning": ("FitImage-v0", {"max_evaluations": EPISODE}),
     "race_learning": ("Race-v0", {"generations": (EPISODE, EPISODE)}),
 }
 
