@@ -47,7 +47,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         truncated = stepping & (self._steps >= self._budget)
         infos = self._progress(self._best, self._steps, last.poses, cost=last.costs, areas=last.areas)
         common = {"instance": self._numbers}
-        return Outcome(last.pictures, -last.costs, np.zeros_like(truncated), infos, common, truncated)
+        return Outcome(last.pictures, -np.log1p(last.costs), np.zeros_like(truncated), infos, common, truncated)
 
     def _render_row(self, i: int, episode: Episode) -> Picture:
         last = self._last
@@ -83,7 +83,8 @@ class FitImageEnv(SearchEnv):
     | 1 | the silhouette of the last proposal; empty before the first |
 
     ## Rewards
-    Minus the cost of the proposal, 0 to 100; SAPSO (4).
+    -ln(1 + cost) of the proposal, whose cost is 0 to 100: SAPSO (4). It needs no normalisation, and as a proposal
+    changes nothing but the next picture, a discount `gamma` of 0 learns fastest.
 
     ## Starting State
     An instance: its number gives the person, the pose, the cadence, the camera, and the guesses. Without

@@ -22,13 +22,14 @@ def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
 
 
 def rollout(env: gym.Env[Any, Any], policy: Policy, instance: int, seed: int) -> dict[str, Any]:
-    """Return the last info of an episode of a policy on an instance, with the sum of its rewards as `gain`."""
+    """Return the last info of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,)."""
     observation, info = env.reset(seed=seed, options={"instance": instance})
-    step, gain, ended, cut = 0, 0.0, False, False
+    actions, rewards, ended, cut = [], [], False, False
     while not (ended or cut):
-        observation, reward, ended, cut, info = env.step(policy(observation, step))
-        step, gain = step + 1, gain + float(reward)
-    return info | {"gain": gain}
+        actions.append(policy(observation, len(actions)))
+        observation, reward, ended, cut, info = env.step(actions[-1])
+        rewards.append(float(reward))
+    return info | {"actions": np.array(actions), "rewards": np.array(rewards)}
 
 
 def race_features(observation: Any) -> tuple[Array, Array]:

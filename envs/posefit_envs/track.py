@@ -65,7 +65,7 @@ class TrackVectorEnv(SearchVectorEnv):
             committed = self._commit(full.nonzero()[0], last)
         infos["frame"] = self._frames.copy()
         common = {"instance": self._numbers, "frame": infos["frame"]}
-        return Outcome(last.pictures, -last.costs, terminated, infos, common, row_infos=committed)
+        return Outcome(last.pictures, -np.log1p(last.costs), terminated, infos, common, row_infos=committed)
 
     def _commit(self, rows: Rows, last: Evaluation) -> dict[int, Infos]:
         """Commit the best proposals of some environments, begin their next frames, and return their infos by row."""
@@ -107,7 +107,7 @@ class TrackEnv(SearchEnv):
     that of the last proposal. The first picture of a frame shows the pose that was committed in the frame before.
 
     ## Rewards
-    Minus the cost of the proposal, 0 to 100; SAPSO (4).
+    -ln(1 + cost) of the proposal, as in `FitImage-v0`.
 
     ## Starting State
     The first frame of an instance, as in `FitImage-v0`.

@@ -1,6 +1,7 @@
 """The environments keep Gymnasium's rules and Stable-Baselines3's, with every warning an error."""
 
 import copy
+import math
 import pickle
 import sys
 from typing import Any
@@ -98,19 +99,20 @@ def test_fit_ends_with_the_budget_and_counts_the_best() -> None:
     ends = [env.step(np.full(9, 0.3 * k, np.float32)) for k in range(3)]
     assert [end[2:4] for end in ends] == [(False, False), (False, False), (False, True)]
     costs = [end[4]["cost"] for end in ends]
-    assert [end[1] for end in ends] == [-cost for cost in costs]
+    assert [end[1] for end in ends] == pytest.approx([-math.log(1.0 + cost) for cost in costs])
     assert [end[4]["best_cost"] for end in ends] == [min(costs[: k + 1]) for k in range(3)]
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
 
 
-def test_the_reward_is_the_mismatch_of_the_two_channels() -> None:
+def test_the_cost_is_the_mismatch_of_the_two_channels() -> None:
     env = gym.make("posefit/FitImage-v0", instance=5, size=(160, 120))
     env.reset(seed=0)
     picture, reward, _, _, info = env.step(np.full(9, 0.1, np.float32))
     observed, body = picture[..., 0] > 0, picture[..., 1] > 0
     r, b, y = (observed & ~body).sum(), (body & ~observed).sum(), (observed & body).sum()
     assert info["areas"].tolist() == [[r, b, y]]
-    assert reward == pytest.approx(-100.0 * (0.5 * b / (b + y) + 0.5 * r / (r + y)))
+    assert info["cost"] == pytest.approx(100.0 * (0.5 * b / (b + y) + 0.5 * r / (r + y)))
+    assert reward == pytest.approx(-math.log(1.0 + info["cost"]))
     assert set(np.unique(picture)) == {0, 255}
 
 
