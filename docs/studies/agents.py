@@ -46,7 +46,11 @@ BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
 CONSTANTS = ("uniform", "the box's middle", "training mean", "the truth, projected")
 LEARNERS = ("cloning", "PPO", "PPO, blank", "cloning, then PPO")
-STARTED, STARTED_BUDGET, STARTED_SPREAD = "PPO, then cma", 200, 0.1  # CMA-ES that starts from the best of PPO's proposals
+STARTED, STARTED_BUDGET, STARTED_SPREAD = (
+    "PPO, then cma",
+    200,
+    0.1,
+)  # CMA-ES that starts from the best of PPO's proposals
 ENVIRONMENTS, ROLLOUT, BATCH, EPOCHS = 64, 16, 256, 6
 LEARNING_RATE, LOG_DEVIATION = 1.5e-3, -1.6
 CLONING_SHARE = 0.2  # of the steps of "cloning, then PPO"
@@ -154,7 +158,7 @@ def trained(training: Training, curve: list[Any]) -> Policy:
         "net_arch": [128],
     }
     model = PPO(
-        "CnnPolicy", vector, seed=training.seed, device="cpu", gamma=0.0, learning_rate=LEARNING_RATE,
+        "CnnPolicy", vector, seed=training.seed, device="cpu", gamma=0.0, learning_rate=lambda left: LEARNING_RATE * left,
         n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS, policy_kwargs=policy_settings,
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 import sys
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -260,3 +261,43 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))
     env.step(np.full(size, -2.0))  # a second warning would be an error
+
+
+def test_gymnasiums_wrappers_and_a_loop_as_in_cleanrl_run_on_it() -> None:
+    from gymnasium.wrappers.vector import ClipAction, NormalizeReward, RecordEpisodeStatistics
+
+    env = gym.make_vec("posefit/FitImage-v0", 4, max_evaluations=3, autoreset_mode="SameStep")
+    env = NormalizeReward(ClipAction(RecordEpisodeStatistics(env)), gamma=0.0)
+    observations, _ = env.reset(seed=1)
+    stored = np.zeros((6, *observations.shape), dtype=observations.dtype)
+    rng, returns = np.random.default_rng(0), []
+    for step in range(6):
+        stored[step] = observations
+        actions = rng.normal(size=env.action_space.shape or ()).astype(np.float32)
+        observations, _, terminated, truncated, infos = env.step(actions)
+        if (done := terminated | truncated).any():
+            assert infos["final_obs"][0].shape == observations[0].shape
+            returns += infos["episode"]["r"][done].tolist()
+    assert len(returns) == 8  # four environments, two episodes each
+    assert max(returns) < 0.0
+    assert stored[:, :, :, :, 0].any()
+
+
+def test_frames_are_stacked_by_gymnasiums_wrappers() -> None:
+    single = gym.wrappers.FrameStackObservation(gym.make("posefit/Track-v0", frames=2), 4)
+    observation, _ = single.reset(seed=0)
+    assert observation.shape == (4, 48, 64, 2)
+    stacked, *_ = single.step(single.action_space.sample())
+    np.testing.assert_array_equal(stacked[:-1], observation[1:])
+
+
+def test_an_episode_is_recorded_as_a_video(tmp_path: Path) -> None:
+    pytest.importorskip("moviepy", reason="needs posefit[rl]")
+    env: Any = gym.make("posefit/FitImage-v0", render_mode="rgb_array", max_evaluations=3)
+    env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.RecordVideo(env, str(tmp_path)))
+    env.reset(seed=0)
+    for _ in range(3):
+        info = env.step(env.action_space.sample())[-1]
+    env.close()
+    assert info["episode"]["l"] == 3
+    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]

@@ -261,3 +261,17 @@ def test_the_package_is_light_to_import() -> None:
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
     assert set(dir(posefit_envs)) >= {"__all__"}
+
+
+def test_the_truth_comes_with_a_training_instance_alone() -> None:
+    vector = gym.make_vec("posefit/FitImage-v0", 3, max_evaluations=2)
+    _, infos = vector.reset(seed=0, options={"instance": [5, 10_005, 6]})
+    assert infos["_truth"].tolist() == [True, False, True]
+    assert not infos["truth"][1].any()
+    single = gym.make("posefit/FitImage-v0", max_evaluations=2)
+    np.testing.assert_array_equal(single.reset(options={"instance": 6})[1]["truth"], infos["truth"][2])
+    assert "truth" not in single.reset(options={"instance": 10_005})[1]
+    cost = single.unwrapped.step(np.zeros(9))[-1]["cost"]
+    for arguments in ({"errors": False}, {"split": "test"}):
+        assert "truth" not in gym.make("posefit/FitImage-v0", **arguments).reset(seed=0)[1]
+    assert vector.step(np.where(infos["_truth"][:, None], infos["truth"], 0.0))[-1]["cost"][1] == cost
