@@ -158,7 +158,8 @@ def trained(training: Training, curve: list[Any]) -> Policy:
         "net_arch": [128],
     }
     model = PPO(
-        "CnnPolicy", vector, seed=training.seed, device="cpu", gamma=0.0, learning_rate=lambda left: LEARNING_RATE * left,
+        "CnnPolicy", vector, seed=training.seed, device="cpu", gamma=0.0,
+        learning_rate=lambda left: LEARNING_RATE * left,
         n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS, policy_kwargs=policy_settings,
     )  # fmt: skip
 
@@ -250,10 +251,8 @@ def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             proposals = f"8 + {budget}"
         cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}" if learns else ""
         equal = [equivalent(blind[name], float(costs.mean())) if not searches else "" for name in SEARCHES]
-        cells.append(
-            [agent, proposals, f"{budget:,}" if learns else "", cpu, str(len(group)), f"{costs.mean():.1f}"]
-            + [f"{low:.1f} to {high:.1f}", *equal]
-        )
+        figures = [proposals, f"{budget:,}" if learns else "", cpu, str(len(group)), f"{costs.mean():.1f}"]
+        cells.append([agent, *figures, f"{low:.1f} to {high:.1f}", *equal])
     heads = ["", "proposals", "steps", "CPU s", "seeds", "cost", "95 % interval", "as SAPSO", "as CMA-ES"]
     yield from markdown(heads, cells)
 

@@ -294,10 +294,10 @@ def test_frames_are_stacked_by_gymnasiums_wrappers() -> None:
 def test_an_episode_is_recorded_as_a_video(tmp_path: Path) -> None:
     pytest.importorskip("moviepy", reason="needs posefit[rl]")
     env: Any = gym.make("posefit/FitImage-v0", render_mode="rgb_array", max_evaluations=3)
-    env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.RecordVideo(env, str(tmp_path)))
+    env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.RecordVideo(env, str(tmp_path / "video")))
     env.reset(seed=0)
     for _ in range(3):
         info = env.step(env.action_space.sample())[-1]
     env.close()
     assert info["episode"]["l"] == 3
-    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
+    assert [path.suffix for path in (tmp_path / "video").iterdir()] == [".mp4"]
