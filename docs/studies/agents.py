@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import click
 import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 
 from posefit import minimise
 from posefit.arrays import Array
@@ -53,11 +54,13 @@ STARTED, STARTED_BUDGET, STARTED_SPREAD = (
 )  # CMA-ES that starts from the best of PPO's proposals
 ENVIRONMENTS, ROLLOUT, BATCH, EPOCHS = 64, 16, 256, 6
 LEARNING_RATE, LOG_DEVIATION = 1.5e-3, -1.6
+SHOWN = (12, 16)  # height and width of the pictures that networks take
+NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
 CLONING_SHARE = 0.2  # of the steps of "cloning, then PPO"
 LOOKS = 6  # at the held-out costs while PPO learns
 CURVE_INSTANCES = 100
 
-Policy = Callable[[Any], Array]  # of pictures (n, height, width, 2 views)
+Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
 
 
 class Training(NamedTuple):
@@ -76,14 +79,17 @@ def check_learners() -> None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
-def made(variant: str, count: int, **arguments: Any) -> Any:
-    """Return a vector environment of a variant."""
-    return gym.make_vec(NAME, count, **VARIANTS[variant], **arguments)
+def made(training: Training, count: int, **arguments: Any) -> Any:
+    """Return a vector environment of a variant with small pictures; the observed ones are blank for a blank agent."""
+    env = ResizeObservation(gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN)
+    channels = np.arange(env.single_observation_space.shape[-1])
+    mask = (channels % 2 if "blank" in training.agent else np.ones_like(channels)).astype(np.uint8)
+    return TransformObservation(env, lambda pictures: pictures * mask)
 
 
-def episodes(policy: Policy, variant: str, count: int, proposals: int = MAX_EVALUATIONS) -> tuple[Array, Array]:
+def episodes(policy: Policy, training: Training, count: int, proposals: int = MAX_EVALUATIONS) -> tuple[Array, Array]:
     """Return the actions (k, n, d) and costs (k, n) of an episode on each of the first held-out instances."""
-    env = made(variant, count, max_evaluations=proposals)
+    env = made(training, count, max_evaluations=proposals)
     pictures, _ = env.reset(seed=0, options={"instance": list(range(HELD_OUT, HELD_OUT + count))})
     actions, costs = [], []
     for _ in range(proposals):
@@ -103,7 +109,7 @@ def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[s
     policy = trained(training, row["curve"]) if learns else constant(training)
     row["cpu_seconds"] = round(process_time() - begun, 1)
     count = MAX_EVALUATIONS if learns or training.agent == "uniform" else 1
-    actions, costs = episodes(policy, training.variant, training.instances, count)
+    actions, costs = episodes(policy, training, training.instances, count)
     row["costs"] = costs.min(axis=0).tolist()
     if learns:
         row |= {"proposals": actions.round(4).tolist(), "proposal_costs": costs.round(2).tolist()}
@@ -112,7 +118,7 @@ def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[s
 
 def constant(training: Training) -> Policy:
     """Return the policy of a reference that does not look."""
-    rng, env = np.random.default_rng(training.seed), made(training.variant, training.instances)
+    rng, env = np.random.default_rng(training.seed), made(training, training.instances)
     d = env.single_action_space.shape[0]
     if training.agent == "uniform":
         return lambda pictures: rng.uniform(-1.0, 1.0, (len(pictures), d))
@@ -127,7 +133,7 @@ def constant(training: Training) -> Policy:
 def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
     """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
     name = "cma" if training.agent == STARTED else training.agent
-    env, factory = made(training.variant, training.instances), registry().optimiser(name)
+    env, factory = made(training, training.instances), registry().optimiser(name)
     env.reset(options={"instance": list(range(HELD_OUT, HELD_OUT + training.instances))})
     few = {"population_size": training.budget} if training.budget < 40 else {}  # one population of sapso
     settings, costs = planned(factory, few, training.budget), []
@@ -147,36 +153,30 @@ def trained(training: Training, curve: list[Any]) -> Policy:
     import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.vec_env import VecTransposeImage
 
     torch.set_num_threads(1)
-    vector = VecTransposeImage(to_sb3_vec_env(made(training.variant, ENVIRONMENTS, errors=False)))
-    policy_settings = {
-        "features_extractor_class": eyes(),
-        "features_extractor_kwargs": {"blank": training.agent == "PPO, blank"},
-        "log_std_init": LOG_DEVIATION,
-        "net_arch": [128],
-    }
+    vector = to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False))
+    policy_settings = {"log_std_init": LOG_DEVIATION, "net_arch": NETWORKS, "activation_fn": torch.nn.ReLU}
     model = PPO(
-        "CnnPolicy", vector, seed=training.seed, device="cpu", gamma=0.0,
+        "MlpPolicy", vector, seed=training.seed, device="cpu", gamma=0.0,
         learning_rate=lambda left: LEARNING_RATE * left,
         n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS, policy_kwargs=policy_settings,
     )  # fmt: skip
 
     def act(pictures: Any) -> Array:
-        return np.asarray(model.predict(pictures.transpose(0, 3, 1, 2), deterministic=True)[0], dtype=np.float64)
+        return np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
 
     begun, clones = process_time(), "cloning" in training.agent
     learning = 0 if training.agent == "cloning" else training.budget
     if clones:
         steps = int(training.budget * CLONING_SHARE) if learning else training.budget
-        cloned(model, made(training.variant, ENVIRONMENTS), steps)
+        cloned(model, made(training, ENVIRONMENTS), steps)
         learning -= steps if learning else 0
 
     class Looking(BaseCallback):  # type: ignore[misc]
         def _on_rollout_start(self) -> None:
             if self.num_timesteps >= learning * len(curve) // LOOKS:
-                cost = episodes(act, training.variant, CURVE_INSTANCES)[1].min(axis=0).mean()
+                cost = episodes(act, training, CURVE_INSTANCES)[1].min(axis=0).mean()
                 curve.append([training.budget - learning + self.num_timesteps, cost, process_time() - begun])
 
         def _on_step(self) -> bool:
@@ -185,27 +185,6 @@ def trained(training: Training, curve: list[Any]) -> Policy:
     if learning:
         model.learn(learning, callback=Looking())
     return act
-
-
-def eyes() -> type:
-    """Return the class of the features: pictures of half the size, and one layer; `blank` hides what was observed."""
-    import torch
-    from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-    from torch import nn
-
-    class Eyes(BaseFeaturesExtractor):  # type: ignore[misc]
-        def __init__(self, space: Any, blank: bool) -> None:
-            super().__init__(space, 256)
-            channels, height, width = space.shape
-            size = channels * (height // 2) * (width // 2)
-            self.net = nn.Sequential(nn.AvgPool2d(2), nn.Flatten(), nn.Linear(size, 256), nn.ReLU())
-            shown = torch.arange(channels) % 2 if blank else torch.ones(channels)
-            self.register_buffer("shown", shown.float().view(1, -1, 1, 1))
-
-        def forward(self, pictures: Any) -> Any:
-            return self.net(pictures * self.shown)
-
-    return Eyes
 
 
 def cloned(model: Any, env: Any, steps: int) -> None:
@@ -217,7 +196,7 @@ def cloned(model: Any, env: Any, steps: int) -> None:
     for _ in range(steps // length):
         shown, targets = [], []
         for _ in range(ROLLOUT):
-            shown.append(pictures.transpose(0, 3, 1, 2))
+            shown.append(pictures)
             targets.append(truths.copy())
             pictures, _, _, _, infos = env.step(np.clip(model.predict(shown[-1])[0], -1.0, 1.0))
             if "truth" in infos:
