@@ -56,7 +56,7 @@ ENVIRONMENTS, ROLLOUT, BATCH, EPOCHS = 64, 16, 256, 6
 LEARNING_RATE, LOG_DEVIATION = 1.5e-3, -1.6
 SHOWN = (12, 16)  # height and width of the pictures that networks take
 NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
-CLONING_SHARE = 0.2  # of the steps of "cloning, then PPO"
+CLONING_STEPS, CLONED_LOG_DEVIATION = 30_720, -2.3  # before PPO goes on, from where it draws nearer to the means
 LOOKS = 6  # at the held-out costs while PPO learns
 CURVE_INSTANCES = 100
 
@@ -166,12 +166,12 @@ def trained(training: Training, curve: list[Any]) -> Policy:
     def act(pictures: Any) -> Array:
         return np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
 
-    begun, clones = process_time(), "cloning" in training.agent
-    learning = 0 if training.agent == "cloning" else training.budget
-    if clones:
-        steps = int(training.budget * CLONING_SHARE) if learning else training.budget
+    begun, learning = process_time(), training.budget
+    if "cloning" in training.agent:
+        steps = min(CLONING_STEPS, training.budget)
         cloned(model, made(training, ENVIRONMENTS), steps)
-        learning -= steps if learning else 0
+        model.policy.log_std.data.fill_(CLONED_LOG_DEVIATION)
+        learning -= steps
 
     class Looking(BaseCallback):  # type: ignore[misc]
         def _on_rollout_start(self) -> None:
@@ -291,7 +291,11 @@ def main(
     for variant in names or ("walks",):
         turns += [Training(variant, agent, 0, 0, instances) for agent in CONSTANTS]
         turns += [Training(variant, agent, budget, 0, instances) for agent in SEARCHES for budget in BUDGETS]
-        turns += [Training(variant, one, steps, seed, instances) for seed in range(seeds) for one in agents or LEARNERS]
+        turns += [
+            Training(variant, name, min(steps, CLONING_STEPS) if name == "cloning" else steps, seed, instances)
+            for seed in range(seeds)
+            for name in agents or LEARNERS
+        ]
     done = earlier(rows, turn_of)
     jobs = {turn: partial(row_of, turn) for turn in turns if turn not in done}
     done |= each(jobs, workers, partial(kept, rows)) if jobs else {}

@@ -3,6 +3,7 @@
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from posefit import SearchSpace
+from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.fitting.check import one_of, whole
 from posefit.fitting.exchange import exchanged
@@ -127,7 +128,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._ended = np.zeros(num_envs, dtype=bool)
         self._numbers = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._episodes: dict[int, Episode] = {}
+        self._episodes: dict[int, Episode | partial[Episode]] = {}  # those that nobody asked for are not made
         self._truths = np.empty((num_envs, ANGLES))
 
     @property  # type: ignore[misc]
@@ -144,14 +145,13 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     @property
     def episodes(self) -> list[Episode]:
         """What each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        if len(self._episodes) < self.num_envs:
-            raise error.ResetNeeded(NOT_BEGUN)
-        return [self._episodes[i] for i in range(self.num_envs)]
+        self._check_begun()
+        return [self._episode(i) for i in range(self.num_envs)]
 
     @property
-    def search_spaces(self) -> list[SearchSpace]:
-        """The space that each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [episode.problem.space for episode in self.episodes]
+    def problems(self) -> list[PoseProblem]:
+        """The problem of each environment's proposals. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return [episode.problem for episode in self.episodes]
 
     def render(self) -> Any:
         """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
@@ -180,7 +180,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
         """Step each environment; one whose episode has ended resets instead, or at once by SAME_STEP."""
         actions = self._validator.check(actions, self._shape)
-        assert self.episodes
+        self._check_begun()
         stepping = ~self._ended
         for i in np.flatnonzero(self._ended).tolist():
             self._begin(i, None)
@@ -218,6 +218,17 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         if i not in self._generators:
             self._generators[i] = seeding.np_random(None)
         return self._generators[i][0]
+
+    def _check_begun(self) -> None:
+        if len(self._episodes) < self.num_envs:
+            raise error.ResetNeeded(NOT_BEGUN)
+
+    def _episode(self, i: int) -> Episode:
+        """Return what environment i searches."""
+        episode = self._episodes[i]
+        if isinstance(episode, partial):
+            episode = self._episodes[i] = episode()
+        return episode
 
     def _enter(self, i: int, episode: Episode) -> None:
         self._episodes[i] = episode
@@ -282,9 +293,9 @@ class SearchEnv(Env[Any, Any]):
         return self._vector.episodes[0].instance
 
     @property
-    def search_space(self) -> SearchSpace:
-        """The space that is searched. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return self._vector.episodes[0].problem.space
+    def problem(self) -> PoseProblem:
+        """The problem that proposals are evaluated on. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return self._vector.episodes[0].problem
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Infos]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""

@@ -40,8 +40,8 @@ class EnvObjective:
         """Reset with an instance for all or each, or with random ones; return what each searches, and their numbers."""
         self._instances = self._env.reset(seed=seed, options={"instance": instance})[1]["instance"]
         bare = self._bare
-        spaces = [bare.search_space] if isinstance(bare, FitImageEnv) else bare.search_spaces
-        return spaces, np.atleast_1d(self._instances).tolist()
+        problems = [bare.problem] if isinstance(bare, FitImageEnv) else bare.problems
+        return [problem.space for problem in problems], np.atleast_1d(self._instances).tolist()
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""

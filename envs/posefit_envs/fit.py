@@ -1,16 +1,16 @@
 """FitImage-v0: one silhouette and few proposals of a pose; what is observed are pictures."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
 from posefit_envs.instance import Episode, Image, checked, first_episode, is_held_out
 from posefit_envs.rendering import Picture, render_frame
-from posefit_envs.stage import Evaluation, Rows
+from posefit_envs.stage import Evaluation, Rows, prepared
 
 MAX_EVALUATIONS = 8
 
@@ -25,13 +25,10 @@ class FitImageVectorEnv(SearchVectorEnv):
         self._best = np.full(num_envs, np.inf)
         self._last: Evaluation | None = None
 
-    @property
-    def problems(self) -> list[PoseProblem]:
-        """The problem that each environment's proposals are evaluated on."""
-        return [episode.problem for episode in self.episodes]
-
     def _begin_search(self, i: int, number: int) -> None:
-        self._enter(i, first_episode(self.world, number, self._budget))
+        values, self._truths[i] = prepared(self.world, number, self._budget)
+        self._stage.set_values(i, values)
+        self._episodes[i] = partial(first_episode, self.world, number, self._budget)
         self._best[i] = np.inf
 
     def _opened(self, begun: Flags) -> tuple[Image, Infos]:
@@ -39,7 +36,7 @@ class FitImageVectorEnv(SearchVectorEnv):
 
     def _begun_infos(self, i: int) -> Infos:
         hidden = is_held_out(int(self._numbers[i])) or not self.world.errors
-        return {} if hidden else {"truth": self._episodes[i].truth}
+        return {} if hidden else {"truth": self._episode(i).truth}
 
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
         last = self._last = self._stage.evaluate(actions, rows)

@@ -264,12 +264,6 @@ class Episode:
         return space.proposals(np.concatenate([pose[:3], searched, latents]))
 
 
-def backdrop(silhouettes: Sequence[Silhouette]) -> NDArray[np.uint16]:
-    """Return the picture (height, width, views) of silhouettes into which bodies are drawn."""
-    masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
-    return masks.astype(np.uint16) * np.uint16(OBSERVED)
-
-
 def first_episode(world: World, number: int, evaluations: int, frames: int = 1) -> Episode:
     """Return the search for the first frame's pose of an instance."""
     made = instance(world, number, frames, evaluations)

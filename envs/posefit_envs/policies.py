@@ -24,7 +24,8 @@ def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
 def rollout(env: gym.Env[Any, Any], policy: Policy, instance: int, seed: int) -> dict[str, Any]:
     """Return the last info of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,)."""
     observation, info = env.reset(seed=seed, options={"instance": instance})
-    actions, rewards, ended, cut = [], [], False, False
+    actions: list[Array] = []
+    rewards, ended, cut = [], False, False
     while not (ended or cut):
         actions.append(policy(observation, len(actions)))
         observation, reward, ended, cut, info = env.step(actions[-1])

@@ -72,7 +72,7 @@ class RaceVectorEnv(SearchVectorEnv):
 
     def _begin_another(self, i: int, search: int) -> None:
         """Begin another search in the place of one of an environment's."""
-        space, rng = self._episodes[i].problem.space, np.random.default_rng(int(self._rngs[i].integers(2**63)))
+        space, rng = self._episode(i).problem.space, np.random.default_rng(int(self._rngs[i].integers(2**63)))
         self._searches[i][search] = checked(lambda: self._factory(space, rng, **self._settings))
         self._best_costs[i, search] = self._costs[i, search] = np.inf
         self._slopes[i, search], self._used[i, search] = MAX_SLOPE, 0

@@ -73,7 +73,7 @@ class TrackVectorEnv(SearchVectorEnv):
         last.poses[rows], last.translations[rows] = poses[rows, 0], places[rows, 0]
         infos, entered = {}, []
         for i in rows.tolist():
-            made, frame, best = self.episodes[i].instance, int(self._frames[i]), float(self._best[i])
+            made, frame, best = self._episode(i).instance, int(self._frames[i]), float(self._best[i])
             infos[i] = committed_infos(made, frame, poses[i, 0], places[i, 0], best, self.world.errors)
             self._followers[i].commit(self._best_proposals[i])
             if frame + 1 < self._frame_count:

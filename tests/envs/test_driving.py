@@ -1,5 +1,6 @@
 """Optimisers search one environment or many, whatever the size of a population and the end of an episode."""
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -7,11 +8,12 @@ import numpy as np
 import pytest
 from gymnasium import error
 
-from posefit import minimise
+from posefit import Start, minimise
 from posefit.registry import registry
 from posefit.settings import planned
 from posefit_envs import drive, drive_each, track_reference
 from posefit_envs.instance import first_episode, world_of
+from posefit_envs.policies import rollout
 from tests.cases import each
 
 
@@ -40,6 +42,19 @@ def test_each_environment_has_its_instance_and_its_search() -> None:
         np.testing.assert_array_equal(minimum.trace, expected.trace)
         np.testing.assert_array_equal(minimum.proposal, expected.proposal)
         assert minimum.evaluations == expected.evaluations
+
+
+def test_a_search_starts_from_the_proposals_of_a_policy() -> None:
+    env: Any = gym.make("posefit/FitImage-v0", instance=3)
+    truth = env.reset(seed=0)[1]["truth"]
+    episode = rollout(env, lambda _, step: truth * step / 7.0, 3, seed=0)
+    assert episode["actions"].shape == (8, 9)
+    best = episode["actions"][episode["rewards"].argmax()]
+    assert env.unwrapped.problem.evaluate(best[None])[0] == episode["best_cost"]
+    start = Start(best, np.full(9, 1e-3), np.zeros(9))
+    space = replace(env.unwrapped.problem.space, start=start)
+    search = registry().optimiser("cma")(space, np.random.default_rng(0))
+    assert minimise(env.unwrapped.problem.evaluate, search, 10).cost < 2.0 * episode["best_cost"]
 
 
 def test_what_cannot_be_driven_is_named() -> None:

@@ -10,7 +10,7 @@ from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.silhouette.cost import project
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
-from posefit_envs.instance import SPLITS, Episode, backdrop, first_episode, instance, world_of
+from posefit_envs.instance import SPLITS, Episode, first_episode, instance, world_of
 from posefit_envs.stage import Stage
 from tests.cases import each
 
@@ -112,8 +112,8 @@ def test_rows_that_are_left_out_show_nothing_proposed() -> None:
     stage, episodes = staged((3, 17))
     for rows in (np.array([1]), np.array([], dtype=np.int64)):
         evaluation = stage.evaluate(np.zeros((2, 9)), rows)
-        picture = backdrop(episodes[0].problem.silhouettes).view(np.uint8)
-        np.testing.assert_array_equal(evaluation.pictures[0], picture)
+        mask = episodes[0].problem.silhouettes[0].mask
+        np.testing.assert_array_equal(evaluation.pictures[0], np.stack([255 * mask, 0 * mask], axis=-1))
         assert not evaluation.areas[0].any()
         assert evaluation.areas[1].any() == bool(len(rows))
 

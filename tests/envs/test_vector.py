@@ -239,11 +239,11 @@ def test_stable_baselines3_chooses_environments_by_indices() -> None:
     vector = gym.make_vec("posefit/Race-v0", num_envs=3, render_mode="rgb_array")
     adapted = to_sb3_vec_env(vector)
     adapted.reset()
-    spaces = vector.unwrapped.search_spaces  # type: ignore[attr-defined]
+    problems = vector.unwrapped.problems  # type: ignore[attr-defined]
     assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
     for indices, rows in ((None, [0, 1, 2]), (1, [1]), ([2, 0], [2, 0])):
-        chosen = adapted.get_attr("search_spaces", indices)
-        assert [space.centre.tolist() for space in chosen] == [spaces[row].centre.tolist() for row in rows]
+        chosen = adapted.get_attr("problems", indices)
+        assert chosen == [problems[row] for row in rows]
     np.testing.assert_array_equal(adapted.env_method("render"), np.array(vector.render()))
     adapted.set_attr("note", "common")
     assert adapted.get_attr("note") == ["common"] * 3
