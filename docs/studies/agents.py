@@ -59,6 +59,7 @@ NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layer
 CLONING_STEPS, CLONED_LOG_DEVIATION = 30_720, -2.3  # before PPO goes on, from where it draws nearer to the means
 LOOKS = 6  # at the held-out costs while PPO learns
 CURVE_INSTANCES = 100
+WHITE = (255, 255, 255)
 
 Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
 
@@ -201,7 +202,7 @@ def cloned(model: Any, env: Any, steps: int) -> None:
             pictures, _, _, _, infos = env.step(np.clip(model.predict(shown[-1])[0], -1.0, 1.0))
             if "truth" in infos:
                 truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
-        inputs = torch.as_tensor(np.concatenate(shown))
+        inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
         answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
         for rows in [part for _ in range(EPOCHS) for part in torch.randperm(length).split(BATCH)]:
             means = model.policy.get_distribution(inputs[rows]).distribution.mean
@@ -212,39 +213,40 @@ def cloned(model: Any, env: Any, steps: int) -> None:
 
 def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the table of a variant's rows: mean costs, and the evaluations that blind searches need for the same."""
-    blind = {
-        name: {row["budget"]: [] for row in rows if row["agent"] == name and row["budget"] >= 40} for name in SEARCHES
-    }
-    groups: dict[tuple[str, int], list[Mapping[str, Any]]] = {}
+    groups: dict[str, dict[int, list[Mapping[str, Any]]]] = {}
     for row in rows:
-        groups.setdefault((row["agent"], row["budget"]), []).append(row)
-        if row["budget"] in blind.get(row["agent"], {}):
-            blind[row["agent"]][row["budget"]].append(np.mean(row["costs"]))
+        groups.setdefault(row["agent"], {}).setdefault(row["budget"], []).append(row)
+    blind = {
+        name: {budget: float(np.mean([row["costs"] for row in group])) for budget, group in groups[name].items()}
+        for name in SEARCHES
+    }
     cells = []
-    for (agent, budget), group in groups.items():
+    for agent, budgets in groups.items():
+        if agent in SEARCHES:
+            proposals, cost = "; ".join(f"{n:,}" for n in budgets), "; ".join(f"{c:.1f}" for c in blind[agent].values())
+            cells.append([agent, proposals, "", "", "", cost, "", "", ""])
+            continue
+        ((budget, group),) = budgets.items()
         costs = np.array([row["costs"] for row in group])
+        proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(agent, "8" if agent in LEARNERS else "1")
+        steps, cpu = f"{budget:,}", f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
+        training = [steps, cpu, str(len(group))] if agent in LEARNERS else ["", "", ""]
         low, high = interval(costs)
-        learns, searches = agent in LEARNERS, agent in SEARCHES
-        proposals = str(budget) if searches else "8" if learns or agent == "uniform" else "1"
-        if agent == STARTED:
-            proposals = f"8 + {budget}"
-        cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}" if learns else ""
-        equal = [equivalent(blind[name], float(costs.mean())) if not searches else "" for name in SEARCHES]
-        figures = [proposals, f"{budget:,}" if learns else "", cpu, str(len(group)), f"{costs.mean():.1f}"]
-        cells.append([agent, *figures, f"{low:.1f} to {high:.1f}", *equal])
+        equal = [equivalent(blind[name], float(costs.mean())) for name in SEARCHES]
+        cells.append([agent, proposals, *training, f"{costs.mean():.1f}", f"{low:.1f} to {high:.1f}", *equal])
     heads = ["", "proposals", "steps", "CPU s", "seeds", "cost", "95 % interval", "as SAPSO", "as CMA-ES"]
     yield from markdown(heads, cells)
 
 
-def equivalent(blind: Mapping[int, Sequence[float]], cost: float) -> str:
-    """Return how many evaluations a blind search needs for a mean cost, by its logarithm between those measured."""
-    budgets = sorted(blind)
-    means = np.array([np.mean(blind[budget]) for budget in budgets])
-    if not budgets or cost > means[0]:
-        return f"< {budgets[0]}" if budgets else ""
-    if cost < means[-1]:
-        return f"> {budgets[-1]:,}"
-    return f"{np.exp(np.interp(-cost, -means, np.log(budgets))):,.0f}"
+def equivalent(blind: Mapping[int, float], cost: float) -> str:
+    """Return how many evaluations a blind search needs for a mean cost, by its logarithm between those measured.
+
+    The costs of a search are those after so many evaluations, which rise nowhere.
+    """
+    budgets, costs = np.array(list(blind)), -np.minimum.accumulate(list(blind.values()))
+    if not -costs[-1] <= cost <= -costs[0]:
+        return f"< {budgets[0]}" if cost > -costs[0] else f"> {budgets[-1]:,}"
+    return f"{np.exp(np.interp(-cost, costs, np.log(budgets))):,.0f}"
 
 
 def interval(costs: Array) -> tuple[float, float]:
@@ -257,20 +259,20 @@ def interval(costs: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def picture(row: Mapping[str, Any], path: str, instance: int = 0) -> None:
-    """Write the picture of a row's eight proposals for one of the held-out instances."""
+def picture(row: Mapping[str, Any], path: str) -> None:
+    """Write the picture of a row's eight proposals, with their costs, where their best cost is the median."""
     import cv2
 
+    instance = int(np.argsort(row["costs"])[row["instances"] // 2])
     env = gym.make(NAME, **VARIANTS[row["variant"]], render_mode="rgb_array")
     env.reset(options={"instance": HELD_OUT + instance})
     panels = []
     for proposals in row["proposals"]:
         info = env.step(np.array(proposals[instance]))[-1]
-        panel = np.ascontiguousarray(np.asarray(env.render())[:240, :320])
-        cv2.putText(panel, f"{info['cost']:.1f}", (8, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.9, (0, 0, 0), 2, cv2.LINE_AA)
-        panels.append(cv2.resize(panel, (160, 120), interpolation=cv2.INTER_AREA))
-    grid = np.vstack([np.hstack(panels[:4]), np.hstack(panels[4:])])
-    cv2.imwrite(path, grid[..., ::-1])
+        panel = np.ascontiguousarray(np.asarray(env.render())[:240, 80:240])
+        cv2.putText(panel, f"{info['cost']:.1f}", (8, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, WHITE, 2, cv2.LINE_AA)
+        panels.append(panel)
+    cv2.imwrite(path, np.hstack(panels)[..., ::-1])
 
 
 @click.command(cls=Command, help=__doc__)

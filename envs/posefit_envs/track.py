@@ -122,8 +122,10 @@ class TrackEnv(SearchEnv):
     then the next one. A reset gives `instance` and `frame`.
 
     ## Arguments
-    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `target_cost` and
-    `max_evaluations`.
+    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `max_evaluations`.
+
+    ## Version History
+    - v0: not released yet; until then a version changes without a number.
     """
 
     vector = TrackVectorEnv

@@ -292,7 +292,6 @@ def test_frames_are_stacked_by_gymnasiums_wrappers() -> None:
 
 
 def test_an_episode_is_recorded_as_a_video(tmp_path: Path) -> None:
-    pytest.importorskip("moviepy", reason="needs posefit[rl]")
     env: Any = gym.make("posefit/FitImage-v0", render_mode="rgb_array", max_evaluations=3)
     env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.RecordVideo(env, str(tmp_path / "video")))
     env.reset(seed=0)
