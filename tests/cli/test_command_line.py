@@ -1,6 +1,5 @@
 """What a user types, and what comes back: results, files, and one line for every mistake."""
 
-import csv
 import json
 import os
 import re
@@ -26,7 +25,7 @@ from posefit.motion.asf import write_asf
 from posefit_priors.pca import PCA
 from tests.cases import each
 from tests.commands import error_of, printed, run
-from tests.files import arrays
+from tests.files import arrays, csv_rows
 from tests.geometry.turns import about
 from tests.motion.rigs import STYLES, write_rig
 from tests.plugins.test_registry import point, registering
@@ -88,8 +87,7 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
     difference = (again.poses - stored["poses"] + np.pi) % (2 * np.pi) - np.pi
     np.testing.assert_allclose(difference, 0.0, atol=1e-8)
     np.testing.assert_allclose(again.translations, stored["translations"], atol=1e-9)
-    with (out / "frames.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(out / "frames.csv")
     assert len(rows) == 5
     summary = json.loads((out / "summary.json").read_text())
     assert np.mean([float(row["error_degrees"]) for row in rows]) == pytest.approx(summary["error_degrees"]["mean"])
@@ -122,7 +120,7 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     assert summary["frames"] == 1
     fit = posefit.fit("walk", frame=7, evaluations=50, size=(120, 90))
     np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
-    assert fit.trace.shape[1] == 2
+    assert fit.frame.trace.shape[1] == 2
 
 
 def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,8 +163,7 @@ def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(t
     assert unit.startswith(f"{path}: lengths are taken for centimetres")
     assert axis == f"{path}: z is taken to be up, as the person stands along it; --up sets it"
     for name in ("frames.csv", "angles.csv"):
-        with (out / name).open(newline="") as file:
-            rows = list(csv.DictReader(file))
+        rows = csv_rows(out / name)
         assert [int(float(row["frame"])) for row in rows] == [5, 6, 7]
         assert [float(row["seconds"]) for row in rows] == pytest.approx([5 / 30, 6 / 30, 7 / 30], abs=1e-3)
     assert arrays(out / "poses.npz")["frames"].tolist() == [5, 6, 7]
@@ -207,7 +204,9 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(out)
     force = ["track", "walk", "--frames", "0:2", "--force", *QUICK, "--out"]
-    assert "link: expected a folder to write to, got a link" in error_of(*force, link)
+    (tmp_path / "nowhere").symlink_to(tmp_path / "nothing")
+    for path in (link, tmp_path / "nowhere"):
+        assert f"{path.name}: expected a folder to write to, got a link" in error_of(*force, path)
     before = sorted(path.name for path in out.iterdir())
     (out / "precious.txt").write_text("mine")
     assert "got one with precious.txt, which is none of posefit's" in error_of(*force, out)
@@ -365,6 +364,8 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
         (["plugins", "check"], "check", "posefit check"),
         (["plugins", "docter"], "docter", "posefit plugins doctor"),
         (["suite", "rn"], "rn", "posefit suite run"),
+        (["optimizers"], "optimizers", "posefit plugins"),
+        (["segmenter"], "segmenter", "posefit plugins"),
     ):
         assert error_of(*words) == f"posefit: No such command {name!r}; did you mean {path!r}?"
     assert error_of("zebra") == "posefit: No such command 'zebra'"
