@@ -42,11 +42,11 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "damaged masks": {"noise": {"holes": 0.3, "shadow": 0.5}},
     "another body": {"mismatch_percent": 10.0},
 }
-INSTANCES, SEEDS, STEPS = 200, 3, 300_000
+INSTANCES, SEEDS, STEPS = 200, 3, 270_000
 BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
 SEARCHES = ("sapso", "cma")
 CONSTANTS = ("uniform", "the box's middle", "training mean", "the truth, projected")
-LEARNERS = ("cloning", "PPO", "PPO, blank", "cloning, then PPO")
+LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
 STARTED, STARTED_BUDGET, STARTED_SPREAD = (
     "PPO, then cma",
     200,
