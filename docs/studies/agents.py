@@ -21,6 +21,7 @@ from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
+from posefit.errors import InputError
 from posefit.fitting.box import Start
 from posefit.registry import registry
 from posefit.settings import planned
@@ -289,6 +290,8 @@ def main(
     rows: str | None, drawn: str | None, workers: int | None,
 ) -> None:  # fmt: skip
     check_learners()
+    if drawn is not None and "PPO" not in (agents or LEARNERS):
+        raise InputError("--picture must come with the agent PPO")
     turns = []
     for variant in names or ("walks",):
         turns += [Training(variant, agent, 0, 0, instances) for agent in CONSTANTS]
