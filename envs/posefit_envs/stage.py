@@ -64,7 +64,7 @@ def prepared(world: World, number: int, evaluations: int) -> tuple[tuple[NDArray
     return (_prepared if remembers else _prepared.__wrapped__)(world, number, evaluations)
 
 
-@lru_cache(maxsize=SPLITS["test"][0])
+@lru_cache(maxsize=SPLITS["train"][1])
 def _prepared(world: World, number: int, evaluations: int) -> tuple[tuple[NDArray[Any], ...], Array]:
     episode = first_episode(world, number, evaluations)
     return values_of(episode.problem), episode.instance.truth.poses[0]
