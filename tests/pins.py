@@ -30,9 +30,8 @@ EXPORTS = ("*.amc", "*.asf", "*.bvh", "*.c3d", "*.glb", "*.mot", "*.osim", "*.tr
 TIMES = ("version", "key", "seconds", "_ms", "ms_", "cpu", "wall")  # in the names of columns that are left out
 LABELS = ("kind", "name")  # columns of a row that no result depends on, and that were not there at first
 ENVIRONMENTS = (
-    ("FitImage", {}),
-    ("FitImage", {"noise": {"holes": 0.3, "shadow": 0.5}}),
-    ("FitState", {}),
+    ("FitImage", {"max_evaluations": 12}),
+    ("FitImage", {"max_evaluations": 12, "noise": {"holes": 0.3, "shadow": 0.5}}),
     ("Track", {"frames": 4, "evaluations_per_frame": 5}),
     ("Race", {}),
 )
