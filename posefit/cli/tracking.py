@@ -5,11 +5,12 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 import click
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options
+from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options, track_flags
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
@@ -109,12 +110,17 @@ def _print(
 @options(EXTRACTION)
 @click.option("--set", "settings", multiple=True, metavar="[NAME.]SETTING=VALUE", help="Of the segmenter; repeatable.")
 @FRAMES
+@options(track_flags("person"))
 @JSON
-def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:
+def extract(
+    video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], person: Any, **options: Any
+) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
+    from posefit.footage.segmentation import Extraction
 
     how = extraction_of(options, video, settings)
+    how = replace(how or Extraction(), person=person)
     result = run(video, out, how, frames=frames, progress=progress)
     if result["guesses"]:
         say(f"guessed: {'; '.join(result['guesses'])}")

@@ -1,15 +1,16 @@
 """Masks from elsewhere made clean: inverted ones are turned round, holes filled, one person of several is followed."""
 
-from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array
 from posefit.errors import InputError
-from posefit.footage.masks import PackedMasks
+from posefit.footage.masks import PackedMasks, empty_planes
+from posefit.footage.people import Choice, People, planes_of
+from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import HOLE, NEAR, PIECE, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 
@@ -17,51 +18,58 @@ INVERSION_FRAMES = 40  # masks by which it is decided whether they are inverted
 BORDER_SHARE = 0.5  # of the image's border: a person covers no more of it
 RIVAL_AREA = 0.4  # of the largest person's area: something so large may be another person
 ABOVE_GAP = 0.3  # of the height of both: parts of a person that stand above each other are no farther apart
-MERGED_AREA = 1.5  # times the typical area: two people who touch
-MEMORY = 0.8  # of the last step and area that is kept with each frame
 CUT_SHOWN = 0.5  # of the person's area: where the picture's edge leaves less of it, there is too little to search
-LEAP = 1.0  # times the height: farther than a person goes in a frame
 
 
-def cleaned(masks: PackedMasks, name: object, holes: float | None = None) -> tuple[PackedMasks, list[str]]:
+def cleaned(
+    masks: PackedMasks, name: object, holes: float | None = None, choice: Choice | None = None
+) -> tuple[PackedMasks, list[str]]:
     """Return the masks of one person, and warnings; the bits of `masks` are overwritten.
 
-    The largest person of the first frame that shows one is followed, then the nearest to their last place. Frames that
-    show no person before a background are not usable, nor are those in which the picture's edge leaves only a little
-    of the person. Holes of at most the share `holes` of the person are filled. Raises InputError naming the first mask
-    where no frame shows a person.
+    Of several people `choice` is followed, see `People.chosen`; the pixels of the others are unknown. Frames that show
+    no person before a background are not usable, nor are those in which the picture's edge leaves only a little of the
+    person. Holes of at most the share `holes` of the person are filled. Raises InputError naming the first mask where
+    no frame shows a person.
     """
     warnings = []
     inverted = _is_inverted(masks)
     if inverted:
         warnings.append(f"{name}: most of the border is marked, so that the masks seem inverted: they are turned round")
-    usable, crowded, follower = np.zeros(len(masks), dtype=bool), 0, _Follower()
-    areas, cut = np.zeros(len(masks)), np.zeros(len(masks), dtype=bool)
-    for k in range(len(masks)):
+
+    def silhouette_of(k: int) -> Silhouette:
         silhouette = masks.silhouette(k)
-        if inverted:
-            silhouette = Silhouette.of(~silhouette.mask, silhouette.valid)
+        return Silhouette.of(~silhouette.mask, silhouette.valid) if inverted else silhouette
+
+    usable, people = np.zeros(len(masks), dtype=bool), People(masks.fps or FPS)
+    for k in range(len(masks)):
+        silhouette = silhouette_of(k)
         mask = silhouette.mask
         usable[k] = masks.usable[k] and mask.any() and (mask != silhouette.valid).any()
-        if usable[k]:
-            people = people_in(silhouette)
-            crowded += len(people) > 1
-            mask = people[follower.next(people, masks.names[k])]
-            mask = without_holes(mask, HOLE if holes is None else holes) & silhouette.valid
-            areas[k], cut[k] = mask.sum(), touches_border(mask)
-        else:
-            follower.skip()
-        masks.masks[k] = np.packbits(mask)
+        people.add(people_in(silhouette) if usable[k] else [])
     if not usable.any():
-        came = "one without background" if masks.silhouette(0).mask.any() else "an empty one"
+        came = "one without background" if silhouette_of(0).mask.any() else "an empty one"
         rest = f" first, and no other in {len(masks)}" if len(masks) > 1 else ""
         raise InputError(f"{masks.names[0]}: expected a mask with a person before a background, got {came}{rest}")
-    if crowded:
-        leaps = f", which leaps at {follower.leap}: look there" if follower.leap else ""
-        warnings.append(
-            f"{name}: several people in {crowded} of {len(masks)} masks; the largest of the first is followed, then "
-            f"the nearest to the last{leaps}"
-        )
+    parts, words = people.chosen(choice, lambda frame: Path(masks.names[frame]).name)
+    if words:
+        warnings.append(f"{name}: {words}")
+        known = empty_planes(len(masks), masks.size) if masks.valid is None else masks.valid
+        known[:] = 255 if masks.valid is None else known
+        masks = replace(masks, valid=known)
+    others = [one for person in people.persons() for one in person if one not in parts]
+    areas, cut = np.zeros(len(masks)), np.zeros(len(masks), dtype=bool)
+    for k in range(len(masks)):
+        silhouette = silhouette_of(k)
+        mask, valid = silhouette.mask, silhouette.valid
+        if usable[k]:
+            mask = people_in(silhouette)[0]
+            if words:
+                mask, valid = planes_of(parts, others, k, silhouette.valid)
+            mask = without_holes(mask, HOLE if holes is None else holes) & valid
+            usable[k], areas[k], cut[k] = mask.any(), mask.sum(), touches_border(mask)
+        masks.masks[k] = np.packbits(mask)
+        if words and masks.valid is not None:
+            masks.valid[k] = np.packbits(valid)
     whole = np.flatnonzero(usable & ~cut)
     for frame in np.flatnonzero(usable & cut) if len(whole) else ():
         usable[frame] = areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
@@ -118,39 +126,3 @@ def _is_one_person(first: NDArray[np.int32], second: NDArray[np.int32], distance
     between = top.max() - (top + tall).min()
     whole = (top + tall).max() - top.min()
     return bool(across >= 0.5 * wide.min() and 0 <= between <= ABOVE_GAP * whole)
-
-
-class _Follower:
-    """Follows one person by their last place and step; while two people touch, the step goes on."""
-
-    def __init__(self) -> None:
-        self.leap = ""  # the first mask in which the person is farther away than a person goes
-        self._place: Array | None = None
-        self._step, self._area, self._frames = np.zeros(2), 0.0, 1
-
-    def next(self, people: Sequence[Mask], name: str) -> int:
-        """Return the index of the person among the people of the next frame."""
-        moments = [cv2.moments(mask.astype(np.uint8), binaryImage=True) for mask in people]
-        places = np.array([(m["m01"], m["m10"]) for m in moments]) / [[m["m00"]] for m in moments]
-        expected = places[0] if self._place is None else self._place + self._frames * self._step
-        index = int(np.linalg.norm(places - expected, axis=1).argmin())
-        area = float(moments[index]["m00"])
-        if self._place is not None and area > MERGED_AREA * self._area:
-            self.skip()
-            self._area += 0.02 * (area - self._area)  # or the person comes nearer
-            return index
-        if self._place is not None:
-            tall = int(np.ptp(np.flatnonzero(people[index].any(axis=1)))) + 1
-            if len(people) > 1 and np.linalg.norm(places[index] - expected) > LEAP * tall:
-                self.leap = self.leap or name
-            step = (places[index] - self._place) / self._frames
-            self._step = MEMORY * self._step + (1.0 - MEMORY) * step
-            self._area = MEMORY * self._area + (1.0 - MEMORY) * area
-        else:
-            self._area = area
-        self._place, self._frames = places[index], 1
-        return index
-
-    def skip(self) -> None:
-        """Note that a frame does not show where the person is."""
-        self._frames += 1

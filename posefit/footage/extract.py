@@ -12,7 +12,8 @@ from posefit.files import check_new, new_folder, opencv_name
 from posefit.footage.masks import PackedMasks, Range
 from posefit.footage.segmentation import Extraction, Progress, Segmentation
 from posefit.footage.video import Video, VideoWriter
-from posefit.silhouette.foreground import Image, Person
+from posefit.silhouette.foreground import Image
+from posefit.silhouette.mask import Silhouette
 
 
 def extract(
@@ -37,8 +38,10 @@ def extract(
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
+        masks = segmentation.masks(progress)
         with VideoWriter(building / "preview.mp4", video.fps, segmentation.size) as preview:
-            masks = segmentation.masks(progress, lambda *frame: preview.write(_painted(*frame)))
+            for k, image in enumerate(video.frames(segmentation.start, segmentation.stop, segmentation.size)):
+                preview.write(_painted(image, masks.silhouette(k), bool(masks.usable[k])))
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(segmentation.rows[0]))
@@ -64,7 +67,7 @@ def _write_npz(path: Path, masks: PackedMasks) -> None:
                 np.lib.format.write_array(member, value)
 
 
-def _painted(image: Image, person: Person, usable: bool) -> Image:
+def _painted(image: Image, person: Silhouette, usable: bool) -> Image:
     colour = np.array((90, 200, 90) if usable else (60, 60, 230), dtype=np.float32)
     painted = image.copy()
     painted[~person.valid] //= 2

@@ -179,9 +179,12 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    segmenter = PersonSegmenter(Video.of_images(learned, Path(stream.name), stream.fps), how)
+    segmenter, quality = PersonSegmenter(Video.of_images(learned, Path(stream.name), stream.fps), how), None
     for live in images:
-        person, row, _, landmarks = segmenter.frame(scaled(live.image, segmenter.size), live.number)
+        image = scaled(live.image, segmenter.size)
+        (person, *_), _, landmarks = segmenter.frame(image)
+        quality = quality or segmenter.quality()
+        row = segmenter.row(quality, image, person, live.number)
         yield LiveMask(live, person.mask, person.valid, bool(row["usable"]), landmarks)
 
 

@@ -43,8 +43,13 @@ class PackedMasks:
         return Silhouette.of(self._plane(self.masks, k), None if self.valid is None else self._plane(self.valid, k))
 
     def _plane(self, planes: Planes, k: int) -> NDArray[np.bool_]:
-        width, height = self.size
-        return np.unpackbits(planes[k], count=width * height).reshape(height, width).view(np.bool_)
+        return unpacked(planes[k], self.size)
+
+
+def unpacked(bits: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return the mask (height, width) of a frame's bits."""
+    width, height = size
+    return np.unpackbits(bits, count=width * height).reshape(height, width).view(np.bool_)
 
 
 def empty_planes(count: int, size: tuple[int, int]) -> Planes:

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from inspect import Parameter
 from itertools import islice
 from pathlib import Path
@@ -16,29 +18,27 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
-from posefit.footage.masks import PackedMasks, Range, empty_planes, span
+from posefit.footage.masks import PackedMasks, Range, empty_planes, span, unpacked
+from posefit.footage.people import LARGE, Choice, Individual, People, part_at, planes_of
 from posefit.footage.quality import MIN_FRAMES, PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
-from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, person
-from posefit.silhouette.mask import Mask
+from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, people
+from posefit.silhouette.mask import Mask, touches_border
 
 T = TypeVar("T", bound=np.generic)
 Box = tuple[int, int, int, int]  # x, y, width, height
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
-OnFrame = Callable[[Image, Person, bool], None]  # a frame, the person in it, and whether it is usable
 
 DEFAULT_SEGMENTER = "mixture"
 BACKGROUND_SEGMENTER = "mean"  # where a background is given
 WIDTH = 640  # pixels; larger videos are scaled down to it
-RIVAL_AREA = 0.4  # of the person's area: something so large may be another person
 OFTEN = 0.2  # the share of frames from which on something is worth a warning
 MISSING = 0.02  # the share of a file's frames that may be missing without a warning
 CROSSING = 0.35  # of the longer side: a person who goes as far across the picture within `STAYING` is not on the spot
-LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
 STAYING = 2.0  # seconds before and after a frame
 
 # whether the camera moved
@@ -61,7 +61,8 @@ class Extraction:
     `background` where that is given: frames without a person, as A:B, or an image. Where "mediapipe" is installed, a
     track by default takes the better of both, see `ways`. `settings` are the segmenter's own.
     `roi` x, y, width, height in the video's own pixels is where the person is searched; `ignore` is an image whose
-    bright pixels are never known, such as a tree in front. Videos wider than `width` are scaled down to it.
+    bright pixels are never known, such as a tree in front. Of several people `person` is followed, see `People.chosen`,
+    a place being in the video's own pixels. Videos wider than `width` are scaled down to it.
     """
 
     method: str | None = None
@@ -69,6 +70,7 @@ class Extraction:
     roi: Box | None = None
     ignore: str | Path | None = None
     width: int = WIDTH
+    person: Choice | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -154,10 +156,9 @@ class VideoFootage:
 
 
 class SegmentedFrame(NamedTuple):
-    """The person in a frame of the working size, and what a segmenter knows besides."""
+    """The people in a frame of the working size, the largest first, and what a segmenter knows besides."""
 
-    person: Person
-    row: dict[str, Any]  # of quality.csv
+    people: list[Person]
     facing: float  # as `Segmenter.facing`; NaN where unknown
     landmarks: Array  # (27, 3) as `Segmenter.landmarks`, at their place in the frame; 0 for none
 
@@ -169,22 +170,27 @@ class PersonSegmenter:
         """Check that the extraction fits the video. Raises InputError where it does not."""
         scale = min(1.0, how.width / video.size[0])
         self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
+        self.scale = scale
         self.method, self.learned = how.name, "background" not in how.settings
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
         self._film, self._how = VideoFootage(video, self.size, self._roi or (0, 0, *self.size)), how
         self._segmenter = None if self.learned else how.segmenter(self._film)  # a background is checked now
-        self._quality: FrameQuality | None = None
 
-    def frame(self, image: Image, number: int) -> SegmentedFrame:
-        """Return the person in the next frame, which is of the working size."""
+    def frame(self, image: Image) -> SegmentedFrame:
+        """Return who is in the next frame, which is of the working size."""
         segmenter = self._segmenter = self._segmenter or self._how.segmenter(self._film)
-        if self._quality is None:
-            still, background = self._how.still_background, getattr(segmenter, "background", None)
-            self._quality = FrameQuality(self._film.video.fps, background, still=still)
-        result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
-        part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
-        row = self._quality.row(self._film.cut(image), part, number)
-        return SegmentedFrame(result, row, float(getattr(segmenter, "facing", math.nan)), self._landmarks(segmenter))
+        result = people(*self._segmented(segmenter, image), self._roi, self._ignored)
+        return SegmentedFrame(result, float(getattr(segmenter, "facing", math.nan)), self._landmarks(segmenter))
+
+    def quality(self) -> FrameQuality:
+        """Return what compares the masks of a person with the pictures, from the first frame on."""
+        background = getattr(self._segmenter, "background", None)
+        return FrameQuality(self._film.video.fps, background, still=self._how.still_background)
+
+    def row(self, quality: FrameQuality, image: Image, person: Person, number: int) -> dict[str, Any]:
+        """Return the row of quality.csv for a person in the next frame."""
+        part = replace(person, mask=self._film.cut(person.mask), valid=self._film.cut(person.valid))
+        return quality.row(self._film.cut(image), part, number)
 
     def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
         """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
@@ -221,24 +227,27 @@ class Segmentation:
         self.start, self.stop = span(frames, count)
         self.video, self._segmenter = video, PersonSegmenter(video, how)
         self.method, self.size = self._segmenter.method, self._segmenter.size
-        self.rows: list[dict[str, Any]] = []
+        self._people, self._choice = People(video.fps), how.person
+        if isinstance(self._choice, tuple):
+            self._choice = self._choice[0] * self._segmenter.scale, self._choice[1] * self._segmenter.scale
+        # rows of nobody, and of the largest blobs, who are one person where nobody else is there
+        self._blanks, self._largest = list[dict[str, Any]](), list[dict[str, Any]]()
+        self._qualities: tuple[FrameQuality, FrameQuality] | None = None  # of both
         self._missing = max(0, video.claimed - count)
         self._masks, self._valid = (empty_planes(len(self), self.size) for _ in range(2))
         self._images: Iterator[Image] | None = None  # while frames are read
         self._motion, self._shifts = CameraMotion(self.size), list[float]()
-        # of each frame: facing, the middle of the mask's pixels from the left, NaN where it is empty, and landmarks
-        self._signs: list[tuple[float, float, Array]] = []
+        self._signs: list[tuple[float, Array]] = []  # of each frame: facing and landmarks
 
     def __len__(self) -> int:
         return self.stop - self.start
 
-    def masks(self, progress: Progress | None = None, on_frame: OnFrame | None = None) -> PackedMasks:
+    def masks(self, progress: Progress | None = None) -> PackedMasks:
         """Return the masks of the video, which is decoded once, after the background was learned.
 
-        `on_frame` gets each frame, scaled, the person in it, and whether it is usable. Raises InputError where no frame
-        shows a person.
+        Raises InputError where no frame shows a person.
         """
-        self.read(len(self) - len(self.rows), progress, on_frame)
+        self.read(len(self) - len(self._blanks), progress)
         self._images = None
         if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
@@ -248,22 +257,58 @@ class Segmentation:
             )
         return self.packed()
 
-    def read(self, count: int, progress: Progress | None = None, on_frame: OnFrame | None = None) -> None:
-        """Take the person out of so many more frames."""
+    def read(self, count: int, progress: Progress | None = None) -> None:
+        """Take the people out of so many more frames."""
+        vars(self).pop("_parts", None)  # who is followed
         self._images = self._images or self.video.frames(self.start, self.stop, self.size)
         chosen = islice(self._images, count)
         for image in progress(chosen, count) if progress else chosen:
-            k = len(self.rows)
+            k = len(self._blanks)
             if k % PERIOD == 0:
                 self._shifts.append(self._motion.shift(image))
-            person, row, facing, landmarks = self._segmenter.frame(image, self.start + k)
-            middle = float((np.flatnonzero(person.mask) % self.size[0]).mean()) if person.area else math.nan
-            self._signs.append((facing, middle, landmarks))
-            row["usable"] = int(row["usable"] and self.video.is_filmed(self.start + k))
-            self.rows.append(row)
-            self._masks[k], self._valid[k] = np.packbits(person.mask), np.packbits(person.valid)
-            if on_frame is not None:
-                on_frame(image, person, bool(row["usable"]))
+            found, facing, landmarks = self._segmenter.frame(image)
+            self._signs.append((facing, landmarks))
+            known = found[0].valid
+            self._masks[k], self._valid[k] = np.packbits(found[0].mask), np.packbits(known)
+            present = self._people.add([person.mask for person in found if person.area], image)
+            self._qualities = self._qualities or (self._segmenter.quality(), self._segmenter.quality())
+            nobody, largest = self._qualities
+            empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
+            for one in self._people.alive:
+                one.quality = one.quality or deepcopy(nobody)
+                person = empty
+                if one in present:
+                    others = [other for other in present if other is not one and other.proven()]
+                    mask, valid = planes_of([one], others, k, known)
+                    whole = next((person for person in found if person.mask is one.latest.mask), found[0])
+                    person = replace(whole, mask=mask, valid=valid, area=int(mask.sum()))
+                    pieces = max(min(1, person.pieces), person.pieces - len(others))
+                    person = replace(person, pieces=pieces, touches_border=touches_border(mask))
+                one.judge(k, self._row(one.quality, image, person, k))
+            self._blanks.append(self._row(nobody, image, empty, k))
+            self._largest.append(self._row(largest, image, found[0], k))
+
+    def _row(self, quality: FrameQuality, image: Image, person: Person, k: int) -> dict[str, Any]:
+        row = self._segmenter.row(quality, image, person, self.start + k)
+        return row | {"usable": int(row["usable"] and self.video.is_filmed(self.start + k))}
+
+    @cached_property
+    def _parts(self) -> tuple[list[Individual], list[Individual], str]:
+        """The parts of the person who is followed so far, those of the others, and what there is to say of it."""
+        parts, words = self._people.chosen(
+            self._choice, lambda frame: f"frame {self.start + frame}", 1.0 / self._segmenter.scale
+        )
+        return parts, [one for person in self._people.persons() for one in person if one not in parts], words
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of quality.csv so far, for the person who is followed."""
+        if not self._parts[2]:
+            return self._largest
+        return [
+            blank if (part := part_at(self._parts[0], k)) is None else part.rows[k]
+            for k, blank in enumerate(self._blanks)
+        ]
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -278,18 +323,26 @@ class Segmentation:
 
     def packed(self) -> PackedMasks:
         """Return the masks of the frames so far."""
-        count, usable = len(self.rows), self.usable
+        count, usable, (parts, others, several) = len(self._blanks), self.usable, self._parts
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
-        landmarks = np.array([landmarks for *_, landmarks in self._signs])
+        landmarks = np.array([landmarks for _, landmarks in self._signs])
         known = landmarks if landmarks[..., 2].any() else None
-        masks, valid, guesses = self._masks[:count], self._valid[:count], self.video.guesses
+        masks, valid = self._masks[:count], self._valid[:count]
+        if several:
+            masks, valid = (empty_planes(count, self.size) for _ in range(2))
+        for k in range(count) if several else ():
+            shown = unpacked(self._valid[k], self.size)
+            masks[k], valid[k] = (np.packbits(plane) for plane in planes_of(parts, others, k, shown))
+        guesses = self.video.guesses
         return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, self.start, guesses)
 
     @property
     def facings(self) -> Array:
         """Which way the person faces in each frame, as `Segmenter.facing`; NaN where unknown or going along."""
-        facings, middles = [facing for facing, _, _ in self._signs], [middle for _, middle, _ in self._signs]
-        return facings_on_the_spot(facings, middles, [row["longer_side"] for row in self.rows], self.video.fps)
+        facings, rows, masks = [facing for facing, _ in self._signs], self.rows, self.packed()
+        columns = [np.flatnonzero(masks.silhouette(k).mask) % self.size[0] for k in range(len(rows))]
+        middles = [float(each.mean()) if len(each) else math.nan for each in columns]
+        return facings_on_the_spot(facings, middles, [row["longer_side"] for row in rows], self.video.fps)
 
     @property
     def verdict(self) -> Verdict | None:
@@ -312,15 +365,10 @@ class Segmentation:
         texts, name = [*self.video.warnings], self.video.path
         if self.verdict:
             texts.append(self.verdict.text)
-        if self._missing > MISSING * len(self.rows):
+        if self._missing > MISSING * len(self._blanks):
             texts.append(f"{name}: {self._damage}")
-        filled = [row for row in self.rows if row["area"]]
-        rivals = sum(row["rival"] > RIVAL_AREA for row in filled)
-        if rivals > OFTEN * len(filled):
-            texts.append(
-                f"{name}: another person seems to be in {rivals} of {len(filled)} frames; the largest is followed, "
-                "--roi chooses where to search"
-            )
+        if self._parts[2]:
+            texts.append(f"{name}: {self._parts[2]}")
         if self.camera_moves:
             texts.append(f"{name}: the camera seems to move, and silhouettes need a still one; expect poor masks")
         return texts

@@ -15,6 +15,7 @@ from posefit.footage.cameras import CameraView, calibrated, combined, listed, wo
 from posefit.footage.cleaning import cleaned
 from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import Range
+from posefit.footage.people import Choice
 from posefit.footage.quality import MIN_FRAMES, Verdict
 from posefit.footage.readers import Masks, images_in, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
@@ -43,6 +44,7 @@ _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
     "label": ("masks", ["masks"]),
     "holes": ("masks", ["masks"]),
     "height": ("footage", ["masks", "video", "pictures"]),
+    "person": ("footage", ["masks", "video", "pictures"]),
     "size": ("motions", ["motion"]),
 }
 
@@ -80,6 +82,7 @@ def scene_of(
     rate: float | None = None,
     label: int | None = None,
     holes: float | None = None,
+    person: Choice | None = None,
 ) -> Scene:
     """Return the scene of a source, or of what several cameras saw at the same times.
 
@@ -93,7 +96,9 @@ def scene_of(
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
     options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "asf": asf})
+    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "asf": asf, "person": person})
+    if person is not None and len(sources) > 1:
+        raise InputError(f"person must be given for one camera only, got {len(sources)}")
     if kind == "motion":
         if len(sources) > 1:
             raise InputError(f"source must be one motion, or views of one person, got {len(sources)} motions")
@@ -120,11 +125,11 @@ def scene_of(
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
         known = calibrated(camera, [video.size for video in videos])
-        views = _filmed(videos, extraction or Extraction(), frames, progress, scene)
+        views = _filmed(videos, replace(extraction or Extraction(), person=person), frames, progress, scene)
     else:
         known = calibrated(camera, [None] * len(sources))
         places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
-        masks = [cleaned(read_masks(place, frames, label), name_of(place), holes) for place in places]
+        masks = [cleaned(read_masks(place, frames, label), name_of(place), holes, person) for place in places]
         views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
     result = scene(views)
     result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])

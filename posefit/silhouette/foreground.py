@@ -25,6 +25,7 @@ SPECK = 0.004  # of the image's height: what an opening takes away
 GAP = 0.012  # of the image's height: what a closing joins
 NEAR = 0.06  # of the largest piece's height: pieces as near as that belong to the person
 PIECE = 0.05  # of the largest piece's area: a piece that is smaller is not counted
+RIVAL_AREA = 0.25  # of the largest person's area: a smaller one is none
 BRIDGE = 0.15  # of the person's height: shadow between parts of the person that are no farther apart is clothing
 HOLE = 0.02  # of the person's area: a hole that is smaller is filled
 SAMPLES = 40  # frames that a median background looks at
@@ -160,8 +161,10 @@ class Person:
     touches_border: bool
 
 
-def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> Person:
-    """Return the largest person (height, width) of a foreground, within `roi` x, y, width, height.
+def people(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None, ignore: Mask | None) -> list[Person]:
+    """Return the people (height, width) of a foreground, the largest first, within `roi` x, y, width, height.
+
+    The first is there even where nobody is, and empty; others are at least a quarter as large.
 
     Noise and specks go, gaps close, pieces near the largest one join it and small holes are filled. What looks like a
     shadow but lies between parts of the person is dark clothing and belongs to it; any other shadow is unknown.
@@ -178,12 +181,20 @@ def person(foreground: Mask, shadow: Mask, roi: tuple[int, int, int, int] | None
     changed = np.asarray(cv2.medianBlur(foreground.astype(np.uint8), NOISE) > 0) & inside
     mask, pieces, _ = _largest(_cleaned(changed, height) & inside)
     if not pieces:
-        return Person(mask, known, 0, 0, 0.0, False)
+        return [Person(mask, known, 0, 0, 0.0, False)]
     size = int(np.ptp(np.flatnonzero(mask.any(axis=1)))) + 1
     dark = _morphed(foreground & inside, cv2.MORPH_CLOSE, BRIDGE * size) & shadow & inside
-    mask, pieces, rival = _largest(_cleaned(changed | dark, height) & inside)
-    mask = without_holes(mask)
-    return Person(mask, known | mask, int(mask.sum()), pieces, rival, touches_border(mask))
+    rest, result = _cleaned(changed | dark, height) & inside, list[Person]()
+    while True:
+        mask, pieces, rival = _largest(rest)
+        rest &= ~mask
+        mask = without_holes(mask)
+        area = int(mask.sum())
+        if result and area < RIVAL_AREA * result[0].area:
+            return result
+        result.append(Person(mask, known | mask, area, pieces, rival, touches_border(mask)))
+        if rival * area < RIVAL_AREA * result[0].area:
+            return result
 
 
 def _cleaned(mask: Mask, height: int) -> Mask:

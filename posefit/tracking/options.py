@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from posefit.fitting.space import Translation
     from posefit.fitting.tracker import TrackerFactory
     from posefit.footage.masks import Range
+    from posefit.footage.people import Choice
     from posefit.footage.segmentation import Extraction
     from posefit.geometry.calibration import Up
     from posefit.geometry.camera import Camera
@@ -99,6 +100,13 @@ def _range(name: str, value: Any) -> tuple[int | None, int | None]:
     return start, stop
 
 
+def _person(name: str, value: Any) -> "Choice":
+    if _is_whole(value):
+        return whole(name, value, 1)
+    across, down = pair(name, value, "a number, or (across, down) in pixels")
+    return finite_number(name, across), finite_number(name, down)
+
+
 def _is_whole(value: Any) -> bool:
     return isinstance(value, Integral) and not isinstance(value, bool)
 
@@ -154,6 +162,15 @@ def text_label(text: str) -> int:
         raise InputError(f"expected a whole number such as 15, or a colour 0xRRGGBB, got {quoted(text)}") from None
 
 
+def text_person(text: str) -> "Choice":
+    """Return the number of a person of a text N, or the place of one of X,Y. Raises InputError where it is neither."""
+    parts = text.split(",")
+    try:
+        return int(text) if len(parts) == 1 else (float(parts[0]), float(parts[1]))
+    except ValueError:
+        raise InputError(f"expected a number such as 2, or X,Y in pixels, got {quoted(text)}") from None
+
+
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions:
     """The options of a track, checked; what is None or empty is decided by the source."""
@@ -207,6 +224,15 @@ class TrackOptions:
         (0.0, 1.0),
         "SHARE",
         ", a share of the person's area",
+        live=False,
+    )
+    person: "Choice | None" = option(
+        None,
+        "Of several people: the number that the warning gives them, 1 the longest seen, or X,Y where they are first "
+        "seen.",
+        _person,
+        "N|X,Y",
+        parse=text_person,
         live=False,
     )
     method: "str | TrackerFactory | tuple[str | OptimiserFactory, str | Prior] | None" = option(

@@ -16,7 +16,7 @@ from posefit.footage.readers import read_masks
 from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
 from posefit.geometry.skeleton import JOINTS
-from posefit.silhouette.foreground import Still, mean_background, median_background, person
+from posefit.silhouette.foreground import Still, mean_background, median_background, people
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.files import arrays, csv_rows
@@ -108,18 +108,18 @@ def test_the_largest_person_is_taken_with_the_pieces_near_it_and_small_holes_fil
     foreground[204:225, 100:140] = True  # feet, 4 rows apart
     foreground[50:120, 220:240] = True  # a smaller person, far off
     foreground[5, 5] = True  # a speck
-    largest = person(foreground, empty, None, None)
+    largest = people(foreground, empty, None, None)[0]
     assert largest.mask[103, 118]
     assert largest.mask[210, 120]
     assert not largest.mask[:, 215:].any()
     assert not largest.mask[5, 5]
     assert largest.pieces >= 2
     assert not largest.touches_border
-    assert person(foreground, empty, (210, 0, 40, 250), None).mask[60, 230]
-    none = person(empty, empty, None, None)
+    assert people(foreground, empty, (210, 0, 40, 250), None)[0].mask[60, 230]
+    none = people(empty, empty, None, None)[0]
     assert (none.area, none.pieces, none.touches_border) == (0, 0, False)
     foreground[50:200, 0:100] = True
-    assert person(foreground, empty, None, None).touches_border
+    assert people(foreground, empty, None, None)[0].touches_border
 
 
 def test_the_command_prints_a_summary(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_masks
 from posefit.footage.source import body_of, scene_of
 from posefit.tracking.front import track
+from posefit.tracking.options import text_person
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.footage.conftest import ALL, SIZE, camera
@@ -252,15 +253,33 @@ def test_of_several_people_the_nearest_to_the_last_one_is_followed(tmp_path: Pat
     followed, (warning,) = read(stack(tmp_path / "a.npz", masks))
     for k in (*range(10), *range(20, 25)):
         np.testing.assert_array_equal(followed.silhouette(k).mask, blob(walker[k], tall=64), err_msg=str(k))
-    several = sum(cv2.connectedComponents(mask.astype(np.uint8))[0] > 2 for mask in masks)
-    assert f"several people in {several} of 25 masks; the largest of the first is followed, then" in warning
-    assert "leaps" not in warning
+    places = "1 at 40,60 in a.npz[0]; 2 at 100,58 in a.npz[0]"
+    assert warning.endswith(f": 2 people, first seen: {places}; person 1 is followed, --person N another")
+    first = followed.silhouette(0)
+    assert not first.valid[blob(stander)].any()  # the other's pixels are unknown
+    assert first.valid[~blob(stander)].all()
+    hidden = followed.silhouette(15)  # they are one blob
+    np.testing.assert_array_equal(hidden.valid, hidden.mask | ~masks[15])
 
 
-def test_a_leap_to_another_person_is_named(tmp_path: Path) -> None:
-    masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60)) | blob((160, 60))] * 2
-    (warning,) = read(stack(tmp_path / "a.npz", masks))[1]
-    assert warning.endswith(f"then the nearest to the last, which leaps at {tmp_path / 'a.npz'}[3]: look there")
+@each(("words", "followed"), [((), (180, 60)), (("2",), (40, 60)), (("38,70",), (40, 60)), (("170,60",), (180, 60))])
+def test_who_is_in_the_film_longest_is_followed_or_who_is_chosen(
+    words: Sequence[str], followed: tuple[int, int], tmp_path: Path
+) -> None:
+    masks = [blob((40, 60), tall=64) | blob((180, 60))] * 3 + [blob((180, 60))] * 2
+    path = stack(tmp_path / "a.npz", masks)
+    clean, _ = cleaned(read_masks(path, ALL), path, choice=text_person(*words) if words else None)
+    np.testing.assert_array_equal(clean.silhouette(0).mask, blob(followed, tall=64 if followed[0] == 40 else 60))
+    assert clean.usable.tolist() == [True] * 3 + [followed[0] == 180] * 2
+
+
+def test_nobody_of_a_number_is_one_line(tmp_path: Path) -> None:
+    masks = [blob((40, 60)) | blob((180, 60))] * 4
+    path = stack(tmp_path / "a.npz", masks)
+    error = error_of("track", path, "--person", "3", *QUICK)
+    assert "person must be 1 to 2, as many people as there are, got 3" in error
+    assert "person must be given for footage only" in error_of("track", "walk", "--person", "2")
+    assert "expected a number such as 2, or X,Y in pixels, got 'left'" in error_of("track", path, "--person", "left")
 
 
 def test_a_person_in_pieces_is_one_and_specks_are_none(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
-from posefit.silhouette.foreground import Image, mean_background, person
+from posefit.silhouette.foreground import Image, mean_background, people
 from posefit.silhouette.mask import Silhouette
 
 SIZE = (320, 240)
@@ -66,7 +66,7 @@ class Film:
         """The masks of every frame, taken from a film of it by the mean background of the empty scene."""
         empty, film = _images(self.truth, self.body, self.camera, self.rng)
         background = mean_background(empty)
-        masks = (person(*background.segment(image), None, None) for image in film)
+        masks = (people(*background.segment(image), None, None)[0] for image in film)
         return [Observation([Silhouette.of(part.mask)]) for part in masks]
 
     @property

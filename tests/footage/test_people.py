@@ -1,0 +1,85 @@
+"""Two people who cross: one is followed through, and the other is unknown, not background."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+import posefit
+from posefit.footage.cleaning import people_in
+from posefit.footage.people import People, cut_out, paste, planes_of
+from posefit.motion import built_in
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+from tests.cases import each
+
+SIZE, FRAMES = (160, 120), 60
+WALKS = ("walk", "walk-a", "walk-b", "walk-c")
+
+
+def crossing(seed: int) -> Iterator[tuple[Any, list[Any], Any]]:
+    """Yield of each frame a picture, and what shows of each of two people who cross, the first as the nearer one."""
+    rng = np.random.default_rng(seed)
+    camera = posefit.Camera.around(np.array([0.0, 1.0, 0.0]), np.pi / 2, 5.5, SIZE)
+    colours, ways = rng.uniform(10.0, 90.0, (2, 3)), [1.0, -1.0]
+    motions = []
+    for way, depth in zip(ways, (rng.uniform(0.3, 0.8), 0.0), strict=True):
+        motion = built_in.motion(str(rng.choice(WALKS)), frames=FRAMES)
+        places, poses = motion.translations.copy(), motion.poses.copy()
+        places[:, 0] = depth
+        places[:, 2] = way * rng.uniform(0.8, 1.1) * np.linspace(-1.2, 1.2, FRAMES) + rng.uniform(-0.2, 0.2)
+        poses[:, 0] += 0.0 if way > 0.0 else np.pi
+        motions.append(replace(motion, poses=poses, translations=places))
+    bodies = [posefit.Body.of(motion.skeleton) for motion in motions]
+    for k in range(FRAMES):
+        near, far = (
+            project(body, camera, motion.poses[k], motion.translations[k])
+            for body, motion in zip(bodies, motions, strict=True)
+        )
+        image = np.full((*near.shape, 3), 160, dtype=np.uint8)
+        image[far], image[near] = colours[1], colours[0]
+        yield image, [near, far & ~near], near | far
+
+
+@each("seed", range(10))
+def test_of_two_who_cross_one_is_followed_and_the_other_is_unknown(seed: int) -> None:
+    people, true = People(30.0), []
+    for image, shown, together in crossing(seed):
+        people.add(people_in(Silhouette.of(together)) if together.any() else [], image)
+        true.append(shown)
+    followed, other = people.persons()
+    shares = []
+    for k, shown in enumerate(true):
+        mask, valid = planes_of(followed, other, k, np.ones(SIZE[::-1], dtype=bool))
+        shares.append([float((mask & part).sum()) / max(1, mask.sum()) for part in shown])
+        outside = ~(shown[0] | shown[1])
+        assert valid[outside].all()
+        assert not mask[outside].any()
+    which = int(np.mean(shares, axis=0).argmax())
+    wrong = [k for k, pair in enumerate(shares) if pair[1 - which] > pair[which]]
+    assert len(wrong) <= 0.02 * FRAMES
+    assert np.mean(shares, axis=0)[1 - which] < 0.05
+
+
+def test_a_mask_is_the_same_after_it_was_cut_out() -> None:
+    mask = np.random.default_rng(0).random((40, 50)) > 0.98
+    again = np.zeros_like(mask)
+    paste(cut_out(mask), again)
+    np.testing.assert_array_equal(again, mask)
+    nothing = np.zeros_like(mask)
+    paste(cut_out(nothing), nothing)
+    assert not nothing.any()
+
+
+def test_memory_of_noise_is_given_back() -> None:
+    people, rng = People(10.0), np.random.default_rng(0)
+    for _ in range(60):
+        mask = np.zeros((60, 80), dtype=bool)
+        row, column = rng.integers(0, 50), rng.integers(0, 70)
+        mask[row : row + 6, column : column + 4] = True
+        people.add([mask])
+    assert len(people.individuals) > 20
+    assert len(people.alive) < 20
+    assert sum(one.latest.mask.size > 0 for one in people.individuals) == len(people.alive)
+    assert people.chosen(None, str)[1] == ""
