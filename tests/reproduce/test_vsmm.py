@@ -89,7 +89,14 @@ def right(film: activities.Film) -> dict[str, Any]:
     seconds = {"filter_seconds": np.full(len(labels), 0.001), "detection_seconds": np.full(len(labels), 0.002)}
     lost = np.zeros(len(labels), dtype=bool)
     group = np.array([0, 0, 2, 2])[labels]
-    return {"probabilities": probabilities, "group": group, "candidate_group": none, "label": labels, "lost": lost, **seconds}
+    return {
+        "probabilities": probabilities,
+        "group": group,
+        "candidate_group": none,
+        "label": labels,
+        "lost": lost,
+        **seconds,
+    }
 
 
 def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) -> None:
