@@ -1,0 +1,117 @@
+"""Hierarchical particle swarm optimisation: a swarm that searches the kinematic chain part by part.
+
+V. John, E. Trucco, S. Ivekovic, Markerless human articulated tracking using hierarchical particle swarm optimisation,
+Image and Vision Computing 28(11), 2010. The pose is searched in a fixed order along the chain, the whole body's place
+and orientation first; each stage is a swarm over a few coordinates, with all others held.
+
+Interpretations: an optimiser does not know which coordinate turns which bone, only their order, in which posefit puts
+the root first and parents before children; so a stage is a run of neighbouring coordinates, and may cut a limb. In a
+prior whose leading coordinates are the strongest, stages go from coarse to fine. The inertia is that of SAPSO's paper,
+which cites these authors. What moves out of the box or becomes infeasible goes towards the best of the stage before.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    displacement,
+    draw_population,
+    positive,
+    repair,
+)
+
+EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
+ROOT = 3  # coordinates of the first run: yaw, pitch and roll
+
+
+def runs(dimensions: int, length: int) -> list[NDArray[np.int64]]:
+    """Return the coordinates of each stage: the root's, then runs of some length along the chain."""
+    starts = [0, *range(ROOT, dimensions, length), dimensions] if dimensions > ROOT else [0, dimensions]
+    return [np.arange(first, last) for first, last in pairwise(starts)]  # JOHN2010 (hierarchy)
+
+
+def middle(space: Space, rng: np.random.Generator) -> Array:
+    """Return the prediction (d,), or where there is none the middle of the box; a draw where that is infeasible."""
+    centre = np.zeros(space.dimensions) if space.start is None else space.start.mean
+    return centre.copy() if space.feasible(centre[None])[0] else draw_population(space, rng, 1)[0]
+
+
+class HPSO:
+    """A swarm for each run of coordinates, one after another; what a stage found is held in those that follow.
+
+    Settings:
+        population_size: of a swarm, 1 or more.
+        run_length: coordinates of a stage after the root's, 1 or more.
+        evaluations: of a frame, shared among the stages, 1 or more. Ours: as many as SAPSO's.
+        inertia (A): factor on the old velocity at first, above 0.1; falls towards 0.1 in each stage.
+        acceleration: of the pulls towards the personal and the swarm's best, 0 or more.
+        alpha: velocities stay within it, in half-ranges of the box, above 0. Ours.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        population_size: int = 10,
+        run_length: int = 6,
+        evaluations: int = EVALUATIONS,
+        inertia: float = 2.0,
+        acceleration: float = 2.0,
+        alpha: float = 0.5,
+    ) -> None:
+        at_least("population_size", population_size, 1)
+        at_least("run_length", run_length, 1)
+        at_least("evaluations", evaluations, 1)
+        between("inertia", inertia, 0.1, math.inf, ends=False)
+        at_least("acceleration", acceleration, 0.0)
+        positive("alpha", alpha)
+        self._space, self._rng, self._size = space, rng, min(population_size, evaluations)
+        self._runs, self._stage, self._waiting = runs(space.dimensions, run_length), 0, 0
+        self._generations = max(evaluations // (self._size * len(self._runs)), 1)
+        self._inertia, self._acceleration, self._alpha = inertia, acceleration, alpha
+        self._estimate = middle(space, rng)
+        self._begin()
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) of this stage; none after the last stage."""
+        self._waiting = self._size if self._stage < len(self._runs) else 0
+        return self._x[: self._waiting].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Remember the bests and move on, after the last move of a stage to the next one."""
+        check_tell(self._waiting, proposals, costs)
+        better = costs < self._pbest_cost
+        self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
+        self._generation, self._waiting = self._generation + 1, 0
+        if self._generation < self._generations:
+            self._move()
+            return
+        self._estimate = self._pbest[self._pbest_cost.argmin()].copy()  # JOHN2010 (handed down)
+        self._stage += 1
+        if self._stage < len(self._runs):
+            self._begin()
+
+    def _begin(self) -> None:
+        """Spread the swarm over the coordinates of its stage, around what the stages before found."""
+        run, x = self._runs[self._stage], np.tile(self._estimate, (self._size, 1))
+        x[1:, run] = draw_population(self._space, self._rng, self._size)[1:, run]  # JOHN2010 (stage)
+        self._x, self._v, self._generation = repair(self._space, x, self._estimate), np.zeros_like(x), 0
+        self._pbest, self._pbest_cost = self._x.copy(), np.full(self._size, np.inf)
+
+    def _move(self) -> None:
+        run, gbest = self._runs[self._stage], self._pbest[self._pbest_cost.argmin()]
+        omega = self._inertia * (10.0 * self._inertia) ** (-self._generation / self._generations)  # JOHN2010 (inertia)
+        phi1, phi2 = self._acceleration * self._rng.random((2, self._size, len(run)))
+        to_pbest, to_gbest = (displacement(self._space, self._x, best)[:, run] for best in (self._pbest, gbest))
+        v = omega * self._v[:, run] + phi1 * to_pbest + phi2 * to_gbest
+        self._v[:, run] = np.clip(v, -self._alpha, self._alpha)
+        self._x = repair(self._space, self._x + self._v, self._estimate)

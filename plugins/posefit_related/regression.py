@@ -1,0 +1,127 @@
+"""Poses from silhouettes by regression: no body is drawn to fit a frame.
+
+A. Agarwal, B. Triggs, Recovering 3D human pose from monocular images, IEEE Trans. Pattern Analysis and Machine
+Intelligence 28(1), 2006. A silhouette is a histogram of shape contexts: those of the points of its border, as votes for
+the centres of a codebook. Poses are regressed by kernels on a training set of rendered poses; in a sequence, a
+predicted pose joins the silhouette, since one silhouette may be of several poses.
+
+Interpretations: damped least squares over a kernel at every training pose instead of a relevance vector machine, which
+the publication finds sparser and no better; a product of normal kernels of silhouette and predicted pose; the
+prediction is at constant velocity; contexts of several views stand side by side. Training poses are rendered before the
+first frame, and count in no frame's budget.
+"""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, project
+from posefit_related.frames import frame_of, place_of
+
+POINTS, ANGLES, RADII = 80, 12, 5  # of a border and of a shape context; the latter two are the publication's
+VOTES = 0.25  # ours: a normal vote's width, as a share of the usual distance of contexts
+STATE_NOISE = 0.3  # ours: of training's predicted poses, in deviations of each number
+
+
+def contexts(mask: NDArray[np.bool_]) -> Array:
+    """Return the shape contexts (n, 60) of points on a mask's border: where its other points are, around each."""
+    padded = np.pad(np.asarray(mask, dtype=bool), 1)
+    inner = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    points = np.argwhere(padded[1:-1, 1:-1] & ~inner).astype(np.float64)
+    if len(points) < 3:
+        return np.zeros((1, ANGLES * RADII))
+    points = points[np.linspace(0, len(points) - 1, min(POINTS, len(points))).astype(int)]
+    away = points[None] - points[:, None]
+    far = np.hypot(*np.moveaxis(away, 2, 0))
+    ring = np.clip(np.log2(far / far.mean() + 1e-9) + RADII - 1.5, 0.0, RADII - 1.0).astype(int)
+    sector = ((np.arctan2(away[..., 0], away[..., 1]) + np.pi) * ANGLES / (2.0 * np.pi)).astype(int) % ANGLES
+    bins = ring * ANGLES + sector + ANGLES * RADII * np.arange(len(points))[:, None]
+    others = bins[~np.eye(len(points), dtype=bool)]
+    counts = np.bincount(others, minlength=ANGLES * RADII * len(points)).reshape(len(points), -1)
+    return np.asarray(counts / (len(points) - 1.0))  # AGARWAL2006 (shape context)
+
+
+def histogram(found: Array, words: Array) -> Array:
+    """Return the votes (k,) of contexts (n, 60) for the words (k, 60) of a codebook; they sum to 1."""
+    squares = (found**2).sum(axis=1)[:, None] + (words**2).sum(axis=1) - 2.0 * found @ words.T
+    squares -= squares.min(axis=1, keepdims=True)
+    votes = np.exp(-squares / (2.0 * (VOTES * np.sqrt(squares.mean()) + 1e-9) ** 2))
+    return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))  # AGARWAL2006 (histogram)
+
+
+class Regression:
+    """Kernel regression from silhouettes, and in a sequence also from the predicted pose.
+
+    Settings:
+        samples: training poses, each at a random yaw, 10 or more.
+        words: of the codebook, 2 or more.
+        ridge: of the regression, above 0.
+    """
+
+    def __init__(self, task: Task, *, samples: int = 1200, words: int = 100, ridge: float = 0.02) -> None:
+        from sklearn.cluster import MiniBatchKMeans
+
+        at_least("samples", samples, 10)
+        at_least("words", words, 2)
+        positive("ridge", ridge)
+        self.task, rng = task, np.random.default_rng(0)
+        poses = np.concatenate([motion.poses for motion in task.training])
+        poses = poses[rng.integers(len(poses), size=samples)]
+        poses[:, 0] = rng.uniform(-np.pi, np.pi, samples)
+        masks = [[project(task.body, camera, pose, task.anchor) for pose in poses] for camera in task.cameras]
+        found = [[contexts(mask) for mask in view] for view in masks]
+        some = np.concatenate([part for view in found for part in view[:: max(samples // 200, 1)]])
+        self.words = MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0).fit(some).cluster_centers_
+        signs = np.concatenate([[histogram(part, self.words) for part in view] for view in found], axis=1)
+        values = numbers(poses)
+        self.mean, self.scale = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-3)
+        self.targets, self.signs = (values - self.mean) / self.scale, signs
+        self.states = self.targets + STATE_NOISE * rng.standard_normal(values.shape)
+        self.width = float(((signs - signs.mean(axis=0)) ** 2).sum(axis=1).mean())
+        self.factors = {}  # by how many numbers of the predicted pose are known: none, two of the yaw, or all
+        for known in (0, 2, values.shape[1]):
+            gram = self._kernel(signs, self.states, known)
+            self.factors[known] = np.linalg.solve(gram + ridge * np.eye(samples), self.targets)  # AGARWAL2006 (ridge)
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a frame for each observation."""
+        task, latest, place = self.task, list[Array](), np.array(self.task.anchor, dtype=np.float64)
+        for observation in observations:
+            state, known = self._predicted(latest)
+            if observation.usable or not latest:
+                masks = [silhouette.mask for silhouette in observation.silhouettes]
+                sign = np.concatenate([histogram(contexts(mask), self.words) for mask in masks])
+                value = (self._kernel(sign[None], state[None], known) @ self.factors[known])[0]
+                latest = [*latest, value][-2:]
+            pose = pose_of(self.mean + self.scale * latest[-1])
+            place, drawn = place_of(task, observation, pose, place)
+            yield frame_of(task, observation, pose, place, drawn)
+
+    def _predicted(self, latest: list[Array]) -> tuple[Array, int]:
+        """Return the predicted numbers, scaled, and how many of them are known."""
+        if latest:
+            return 2.0 * latest[-1] - latest[0], len(self.mean)  # AGARWAL2006 (prediction)
+        task, pose = self.task, np.zeros(66)
+        pose[0] = task.yaw or 0.0
+        if task.first_pose is not None:
+            pose[3:] = task.first_pose
+        known = 0 if task.yaw is None else 2 if task.first_pose is None else len(self.mean)
+        return (numbers(pose[None])[0] - self.mean) / self.scale, known
+
+    def _kernel(self, signs: Array, states: Array, known: int) -> Array:
+        """Return the kernels (n, samples) of silhouettes, and of the first `known` numbers of predicted poses."""
+        squares = ((signs[:, None] - self.signs) ** 2).sum(axis=2) / self.width
+        if known:
+            squares += ((states[:, None, :known] - self.states[:, :known]) ** 2).mean(axis=2)
+        return np.exp(-squares)  # AGARWAL2006 (kernel)
+
+
+def numbers(poses: Array) -> Array:
+    """Return what is regressed (n, 67): the yaw's cosine and sine, so that it may turn, and the other angles."""
+    return np.column_stack([np.cos(poses[:, 0]), np.sin(poses[:, 0]), poses[:, 1:]])
+
+
+def pose_of(values: Array) -> Array:
+    """Return the pose (66,) of numbers (67,)."""
+    return np.concatenate([[np.arctan2(values[1], values[0])], values[2:]])
