@@ -10,8 +10,8 @@
 - `isomap.IsomapPrior`: an Isomap with a local linear way back (Wang, Xu and Ai, 2003).
 - `gplvm.GPLVM`: latents of a Gaussian process (Urtasun, Fleet, Hertzmann and Fua, 2005).
 
-`frames` has what the trackers share. None of these publications was at hand in full: docs/ways/related.md says what
-each method takes from its publication, and a docstring names the rest an Interpretation.
+`stages` has what the searches share, `frames` what the trackers share. None of these publications was at hand in full:
+docs/ways/related.md says what was, and a docstring names the rest an interpretation.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="psopf", frames=(0, 3))

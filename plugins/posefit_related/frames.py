@@ -40,11 +40,11 @@ def place_of(task: Task, observation: Observation, pose: Array, place: Array) ->
     if observation.translation is not None:
         return np.array(observation.translation, dtype=np.float64), 0
     for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True):
-        seen, drawn = (_box(mask) for mask in (silhouette.mask, project(task.body, camera, pose, place)))
-        if seen is not None and drawn is not None:
+        mask, drawn = (_box(mask) for mask in (silhouette.mask, project(task.body, camera, pose, place)))
+        if mask is not None and drawn is not None:
             at = camera.rotation @ place + camera.translation
-            depth = at[2] * (drawn[1] / seen[1])[1]
-            pixel = seen[0] + (camera.project(place[None])[0][0] - drawn[0]) * at[2] / depth
+            depth = at[2] * (drawn[1] / mask[1])[1]
+            pixel = mask[0] + (camera.project(place[None])[0][0] - drawn[0]) * at[2] / depth
             at = np.append((pixel - camera.centre) / camera.focal * depth, depth)
             return np.asarray(camera.rotation.T @ (at - camera.translation)), 1
     return place, 1

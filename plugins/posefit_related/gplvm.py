@@ -80,8 +80,8 @@ class GPLVM:
         left, sizes, _ = np.linalg.svd(y, full_matrices=False)
         x = (left * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[: self._components]
         start = np.concatenate([x.ravel(), [0.0, 0.0, np.log(0.05)]])
-        found = minimize(loss, start, (y,), jac=True, method="L-BFGS-B", options={"maxiter": STEPS}).x
-        self.latents, self.logs = found[:-3].reshape(len(y), -1), found[-3:]
+        end = np.asarray(minimize(loss, start, (y,), jac=True, method="L-BFGS-B", options={"maxiter": STEPS}).x)
+        self.latents, self.logs = end[:-3].reshape(len(y), -1), end[-3:]
         noisy = kernel(self.latents, self.latents, self.logs) + (np.exp(self.logs[2]) + 1e-6) * np.eye(len(y))
         self.inverse = np.linalg.inv(noisy)
         self.factors = self.inverse @ y
@@ -94,7 +94,8 @@ class GPLVM:
         squares = away.sum(axis=2)
         nearest = np.argsort(squares, axis=1, kind="stable")[:, :NEAREST]
         weights = 1.0 / (np.take_along_axis(squares, nearest, axis=1) + 1e-9)
-        return np.einsum("nk,nkm->nm", weights / weights.sum(axis=1, keepdims=True), self.latents[nearest])
+        weights /= weights.sum(axis=1, keepdims=True)
+        return np.asarray(np.einsum("nk,nkm->nm", weights, self.latents[nearest]))
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m): the mean of the process."""

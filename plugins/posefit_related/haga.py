@@ -10,6 +10,8 @@ geometrically in each layer, and the mutations with it; children lie between the
 or a little beyond; the best so far survives.
 """
 
+import math
+
 import numpy as np
 
 from posefit.plugin import (
@@ -24,16 +26,10 @@ from posefit.plugin import (
     repair,
     weigh,
 )
-from posefit_related.hpso import EVALUATIONS, ROOT, middle
+from posefit_related.stages import EVALUATIONS, middle, opened
 
 TEMPERATURES = 5.0, 0.2  # ours: of the first and the last generation of a layer, in units of the cost
 BEYOND = 0.25  # ours: how far beyond its parents a child may lie, as a share of their distance
-
-
-def opened(dimensions: int, layer: int, layers: int) -> int:
-    """Return how many leading coordinates a layer, counted from 0, searches: the root's, then an equal share each."""
-    rest = max(dimensions - ROOT, 0)
-    return dimensions - rest + -(-rest * (layer + 1) // layers)  # ZHAO2008 (hierarchy)
 
 
 class HAGA:
@@ -103,7 +99,8 @@ class HAGA:
     def temperature(self) -> float:
         """Return the temperature of this generation: it falls geometrically in each layer."""
         first, last = TEMPERATURES
-        return first * (last / first) ** (self._generation / max(self._generations - 1, 1))  # ZHAO2008 (annealing)
+        share = self._generation / max(self._generations - 1, 1)
+        return first * math.exp(share * math.log(last / first))  # ZHAO2008 (annealing)
 
     def _children(self, x: Array, costs: Array) -> Array:
         n, d, count = *x.shape, self._open()

@@ -4,17 +4,14 @@ V. John, E. Trucco, S. Ivekovic, Markerless human articulated tracking using hie
 Image and Vision Computing 28(11), 2010. The pose is searched in a fixed order along the chain, the whole body's place
 and orientation first; each stage is a swarm over a few coordinates, with all others held.
 
-Interpretations: an optimiser does not know which coordinate turns which bone, only their order, in which posefit puts
-the root first and parents before children; so a stage is a run of neighbouring coordinates, and may cut a limb. In a
-prior whose leading coordinates are the strongest, stages go from coarse to fine. The inertia is that of SAPSO's paper,
-which cites these authors. What moves out of the box or becomes infeasible goes towards the best of the stage before.
+Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut a limb; in a prior of components
+stages go from coarse to fine. Where nothing is predicted, the best of some random poses is the start. The inertia is
+that of SAPSO's paper. What moves out of the box or becomes infeasible goes towards the best of the stage before.
 """
 
 import math
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.plugin import (
     Array,
@@ -27,21 +24,7 @@ from posefit.plugin import (
     positive,
     repair,
 )
-
-EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
-ROOT = 3  # coordinates of the first run: yaw, pitch and roll
-
-
-def runs(dimensions: int, length: int) -> list[NDArray[np.int64]]:
-    """Return the coordinates of each stage: the root's, then runs of some length along the chain."""
-    starts = [0, *range(ROOT, dimensions, length), dimensions] if dimensions > ROOT else [0, dimensions]
-    return [np.arange(first, last) for first, last in pairwise(starts)]  # JOHN2010 (hierarchy)
-
-
-def middle(space: Space, rng: np.random.Generator) -> Array:
-    """Return the prediction (d,), or where there is none the middle of the box; a draw where that is infeasible."""
-    centre = np.zeros(space.dimensions) if space.start is None else space.start.mean
-    return centre.copy() if space.feasible(centre[None])[0] else draw_population(space, rng, 1)[0]
+from posefit_related.stages import EVALUATIONS, first_population, runs
 
 
 class HPSO:
@@ -75,33 +58,38 @@ class HPSO:
         at_least("acceleration", acceleration, 0.0)
         positive("alpha", alpha)
         self._space, self._rng, self._size = space, rng, min(population_size, evaluations)
-        self._runs, self._stage, self._waiting = runs(space.dimensions, run_length), 0, 0
-        self._generations = max(evaluations // (self._size * len(self._runs)), 1)
+        self._runs, self._stage, self._waiting = runs(space.dimensions, run_length), -1, 0  # -1: the first poses
+        self._x = first_population(space, rng, evaluations)
+        self._generations = max((evaluations - len(self._x)) // (self._size * len(self._runs)), 1)
         self._inertia, self._acceleration, self._alpha = inertia, acceleration, alpha
-        self._estimate = middle(space, rng)
-        self._begin()
+        self._v, self._generation, self._estimate = np.zeros_like(self._x), 0, self._x[0]
+        self._pbest, self._pbest_cost = self._x, np.full(len(self._x), np.inf)
 
     def ask(self) -> Array:
         """Return the particles (n, d) of this stage; none after the last stage."""
-        self._waiting = self._size if self._stage < len(self._runs) else 0
+        self._waiting = len(self._x) if self._stage < len(self._runs) else 0
         return self._x[: self._waiting].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Remember the bests and move on, after the last move of a stage to the next one."""
         check_tell(self._waiting, proposals, costs)
-        better = costs < self._pbest_cost
-        self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
-        self._generation, self._waiting = self._generation + 1, 0
-        if self._generation < self._generations:
-            self._move()
-            return
+        self._waiting = 0
+        if self._stage < 0:
+            self._pbest, self._pbest_cost = np.array(proposals), np.where(np.isnan(costs), np.inf, costs)
+        else:
+            better = costs < self._pbest_cost
+            self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
+            self._generation += 1
+            if self._generation < self._generations:
+                self._move()
+                return
         self._estimate = self._pbest[self._pbest_cost.argmin()].copy()  # JOHN2010 (handed down)
         self._stage += 1
         if self._stage < len(self._runs):
             self._begin()
 
     def _begin(self) -> None:
-        """Spread the swarm over the coordinates of its stage, around what the stages before found."""
+        """Spread the swarm over the coordinates of its stage, around the estimate of those before."""
         run, x = self._runs[self._stage], np.tile(self._estimate, (self._size, 1))
         x[1:, run] = draw_population(self._space, self._rng, self._size)[1:, run]  # JOHN2010 (stage)
         self._x, self._v, self._generation = repair(self._space, x, self._estimate), np.zeros_like(x), 0

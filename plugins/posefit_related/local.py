@@ -4,7 +4,7 @@ D. Gavrila, L. Davis, 3-D model-based tracking of humans in action: a multi-view
 that pose recovery is a search for the pose whose synthesised appearance is most similar to the picture's, by a
 decomposition of the space and a best-first technique.
 
-Interpretations: parts are runs of neighbouring coordinates, as of `hpso`; the neighbours of a pose are a step to either
+Interpretations: parts are runs of neighbouring coordinates, see `stages`; the neighbours of a pose are a step to either
 side in each coordinate of the part; a part ends after some expansions without a better pose; when all parts were
 searched without one, the step is halved. Where nothing is predicted, the best of some random poses is the start.
 """
@@ -13,10 +13,9 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from posefit.plugin import Array, Space, at_least, check_tell, draw_population, positive, repair, sample_normal
-from posefit_related.hpso import EVALUATIONS, middle, runs
+from posefit.plugin import Array, Space, at_least, check_tell, positive, repair, sample_normal
+from posefit_related.stages import EVALUATIONS, first_population, runs
 
-FIRST_SHARE = 0.25  # ours: of the evaluations, for random poses where nothing is predicted
 MIN_STEP = 1e-3  # ours: half-ranges of the box
 SAME = 1e-9  # of a coordinate: two poses that differ by less are one
 
@@ -47,8 +46,7 @@ class Local:
         at_least("evaluations", evaluations, 1)
         self._space, self._rng, self._patience = space, rng, patience
         self._step, self._runs, self._part, self._waiting = step, runs(space.dimensions, run_length), 0, 0
-        first = max(int(FIRST_SHARE * evaluations), 1)
-        self._next = draw_population(space, rng, first) if space.start is None else middle(space, rng)[None]
+        self._next = first_population(space, rng, evaluations)
         self._best, self._best_cost, self._improved = self._next[0], np.inf, False
         self._open: list[tuple[float, int, Array]] = []  # poses to expand, the best first
         self._closed, self._misses, self._count = self._next[:0], 0, 0
@@ -84,7 +82,7 @@ class Local:
                 pose = heappop(self._open)[2]  # GAVRILA1996 (best first)
                 moves = np.eye(self._space.dimensions)[self._runs[self._part]] * self._step
                 near = repair(self._space, pose + np.concatenate([moves, -moves]), pose)
-                new = near[(np.abs(near[:, None] - self._closed).max(axis=2) > SAME).all(axis=1)]
+                new: Array = near[(np.abs(near[:, None] - self._closed).max(axis=2) > SAME).all(axis=1)]
                 if len(new):
                     return new
             self._next_part()

@@ -24,7 +24,7 @@ from posefit.plugin import (
     sample_normal,
     weigh,
 )
-from posefit_related.hpso import EVALUATIONS
+from posefit_related.stages import EVALUATIONS
 
 CHI, PHI = 0.7298, 2.05  # Clerc and Kennedy 2002: the constriction, and the acceleration of either pull
 
@@ -64,6 +64,10 @@ class PSOPF:
         positive("noise", noise)
         positive("alpha", alpha)
         self._space, self._rng, self._waiting = space, rng, 0
+        self._x: Array
+        self._pbest: Array
+        self._pbest_cost: Array
+        self._moves: int
         self._iterations = min(iterations, evaluations - 1)
         self._sharpness, self._noise, self._alpha = sharpness, noise, alpha
         self._begin(draw_population(space, rng, evaluations // (self._iterations + 1)))

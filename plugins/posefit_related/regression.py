@@ -5,10 +5,9 @@ Intelligence 28(1), 2006. A silhouette is a histogram of shape contexts: those o
 the centres of a codebook. Poses are regressed by kernels on a training set of rendered poses; in a sequence, a
 predicted pose joins the silhouette, since one silhouette may be of several poses.
 
-Interpretations: damped least squares over a kernel at every training pose instead of a relevance vector machine, which
-the publication finds sparser and no better; a product of normal kernels of silhouette and predicted pose; the
-prediction is at constant velocity; contexts of several views stand side by side. Training poses are rendered before the
-first frame, and count in no frame's budget.
+Interpretations: damped least squares over a kernel at every training pose, one of the publication's regressions, instead
+of a relevance vector machine, which it finds sparser and no worse; a product of kernels of silhouette and predicted
+pose, at constant velocity; several views stand side by side. To render training poses counts in no frame's budget.
 """
 
 from collections.abc import Iterable, Iterator
@@ -42,9 +41,9 @@ def contexts(mask: NDArray[np.bool_]) -> Array:
     return np.asarray(counts / (len(points) - 1.0))  # AGARWAL2006 (shape context)
 
 
-def histogram(found: Array, words: Array) -> Array:
+def histogram(shapes: Array, words: Array) -> Array:
     """Return the votes (k,) of contexts (n, 60) for the words (k, 60) of a codebook; they sum to 1."""
-    squares = (found**2).sum(axis=1)[:, None] + (words**2).sum(axis=1) - 2.0 * found @ words.T
+    squares = (shapes**2).sum(axis=1)[:, None] + (words**2).sum(axis=1) - 2.0 * shapes @ words.T
     squares -= squares.min(axis=1, keepdims=True)
     votes = np.exp(-squares / (2.0 * (VOTES * np.sqrt(squares.mean()) + 1e-9) ** 2))
     return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))  # AGARWAL2006 (histogram)
@@ -69,11 +68,12 @@ class Regression:
         poses = np.concatenate([motion.poses for motion in task.training])
         poses = poses[rng.integers(len(poses), size=samples)]
         poses[:, 0] = rng.uniform(-np.pi, np.pi, samples)
-        masks = [[project(task.body, camera, pose, task.anchor) for pose in poses] for camera in task.cameras]
-        found = [[contexts(mask) for mask in view] for view in masks]
-        some = np.concatenate([part for view in found for part in view[:: max(samples // 200, 1)]])
+        shapes = [
+            [contexts(project(task.body, camera, pose, task.anchor)) for pose in poses] for camera in task.cameras
+        ]
+        some = np.concatenate([part for view in shapes for part in view[:: max(samples // 200, 1)]])
         self.words = MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0).fit(some).cluster_centers_
-        signs = np.concatenate([[histogram(part, self.words) for part in view] for view in found], axis=1)
+        signs = np.concatenate([[histogram(part, self.words) for part in view] for view in shapes], axis=1)
         values = numbers(poses)
         self.mean, self.scale = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-3)
         self.targets, self.signs = (values - self.mean) / self.scale, signs
@@ -88,13 +88,14 @@ class Regression:
         """Yield a frame for each observation."""
         task, latest, place = self.task, list[Array](), np.array(self.task.anchor, dtype=np.float64)
         for observation in observations:
-            state, known = self._predicted(latest)
             if observation.usable or not latest:
+                state, known = self._predicted(latest)
                 masks = [silhouette.mask for silhouette in observation.silhouettes]
                 sign = np.concatenate([histogram(contexts(mask), self.words) for mask in masks])
                 value = (self._kernel(sign[None], state[None], known) @ self.factors[known])[0]
                 latest = [*latest, value][-2:]
-            pose = pose_of(self.mean + self.scale * latest[-1])
+            value = self.mean + self.scale * latest[-1]
+            pose = np.append(np.arctan2(value[1], value[0]), value[2:])
             place, drawn = place_of(task, observation, pose, place)
             yield frame_of(task, observation, pose, place, drawn)
 
@@ -102,10 +103,10 @@ class Regression:
         """Return the predicted numbers, scaled, and how many of them are known."""
         if latest:
             return 2.0 * latest[-1] - latest[0], len(self.mean)  # AGARWAL2006 (prediction)
-        task, pose = self.task, np.zeros(66)
-        pose[0] = task.yaw or 0.0
-        if task.first_pose is not None:
-            pose[3:] = task.first_pose
+        task = self.task
+        pose = np.concatenate(
+            [[task.yaw or 0.0, 0.0, 0.0], np.zeros(63) if task.first_pose is None else task.first_pose]
+        )
         known = 0 if task.yaw is None else 2 if task.first_pose is None else len(self.mean)
         return (numbers(pose[None])[0] - self.mean) / self.scale, known
 
@@ -114,14 +115,9 @@ class Regression:
         squares = ((signs[:, None] - self.signs) ** 2).sum(axis=2) / self.width
         if known:
             squares += ((states[:, None, :known] - self.states[:, :known]) ** 2).mean(axis=2)
-        return np.exp(-squares)  # AGARWAL2006 (kernel)
+        return np.asarray(np.exp(-squares))  # AGARWAL2006 (kernel)
 
 
 def numbers(poses: Array) -> Array:
     """Return what is regressed (n, 67): the yaw's cosine and sine, so that it may turn, and the other angles."""
     return np.column_stack([np.cos(poses[:, 0]), np.sin(poses[:, 0]), poses[:, 1:]])
-
-
-def pose_of(values: Array) -> Array:
-    """Return the pose (66,) of numbers (67,)."""
-    return np.concatenate([[np.arctan2(values[1], values[0])], values[2:]])

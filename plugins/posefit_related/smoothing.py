@@ -47,28 +47,27 @@ class Smoothing:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, once all were filtered."""
-        seen, states, weights = list(observations), list[Array](), list[Array]()
+        sequence, states, weights = list(observations), list[Array](), list[Array]()
         count = max(self.task.evaluations - 1, 1)
-        for observation in seen:
+        poses = first_poses(self.task, rng, count)
+        where = np.tile(self.task.anchor, (count, 1))
+        here = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
+        for observation in sequence:
             if states:
-                rows = systematic(self._all[1], rng.random())
-                here = self._all[0][rows] + self.steps * rng.standard_normal((count, len(self.steps)))
-            else:
-                poses = first_poses(self.task, rng, count)
-                where = np.tile(self.task.anchor, (count, 1))
-                here = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
+                rows = systematic(likelihood, rng.random())
+                here = here[rows] + self.steps * rng.standard_normal((count, len(self.steps)))
             if observation.translation is not None:
                 here[:, 1:4] = observation.translation
             costs = np.zeros(count)
             if observation.usable:
                 costs = costs_of(self.task, observation, self._poses(here), here[:, 1:4])
-            self._all = here, weigh(costs, self.sharpness)
-            heaviest = np.argsort(-self._all[1], kind="stable")[:HEAVIEST]
+            likelihood = weigh(costs, self.sharpness)
+            heaviest = np.argsort(-likelihood, kind="stable")[:HEAVIEST]
             states.append(here[heaviest])
-            weights.append(self._all[1][heaviest] / self._all[1][heaviest].sum())
+            weights.append(likelihood[heaviest] / likelihood[heaviest].sum())
         if self.backwards:
             weights = smoothed(states, weights, self.steps)
-        for observation, here, weight in zip(seen, states, weights, strict=True):
+        for observation, here, weight in zip(sequence, states, weights, strict=True):
             leading = here[weight.argmax()]
             mean = leading + weight @ differences(here, leading)
             evaluations = count if observation.usable else 0
@@ -86,7 +85,7 @@ class Smoothing:
             squares.append((differences(moved[1:], moved[:-1]) * motion.fps / self.task.fps) ** 2)
         steps = np.sqrt(np.concatenate(squares).mean(axis=0))
         steps[:4] = np.maximum(steps[:4], MIN_STEPS)
-        return np.maximum(steps, 1e-6)
+        return np.asarray(np.maximum(steps, 1e-6))
 
 
 def differences(states: Array, origin: Array) -> Array:
