@@ -1,6 +1,7 @@
 """What the trackers share: the costs of poses in a frame, first poses, and a frame from a pose."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.plugin import Array, Frame, Observation, Task, areas, mismatch, project
 
@@ -50,7 +51,7 @@ def place_of(task: Task, observation: Observation, pose: Array, place: Array) ->
     return place, 1
 
 
-def _box(mask: Array) -> tuple[Array, Array] | None:
+def _box(mask: NDArray[np.bool_]) -> tuple[Array, Array] | None:
     """Return the middle (2,) and the size (2,), columns and rows, of what a mask shows; None where it shows nothing."""
     rows, columns = np.nonzero(np.asarray(mask))
     if not len(rows):

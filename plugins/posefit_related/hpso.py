@@ -4,9 +4,9 @@ V. John, E. Trucco, S. Ivekovic, Markerless human articulated tracking using hie
 Image and Vision Computing 28(11), 2010. The pose is searched in a fixed order along the chain, the whole body's place
 and orientation first; each stage is a swarm over a few coordinates, with all others held.
 
-Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut a limb; in a prior of components
-stages go from coarse to fine. Where nothing is predicted, the best of some random poses is the start. The inertia is
-that of SAPSO's paper. What moves out of the box or becomes infeasible goes towards the best of the stage before.
+Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut a limb; among the components of
+a prior, stages go from coarse to fine. Where nothing is predicted, the best of some random poses is the start. The
+inertia is that of SAPSO's paper. What leaves the box or becomes infeasible goes towards the best of the stage before.
 """
 
 import math

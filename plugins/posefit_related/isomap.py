@@ -34,7 +34,7 @@ def rebuilt(latents: Array, centres: Array, angles: Array) -> Array:
     gram += (DAMPING * np.einsum("nkk->n", gram) / gram.shape[1] + 1e-12)[:, None, None] * np.eye(gram.shape[1])
     weights = np.linalg.solve(gram, np.ones((*gram.shape[:2], 1)))[..., 0]
     weights /= weights.sum(axis=1, keepdims=True)
-    return np.einsum("nk,nka->na", weights, angles[nearest])  # WANG2003 (way back)
+    return np.asarray(np.einsum("nk,nka->na", weights, angles[nearest]))  # WANG2003 (way back)
 
 
 class IsomapPrior:
@@ -100,4 +100,5 @@ class IsomapPrior:
 
 def evenly(angles: Array, count: int) -> Array:
     """Return at most `count` of the angles (T, 63), evenly."""
-    return angles[np.unique(np.linspace(0, len(angles) - 1, min(count, len(angles))).astype(int))]
+    rows = np.unique(np.linspace(0, len(angles) - 1, min(count, len(angles))).astype(int))
+    return np.asarray(angles[rows])

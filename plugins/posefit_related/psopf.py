@@ -65,6 +65,7 @@ class PSOPF:
         positive("alpha", alpha)
         self._space, self._rng, self._waiting = space, rng, 0
         self._x: Array
+        self._v: Array
         self._pbest: Array
         self._pbest_cost: Array
         self._moves: int

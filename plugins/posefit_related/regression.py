@@ -5,9 +5,9 @@ Intelligence 28(1), 2006. A silhouette is a histogram of shape contexts: those o
 the centres of a codebook. Poses are regressed by kernels on a training set of rendered poses; in a sequence, a
 predicted pose joins the silhouette, since one silhouette may be of several poses.
 
-Interpretations: damped least squares over a kernel at every training pose, one of the publication's regressions, instead
-of a relevance vector machine, which it finds sparser and no worse; a product of kernels of silhouette and predicted
-pose, at constant velocity; several views stand side by side. To render training poses counts in no frame's budget.
+Interpretations: damped least squares over a kernel at every training pose, where the publication prefers a relevance
+vector machine for its sparseness; a product of kernels of silhouette and predicted pose, at constant velocity; several
+views stand side by side. To render training poses counts in no frame's budget.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,8 +19,7 @@ from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, 
 from posefit_related.frames import frame_of, place_of
 
 POINTS, ANGLES, RADII = 80, 12, 5  # of a border and of a shape context; the latter two are the publication's
-VOTES = 0.25  # ours: a normal vote's width, as a share of the usual distance of contexts
-STATE_NOISE = 0.3  # ours: of training's predicted poses, in deviations of each number
+VOTES, STATE_NOISE = 0.25, 0.3  # ours: widths of a vote, in usual distances, and of a prediction, in deviations
 
 
 def contexts(mask: NDArray[np.bool_]) -> Array:
@@ -68,9 +67,7 @@ class Regression:
         poses = np.concatenate([motion.poses for motion in task.training])
         poses = poses[rng.integers(len(poses), size=samples)]
         poses[:, 0] = rng.uniform(-np.pi, np.pi, samples)
-        shapes = [
-            [contexts(project(task.body, camera, pose, task.anchor)) for pose in poses] for camera in task.cameras
-        ]
+        shapes = [[contexts(project(task.body, view, pose, task.anchor)) for pose in poses] for view in task.cameras]
         some = np.concatenate([part for view in shapes for part in view[:: max(samples // 200, 1)]])
         self.words = MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0).fit(some).cluster_centers_
         signs = np.concatenate([[histogram(part, self.words) for part in view] for view in shapes], axis=1)

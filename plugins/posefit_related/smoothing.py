@@ -52,6 +52,7 @@ class Smoothing:
         poses = first_poses(self.task, rng, count)
         where = np.tile(self.task.anchor, (count, 1))
         here = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
+        likelihood = np.full(count, 1.0 / count)
         for observation in sequence:
             if states:
                 rows = systematic(likelihood, rng.random())
