@@ -25,6 +25,12 @@ def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
     return poses
 
 
+def squared_distances(first: Array, second: Array) -> Array:
+    """Return the squared distances (n, k) of points (n, D) from others (k, D)."""
+    squares = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1) - 2.0 * first @ second.T
+    return np.asarray(np.maximum(squares, 0.0))
+
+
 def frame_of(task: Task, observation: Observation, pose: Array, place: Array, evaluations: int) -> Frame:
     """Return the frame of a pose (66,) at a place (3,), whose cost is one evaluation more."""
     views = zip(task.cameras, observation.silhouettes, strict=True)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, project
-from posefit_related.frames import frame_of, place_of
+from posefit_related.frames import frame_of, place_of, squared_distances
 
 POINTS, ANGLES, RADII = 80, 12, 5  # of a border and of a shape context; the latter two are the publication's
 VOTES, STATE_NOISE = 0.25, 0.3  # ours: widths of a vote, in usual distances, and of a prediction, in deviations
@@ -42,7 +42,7 @@ def contexts(mask: NDArray[np.bool_]) -> Array:
 
 def histogram(shapes: Array, words: Array) -> Array:
     """Return the votes (k,) of contexts (n, 60) for the words (k, 60) of a codebook; they sum to 1."""
-    squares = (shapes**2).sum(axis=1)[:, None] + (words**2).sum(axis=1) - 2.0 * shapes @ words.T
+    squares = squared_distances(shapes, words)
     squares -= squares.min(axis=1, keepdims=True)
     votes = np.exp(-squares / (2.0 * (VOTES * np.sqrt(squares.mean()) + 1e-9) ** 2))
     return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))  # AGARWAL2006 (histogram)
@@ -109,9 +109,9 @@ class Regression:
 
     def _kernel(self, signs: Array, states: Array, known: int) -> Array:
         """Return the kernels (n, samples) of silhouettes, and of the first `known` numbers of predicted poses."""
-        squares = ((signs[:, None] - self.signs) ** 2).sum(axis=2) / self.width
+        squares = squared_distances(signs, self.signs) / self.width
         if known:
-            squares += ((states[:, None, :known] - self.states[:, :known]) ** 2).mean(axis=2)
+            squares += squared_distances(states[:, :known], self.states[:, :known]) / known
         return np.asarray(np.exp(-squares))  # AGARWAL2006 (kernel)
 
 
