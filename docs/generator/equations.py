@@ -20,7 +20,7 @@ SOURCES = {
     "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
     "JOHN2010": "John, Trucco and Ivekovic, Markerless human articulated tracking using hierarchical PSO, 2010",
     "ZHAO2008": "Zhao and Liu, Generative tracking of 3D motion by hierarchical annealed genetic algorithm, 2008",
-    "KRZESZOWSKI2010": "Krzeszowski, Kwolek and Wojciechowski, Articulated body motion tracking by swarm and filter, 2010",
+    "KRZESZOWSKI2010": "Krzeszowski, Kwolek and Wojciechowski, Articulated body tracking by combined PSO and filtering, 2010",
     "GAVRILA1996": "Gavrila and Davis, 3-D model-based tracking of humans in action: a multi-view approach, 1996",
     "PEURSUM2010": "Peursum, Venkatesh and West, A study on smoothing for particle-filtered 3D body tracking, 2010",
     "WACHTER1999": "Wachter and Nagel, Tracking persons in monocular image sequences, 1999",
