@@ -18,11 +18,14 @@ SOURCES = {
     "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
     "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
     "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
-    "JOHN2010": "John, Trucco and Ivekovic, Markerless human articulated tracking using hierarchical PSO, 2010",
-    "ZHAO2008": "Zhao and Liu, Generative tracking of 3D motion by hierarchical annealed genetic algorithm, 2008",
-    "KRZESZOWSKI2010": "Krzeszowski, Kwolek and Wojciechowski, Articulated body tracking by combined PSO and filtering, 2010",
+    "JOHN2010": "John, Trucco and Ivekovic, Markerless human articulated tracking using hierarchical particle swarm "
+    "optimisation, 2010",
+    "ZHAO2008": "Zhao and Liu, Generative tracking of 3D human motion by hierarchical annealed genetic algorithm, 2008",
+    "KRZESZOWSKI2010": "Krzeszowski, Kwolek and Wojciechowski, Articulated body motion tracking by combined particle "
+    "swarm optimization and particle filtering, 2010",
     "GAVRILA1996": "Gavrila and Davis, 3-D model-based tracking of humans in action: a multi-view approach, 1996",
-    "PEURSUM2010": "Peursum, Venkatesh and West, A study on smoothing for particle-filtered 3D body tracking, 2010",
+    "PEURSUM2010": "Peursum, Venkatesh and West, A study on smoothing for particle-filtered 3D human body tracking, "
+    "2010",
     "WACHTER1999": "Wachter and Nagel, Tracking persons in monocular image sequences, 1999",
     "AGARWAL2006": "Agarwal and Triggs, Recovering 3D human pose from monocular images, 2006",
     "WANG2003": "Wang, Xu and Ai, Learning object intrinsic structure for robust visual tracking, 2003",
