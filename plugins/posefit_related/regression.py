@@ -6,8 +6,8 @@ the centres of a codebook. Poses are regressed by kernels on a training set of r
 predicted pose joins the silhouette, since one silhouette may be of several poses.
 
 Interpretations: damped least squares over a kernel at every training pose, where the publication prefers a relevance
-vector machine for its sparseness; a product of kernels of silhouette and predicted pose, at constant velocity; several
-views stand side by side. To render training poses counts in no frame's budget.
+vector machine for its sparseness; a product of kernels of silhouette and predicted pose; several views side by side. To
+render training poses counts in no frame's budget.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,7 +19,9 @@ from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, 
 from posefit_related.frames import frame_of, place_of, squared_distances
 
 POINTS, ANGLES, RADII = 80, 12, 5  # of a border and of a shape context; the latter two are the publication's
-VOTES, STATE_NOISE = 0.25, 0.3  # ours: widths of a vote, in usual distances, and of a prediction, in deviations
+YAW_REACH = np.radians(90.0)  # ours: of training poses to either side of a known first yaw
+VOTES, STATE_NOISE = 0.25, 0.5  # ours: widths of a vote, in usual distances, and of a prediction, in deviations
+DAMPING, SHARPNESS = 0.5, (3.0, 0.3, 0.5)  # ours: of velocity; of the kernel in silhouette, yaw, and other angles
 
 
 def contexts(mask: NDArray[np.bool_]) -> Array:
@@ -66,7 +68,7 @@ class Regression:
         self.task, rng = task, np.random.default_rng(0)
         poses = np.concatenate([motion.poses for motion in task.training])
         poses = poses[rng.integers(len(poses), size=samples)]
-        poses[:, 0] = rng.uniform(-np.pi, np.pi, samples)
+        poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * (np.pi if task.yaw is None else YAW_REACH) + (task.yaw or 0.0)
         shapes = [[contexts(project(task.body, view, pose, task.anchor)) for pose in poses] for view in task.cameras]
         some = np.concatenate([part for view in shapes for part in view[:: max(samples // 200, 1)]])
         self.words = MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0).fit(some).cluster_centers_
@@ -99,19 +101,17 @@ class Regression:
     def _predicted(self, latest: list[Array]) -> tuple[Array, int]:
         """Return the predicted numbers, scaled, and how many of them are known."""
         if latest:
-            return 2.0 * latest[-1] - latest[0], len(self.mean)  # AGARWAL2006 (prediction)
-        task = self.task
-        pose = np.concatenate(
-            [[task.yaw or 0.0, 0.0, 0.0], np.zeros(63) if task.first_pose is None else task.first_pose]
-        )
-        known = 0 if task.yaw is None else 2 if task.first_pose is None else len(self.mean)
+            return latest[-1] + DAMPING * (latest[-1] - latest[0]), len(self.mean)  # AGARWAL2006 (prediction)
+        yaw, angles = self.task.yaw, self.task.first_pose
+        pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], np.zeros(63) if angles is None else angles])
+        known = 0 if yaw is None else 2 if angles is None else len(self.mean)
         return (numbers(pose[None])[0] - self.mean) / self.scale, known
 
     def _kernel(self, signs: Array, states: Array, known: int) -> Array:
         """Return the kernels (n, samples) of silhouettes, and of the first `known` numbers of predicted poses."""
-        squares = squared_distances(signs, self.signs) / self.width
-        if known:
-            squares += squared_distances(states[:, :known], self.states[:, :known]) / known
+        scales = np.sqrt(np.repeat([SHARPNESS[1] / 2, SHARPNESS[2] / 65], [2, 65]))[:known]
+        squares = squared_distances(states[:, :known] * scales, self.states[:, :known] * scales)
+        squares += SHARPNESS[0] * squared_distances(signs, self.signs) / self.width
         return np.asarray(np.exp(-squares))  # AGARWAL2006 (kernel)
 
 
