@@ -10,7 +10,6 @@ the latents of a pose are the mean of those of the nearest training poses, by th
 latent is feasible where the process is certain enough, instead of a cost that grows with its variance.
 """
 
-from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -107,8 +106,3 @@ class GPLVM:
         near = kernel(np.asarray(latents), self.latents, self.logs)
         explained = np.einsum("nk,kl,nl->n", near, self.inverse, near)  # URTASUN2005 (variance)
         return np.asarray(1.0 - explained / np.exp(self.logs[0]) <= MAX_VARIANCE)
-
-    def save(self, path: str | Path) -> None:
-        """Write everything that was learned to an .npz file."""
-        names = ("angles", "mean", "scale", "latents", "logs", "inverse", "factors", "low", "high")
-        np.savez(path, **{name: getattr(self, name) for name in names})

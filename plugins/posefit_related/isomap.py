@@ -11,7 +11,6 @@ few as connect all poses; at most `poses` of training are used, evenly.
 """
 
 import warnings
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -92,10 +91,6 @@ class IsomapPrior:
         """Return which latents (n, m) have a training pose near them (n,)."""
         squares = ((np.asarray(latents)[:, None] - self.centres) ** 2).sum(axis=2)
         return np.asarray(squares.min(axis=1) <= self.reach**2)
-
-    def save(self, path: str | Path) -> None:
-        """Write the poses and their latents to an .npz file."""
-        np.savez(path, angles=self.angles, centres=self.centres, low=self.low, high=self.high)
 
 
 def evenly(angles: Array, count: int) -> Array:
