@@ -14,9 +14,16 @@ def costs_of(task: Task, observation: Observation, poses: Array, places: Array) 
     return np.asarray(np.mean([mismatch(areas(task.body, *view, poses, places)) for view in views], axis=0))
 
 
+def training_poses(task: Task) -> Array:
+    """Return the poses (T, 66) of all training motions. Raises ValueError where there is none."""
+    if not task.training:
+        raise ValueError("training must hold a motion to learn from, got none")
+    return np.concatenate([motion.poses for motion in task.training])
+
+
 def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
     """Return poses (count, 66) that a first frame may show: training's, or the known one, and yaws as far as known."""
-    poses = np.concatenate([motion.poses for motion in task.training])
+    poses = training_poses(task)
     poses = poses[rng.integers(len(poses), size=count)]
     if task.first_pose is not None:
         poses[:, 1:3], poses[:, 3:] = 0.0, task.first_pose

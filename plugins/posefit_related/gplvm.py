@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from posefit.plugin import Array, at_least
-from posefit_related.isomap import evenly
+from posefit_related.frames import squared_distances
+from posefit_related.isomap import evenly, training_angles
 
 STEPS = 150  # ours: of L-BFGS
 NEAREST = 4  # ours: training poses whose latents a pose has
@@ -68,11 +69,7 @@ class GPLVM:
 
     def fit(self, angles: Array, skeleton: object = None) -> Self:
         """Learn from joint angles (T, 63). Raises ValueError where they are not, or too few."""
-        angles = np.asarray(angles, dtype=np.float64)
-        if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
-            raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")
-        if len(angles) <= max(NEAREST, self._components):
-            raise ValueError(f"angles must hold more than {max(NEAREST, self._components)} frames, got {len(angles)}")
+        angles = training_angles(angles, max(NEAREST, self._components) + 1)
         self.angles, self.mean = evenly(angles, self._poses), angles.mean(axis=0)
         self.scale = np.maximum(angles.std(axis=0), 1e-3)  # URTASUN2005 (scales)
         y = (self.angles - self.mean) / self.scale
@@ -89,8 +86,7 @@ class GPLVM:
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63): those of the nearest training poses."""
-        away = ((np.asarray(angles)[:, None] - self.angles) / self.scale) ** 2
-        squares = away.sum(axis=2)
+        squares = squared_distances(np.asarray(angles) / self.scale, self.angles / self.scale)
         nearest = np.argsort(squares, axis=1, kind="stable")[:, :NEAREST]
         weights = 1.0 / (np.take_along_axis(squares, nearest, axis=1) + 1e-9)
         weights /= weights.sum(axis=1, keepdims=True)

@@ -56,11 +56,7 @@ class IsomapPrior:
         """Learn from joint angles (T, 63). Raises ValueError where they are not, or too few."""
         from sklearn.manifold import Isomap
 
-        angles = np.asarray(angles, dtype=np.float64)
-        if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
-            raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")
-        if len(angles) <= max(NEIGHBOURS, self._components):
-            raise ValueError(f"angles must hold {max(NEIGHBOURS, self._components) + 1} frames, got {len(angles)}")
+        angles = training_angles(angles, max(NEIGHBOURS, self._components) + 1)
         self.angles = evenly(angles, self._poses)
         for neighbours in range(NEIGHBOURS, len(self.angles)):
             with warnings.catch_warnings():
@@ -91,6 +87,16 @@ class IsomapPrior:
         """Return which latents (n, m) have a training pose near them (n,)."""
         squares = ((np.asarray(latents)[:, None] - self.centres) ** 2).sum(axis=2)
         return np.asarray(squares.min(axis=1) <= self.reach**2)
+
+
+def training_angles(angles: Array, least: int) -> Array:
+    """Return joint angles (T, 63) of training. Raises ValueError where they are none, or fewer than `least` frames."""
+    angles = np.asarray(angles, dtype=np.float64)
+    if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
+        raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")
+    if len(angles) < least:
+        raise ValueError(f"angles must hold at least {least} frames, got {len(angles)}")
+    return angles
 
 
 def evenly(angles: Array, count: int) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, project
-from posefit_related.frames import frame_of, place_of, squared_distances
+from posefit_related.frames import frame_of, place_of, squared_distances, training_poses
 
 POINTS, ANGLES, RADII = 80, 12, 5  # of a border and of a shape context; the latter two are the publication's
 YAW_REACH = np.radians(90.0)  # ours: of training poses to either side of a known first yaw
@@ -66,7 +66,7 @@ class Regression:
         at_least("words", words, 2)
         positive("ridge", ridge)
         self.task, rng = task, np.random.default_rng(0)
-        poses = np.concatenate([motion.poses for motion in task.training])
+        poses = training_poses(task)
         poses = poses[rng.integers(len(poses), size=samples)]
         poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * (np.pi if task.yaw is None else YAW_REACH) + (task.yaw or 0.0)
         shapes = [[contexts(project(task.body, view, pose, task.anchor)) for pose in poses] for view in task.cameras]

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, weigh
-from posefit_related.frames import costs_of, first_poses, frame_of
+from posefit_related.frames import costs_of, first_poses, frame_of, training_poses
 from posefit_related.psopf import systematic
 
 HEAVIEST = 600  # ours: particles of a frame that are smoothed
@@ -40,7 +40,7 @@ class Smoothing:
         positive("sharpness", sharpness)
         positive("spread", spread)
         self.task, self.sharpness, self.backwards = task, sharpness, backwards
-        poses = np.concatenate([motion.poses[:, 1:] for motion in task.training])
+        poses = training_poses(task)[:, 1:]
         self.mean = poses.mean(axis=0)
         self.axes = np.linalg.svd(poses - self.mean, full_matrices=False)[2][:components]
         self.steps = spread * self._training_steps()

@@ -1,5 +1,6 @@
 """The related work as plugins: rules of their kinds, a few frames of a made walk, masks without a known place."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,16 @@ def test_a_place_that_is_not_known_is_found_in_the_masks(method: str) -> None:
     )
     assert track.summary["iou"] > 0.3
     assert np.isfinite(track.motion.translations).all()
+
+
+def test_without_training_there_is_one_line() -> None:
+    task = replace(scene()[0], training=())
+    for name in TRACKERS:
+        with pytest.raises(ValueError, match="training must hold a motion"):
+            list(registry().offer("tracker", name).factory(task).track(scene()[2], np.random.default_rng(0)))
+    for name in ("isomap", "gplvm"):
+        with pytest.raises(ValueError, match="angles must hold at least"):
+            registry().offer("prior", name).factory().fit(np.zeros((3, 63)))
 
 
 def test_a_mask_says_where_the_root_is() -> None:
