@@ -10,11 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 import functions
+import gpu
 from make_boxes import learned_from, upright_poses
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
 from posefit.motion.built_in import average_skeleton
 from posefit.suites.boxes import STEP, TRAINING_PEOPLE, learned_without
 from posefit.sweep.plan import Plan
+from posefit_reproduce.bench import kernel
 from scores import auroc, calibration_error, conformal_factor, false_alarms, kept_errors
 from tests.docs.pages import DOCS
 
@@ -233,3 +235,15 @@ def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> 
     lines = list(functions.share_lines({2: functions.shares_of(targets[None], [costs])}))
     assert lines[2].startswith("| 2 next frame |")
     assert picture.any()
+
+
+@pytest.mark.device
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel, "ROUNDS", 1)
+    monkeypatch.setattr(gpu, "_gpu", lambda: "simulated")
+    figures = gpu.figures_of(sizes=((24, 18),), poses=(1, 2))
+    assert [(case["poses"], case["differing"], case["off_by"]) for case in figures["cases"]] == [(1, 0, 0), (2, 0, 0)]
+    lines = list(gpu.lines_of(figures))
+    assert len(lines) == 4
+    assert lines[2].endswith("  equal")
