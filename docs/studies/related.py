@@ -18,6 +18,7 @@ import numpy as np
 
 from posefit.cli.output import Command
 from posefit.errors import InputError
+from posefit.evaluation.measures import MEASURES
 from posefit.statistics.means import mean_interval
 from posefit.sweep.ledger import Ledger
 from table import head_of, markdown, number, percent
@@ -93,11 +94,11 @@ def methods(rows: Sequence[Row]) -> Iterator[str]:
         lost = float(np.mean([row["lost_rate"] for row in mine]))
         some = [median(WORSE, [row for row in mine if part(condition_of(row))]) for part in parts.values()]
         figures = [number("error_degrees", angles), number(WORSE, median(WORSE, mine)), percent(lost)]
-        ms = 1000.0 * (median(SLOWER, mine) or 0.0)
-        cells.append([f"`{name}`", str(len(mine)), *figures, *(number(WORSE, value) for value in some), f"{ms:.1f}"])
-    cells.sort(key=lambda cell: float(cell[3]))
+        figures += [*(number(WORSE, value) for value in some), number(SLOWER, median(SLOWER, mine))]
+        cells.append([f"`{name}`", str(len(mine)), *figures])
+    cells.sort(key=lambda cell: float(cell[3].replace(",", "")))
     heads = ["method", "tracks", head_of("error_degrees", "median"), head_of(WORSE, "median"), head_of("lost_rate")]
-    yield from markdown([*heads, *parts, "CPU ms a frame"], cells)
+    yield from markdown([*heads, *parts, head_of(SLOWER)], cells)
 
 
 def paired(rows: Sequence[Row], method: str, reference: str, figure: str) -> dict[tuple[Condition, int], float]:
@@ -119,22 +120,19 @@ def winners(rows: Sequence[Row]) -> Iterator[str]:
             name: float(np.mean([row[WORSE] for row in mine if name_of(row) == name])) for name in map(name_of, mine)
         }
         first, *others = sorted(means, key=lambda name: means[name])
-        line = [words_of(condition), f"`{first}`", number(WORSE, means[first])]
-        if others:
-            differences = list(paired(mine, others[0], first, WORSE).values())
-            line += [
-                f"`{others[0]}`",
-                *difference(differences, ["seeds"] * len(differences), range(len(differences)))[:2],
-            ]
-        place = 1 + sorted(means.values()).index(means["sapso@pca"]) if "sapso@pca" in means else "-"
-        lines.append([*line, *[""] * (5 - len(line) + 1), str(place)])
+        second, behind = "-", ["-", "-"]
+        if others and (pairs := paired(mine, others[0], first, WORSE)):
+            second = f"`{others[0]}`"
+            behind = list(difference(list(pairs.values()), [""] * len(pairs), list(pairs))[:2])
+        place = str(1 + [first, *others].index("sapso@pca")) if "sapso@pca" in means else "-"
+        lines.append([words_of(condition), f"`{first}`", number(WORSE, means[first]), second, *behind, place])
     heads = ["where", "leads", "MPJPE mm", "next", "behind mm", "95 % interval", "place of `sapso@pca`"]
     yield from markdown(heads, lines, words=2)
 
 
 def difference(values: Sequence[float], strata: Sequence[object], clusters: Sequence[object]) -> tuple[str, str, str]:
     """Return a mean, its interval and the verdict on a mean above 0, in words; open where there is no interval."""
-    mean = mean_interval(values, [str(one) for one in strata], [str(one) for one in clusters])
+    mean = mean_interval(values, list(map(str, strata)), list(map(str, clusters)))
     if not np.isfinite(mean.low):
         return f"{mean.value:+.3g}", "-", "open"
     verdict = "holds" if mean.low > 0.0 else "fails" if mean.high < 0.0 else "open"
@@ -146,11 +144,12 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
     lines = []
     for sentence in SENTENCES:
         pairs = paired(rows, sentence.method, sentence.reference, sentence.figure)
-        what = f"`{sentence.method}` less `{sentence.reference}`, {sentence.figure}"
+        what = f"`{sentence.method}` less `{sentence.reference}`, {head_of(sentence.figure)}"
         cells = ["", "", "open"]
         if pairs:
             strata = [condition[0] for condition, _ in pairs]
-            cells = list(difference(list(pairs.values()), strata, [condition for condition, _ in pairs]))
+            values = [MEASURES[sentence.figure].factor * value for value in pairs.values()]
+            cells = list(difference(values, strata, [condition for condition, _ in pairs]))
         conditions = len({condition for condition, _ in pairs})
         lines.append([sentence.says, what, cells[2], f"{len(pairs)} in {conditions}", *cells[:2]])
     heads = ["the paper says", "compared, above 0 if so", "verdict", "pairs in conditions", "effect", "95 % interval"]
