@@ -6,8 +6,7 @@ and the pose that fits the picture's edges best is found from there by iterated 
 
 Interpretations: the edges are those of the masks, by the fit that posefit smooths footage with, robust against what is
 far off; the covariance of the prediction is diagonal and the same in all frames, and region information is not used. A
-step is paid for as the poses that take as long. The publication begins by hand; here the best of some training poses is
-the first.
+step is paid for as the poses that take as long. The first pose is the best of some training poses.
 """
 
 from collections.abc import Iterable, Iterator

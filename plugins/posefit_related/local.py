@@ -1,4 +1,4 @@
-"""Local search by parts: the torso first, then limb after limb, each by best-first search.
+"""Local search by parts: the root first, then limb after limb, each by best-first search.
 
 D. Gavrila, L. Davis, 3-D model-based tracking of humans in action: a multi-view approach, CVPR 1996. Its abstract says
 that pose recovery is a search for the pose whose synthesised appearance is most similar to the picture's, by a

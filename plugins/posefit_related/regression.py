@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, project
 from posefit_related.frames import frame_of, place_of, squared_distances, training_poses
 
-POINTS, ANGLES, RADII = 80, 12, 5  # of a border and of a shape context; the latter two are the publication's
+POINTS, ANGLES, RADII = 80, 12, 5  # ours: of a border and of a shape context
 YAW_REACH = np.radians(90.0)  # ours: of training poses to either side of a known first yaw
 VOTES, STATE_NOISE = 0.25, 0.5  # ours: widths of a vote, in usual distances, and of a prediction, in deviations
 DAMPING, SHARPNESS = 0.5, (3.0, 0.3, 0.5)  # ours: of velocity; of the kernel in silhouette, yaw, and other angles

@@ -6,8 +6,8 @@ smoothing: a filter goes forwards, and then particles are weighted again from th
 says that smoothing hardly improves the filtered estimate.
 
 Interpretations: the backward weights are those of Doucet, Godsill and Andrieu (2000). The motion is a random walk of
-the pose's principal components, as wide as training moves from frame to frame; the publication has a learned model of
-activities. The heaviest particles of a frame stand for all. A frame's pose is the weighted mean, of filtered weights
+the pose's principal components, as wide as training moves from frame to frame, and not the publication's
+model. The heaviest particles of a frame stand for all. A frame's pose is the weighted mean, of filtered weights
 where `backwards` is off.
 """
 
