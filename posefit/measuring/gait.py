@@ -177,7 +177,7 @@ def _mean(steps: list[Step], name: str) -> float | None:
     return float(np.mean(values)) if (values := _values(steps, name)) else None
 
 
-def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
+def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
     """Return in which frames (T,) the root faces away from its way; `unknown` frames count for nothing.
 
     The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who

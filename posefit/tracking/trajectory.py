@@ -53,7 +53,7 @@ class TrajectoryCost:
 
     @property
     def total(self) -> float:
-        """By which trajectories are compared: the less the better."""
+        """By which trajectories are compared: lower is better."""
         return self.cost + self.motion
 
 

@@ -244,8 +244,8 @@ def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> N
     scene, truth = footage(20)
     estimate = estimate_of(truth)
     whole, _ = fitted(scene, estimate)
-    monkeypatch.setattr(contours, "WINDOW_FRAMES", 10)
-    monkeypatch.setattr(contours, "OVERLAP_FRAMES", 6)
+    monkeypatch.setattr(contours, "CONTOUR_WINDOW", 10)
+    monkeypatch.setattr(contours, "CONTOUR_OVERLAP", 6)
     assert distance(fitted(scene, estimate)[0], whole) < 0.1 * distance(estimate, whole)
     motion, shape = fitted(scene, estimate, replace(average_shape(scene), height=scene.body.stature))
     assert shape is not None
