@@ -190,7 +190,7 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
 
     def pulled(joints: np.ndarray, parents: list[int], radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, forces = np.zeros((len(parents), 6, 6)), np.zeros((len(parents), 6))
-        mask = field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
+        mask = kernels.Contour(field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25)
         kernels.add_pulls(np.array(parents), joints, radii, mask, scale, blocks, forces)
         return blocks[0], forces[0]
 

@@ -29,7 +29,6 @@ from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_s
 FINE_PIXELS = 80.0  # pixels of a metre; of finer masks only every second pixel, third, ... is used
 FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
 
-BoneSums = tuple[Array, Array]  # (T, 27, 6, 6) and (T, 27, 6, 1 + F)
 Distances = NDArray[np.float32]
 Integers = NDArray[np.int64]
 
@@ -70,11 +69,11 @@ class MaskContours:
         starts = np.cumsum([0, *map(len, points)])
         return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
 
-    def add(self, body: Body, frames: Array, scale: float, grown: tuple[Array, Array, Array], out: BoneSums) -> None:
+    def add(self, body: Body, frames: Array, scale: float, grown: kernels.Growth, sums: kernels.BoneSquares) -> None:
         """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
         camera = tuple(writeable(getattr(self.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
-        contours = self.fields, self.corners, self.sizes, self.points, self.starts, self.step
-        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, out)
+        contours = kernels.Contours(self.fields, self.corners, self.sizes, self.points, self.starts, self.step)
+        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, sums)
 
 
 def _border(observation: Observation, view: int, factor: int, step: int) -> tuple[Array, tuple[int, int], Distances]:
@@ -140,14 +139,15 @@ def contour_squares(
     wider, larger = grown or (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
     factors = len(larger)
     placed = skeleton.frames(poses, places)
-    by_factors = np.zeros((1 + factors, 1 + factors))
-    bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
+    squares = np.zeros((1 + factors, 1 + factors))
+    bones = [np.zeros((count, len(JOINTS), 6, columns)) for columns in (6, 1 + factors)]
+    sums = kernels.BoneSquares(*bones)
     for view in views:
-        view.add(body, placed[0], scale, (wider, larger, by_factors), bones)
+        view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
     free = np.flatnonzero(np.append([True] * 3, skeleton.free))
     curves, slopes = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
-    kernels.add_all_bones(skeleton.chain, placed, bones, free, (curves, slopes))
-    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], by_factors[1:, 1:], by_factors[1:, 0])
+    kernels.add_all_bones(skeleton.chain, placed, sums, free, (curves, slopes))
+    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], squares[1:, 1:], squares[1:, 0])
 
 
 FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
@@ -158,9 +158,8 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     bodies = [shaped(body, np.exp(FACTOR_DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
     here = motion.joints
     joints = [grown.skeleton.joints(motion.poses, motion.translations) - here for grown in bodies]
-    return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(
-        [grown.radii - body.radii for grown in bodies]
-    ) / FACTOR_DIFFERENCE
+    radii = [grown.radii - body.radii for grown in bodies]
+    return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(radii) / FACTOR_DIFFERENCE
 
 
 # metres, step by step: what is farther off counts less, as it may be another person's, or a bag's

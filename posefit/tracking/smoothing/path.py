@@ -43,9 +43,8 @@ class Squares:
             frames = slice(first, count - 2 + first)
             self.slopes[frames, which] += SECOND_DIFFERENCE[first] * bends
             for second in range(first, 3):
-                self.curves[second - first, frames, some, some] += (
-                    weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
-                )
+                square = weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
+                self.curves[second - first, frames, some, some] += square
 
     def add_steps(self, frames: NDArray[np.int64], series: Array, derivatives: Array, weight: float) -> None:
         """Add the squares of `weight` times the changes of `series` (T, m) from some frames to the next ones.
