@@ -124,8 +124,7 @@ class PoseProblem:
 
     def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
         """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
-        scene = self.body, self.cameras, self.silhouettes
-        return pose_costs(*scene, poses, translations, self.beta, self.threads)
+        return pose_costs(self.body, self.cameras, self.silhouettes, poses, translations, self.beta, self.threads)
 
     @cached_property
     def on_device(self) -> bool:

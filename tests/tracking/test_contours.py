@@ -145,7 +145,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(3)
     numbers = drawn_body(body, CAMERA, body.skeleton.joints(np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))[0])
     points = rng.uniform(40.0, 160.0, (30, 2))
-    mask = np.zeros((1, 1), np.float32), np.zeros(2, np.int64), np.ones(2, np.int64), points, 1.0
+    mask = kernels.Contour(np.zeros((1, 1), np.float32), np.zeros(2, np.int64), np.ones(2, np.int64), points, 1.0)
 
     def half_sum(numbers: np.ndarray) -> float:
         joints, radii, total = numbers[:54].reshape(27, 2), numbers[54:].reshape(26, 2), 0.0
