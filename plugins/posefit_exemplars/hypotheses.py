@@ -98,8 +98,6 @@ class Counts(NamedTuple):
 
 
 class _FittedFrame(NamedTuple):
-    """The hypotheses of a frame, and their weights."""
-
     estimate: Estimate  # on the path of the beam
     hypotheses: Hypotheses
     states: markov.FrameStates

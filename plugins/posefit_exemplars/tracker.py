@@ -133,7 +133,6 @@ class ExemplarTracker:
             yield estimate
 
     def _beams(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[_BeamFrame]:
-        """Yield the beam of each frame."""
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
         latest: _BeamFrame | None = None
         for number, observation in enumerate(observations):

@@ -117,7 +117,6 @@ def _iou(scene: Scene, frames: Sequence[Frame]) -> Array:
 def _errors(
     scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float
 ) -> tuple[Table, dict[str, Any]]:
-    """Return the columns and the measures that need a truth; none where it is unknown."""
     if scene.truth is None:
         return {}, {}
     truth, places, skeleton = scene.truth.poses, scene.truth.translations, scene.body.skeleton
@@ -196,7 +195,6 @@ def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
 
 
 def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return the measures of how joints accelerate and standing feet slide."""
     joints, fps = scene.motion(frames).joints, scene.fps
     mean, true_joints = mean_known(acceleration(joints, fps)), None if scene.truth is None else scene.truth.joints
     true_mean = None if true_joints is None else mean_known(acceleration(true_joints, fps))

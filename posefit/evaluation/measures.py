@@ -42,7 +42,6 @@ def _figure(*figure: Any) -> Any:
 
 
 def _share(label: str, meaning: str) -> Any:
-    """Return the field of a share, shown in percent."""
     return _figure(label, "%", 0, meaning, 100.0)
 
 

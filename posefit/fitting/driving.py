@@ -138,7 +138,6 @@ def _check(frame: Frame, audit: Audit) -> None:
 
 
 def _counted(frame: Frame, number: int, counted: int, leeway: int, budget: int, audit: Audit) -> Frame:
-    """Return the frame with the evaluations that were counted, where it reports fewer, and note it."""
     if counted > frame.evaluations + leeway:
         audit.note("evaluations", number, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
         frame = with_evaluations(frame, counted)

@@ -133,7 +133,6 @@ class PoseProblem:
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
-        """The views of which something is known, as the kernel needs them."""
         views = [
             (drawing_of(self.body, camera, silhouette), silhouette)
             for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)

@@ -276,7 +276,6 @@ class SynthesisTracker:
         return PoseProblem(task.body, task.cameras, silhouettes, space, beta=beta, threads=task.threads, blank=True)
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
-        """Return the optimiser of the next frame, as `next_frame` asks."""
         if self.next_frame == "carry" and optimiser is not None:
             cast(Filter, optimiser).advance(space)
             return optimiser

@@ -106,7 +106,6 @@ def plugin_errors(name: str, what: str, passed: tuple[type[BaseException], ...] 
 
 
 def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
-    """Return the error that names the plugin which raised another."""
     if isinstance(error, SystemExit):
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
     # where the plugin raised it, or passed it on from a library

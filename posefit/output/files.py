@@ -112,5 +112,4 @@ def page_of(content: Content) -> str:
 
 
 def _filmed(scene: Scene) -> tuple[Iterable[Observation], Iterable[Image | None]]:
-    """Return what was observed in each frame, and the footage of each, None where there is none."""
     return scene.observations, repeat(None) if scene.pictures is None else scene.pictures()

@@ -33,7 +33,7 @@ def evaluate(
     """Return a track with errors against the truth where it is known, else signs of trust.
 
     `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
-    from the first mask that was read.
+    from the first mask that was read. The build is that of `scene`; that of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
     posteriors = [frame.posterior for frame in frames]

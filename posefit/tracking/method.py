@@ -154,7 +154,6 @@ def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequenc
 
 
 def _assignment(text: str) -> tuple[str, str]:
-    """Return the name and the value of a text such as `sapso.cooling=0.9`."""
     key, equals, value = text.partition("=")
     if not equals or key.endswith("."):
         raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(text)}")

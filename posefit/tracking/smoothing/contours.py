@@ -174,8 +174,6 @@ CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once,
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A window of a track, before its fit or after some of its steps."""
-
     estimate: Motion  # before it is fitted
     fitted: Motion
     body: Body
