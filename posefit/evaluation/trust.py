@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.evaluation.errors import LOST, Table, mean_known
 from posefit.fitting.tracker import Frame, Observation
-from posefit.footage.quality import AROUND, LAG, changed_pixels
+from posefit.footage.quality import LAG, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses
@@ -121,20 +121,13 @@ def covered_pixels(image: Image, then: Image, body: Mask, observed: Mask, reach:
     """Return how many pixels that moved since another picture lie at the body, and how many there are.
 
     Only pixels as near as half of `reach`, the person's longer side in pixels, to the body or to what was
-    observed mask count; both masks are those of the two pictures together.
+    observed count; both masks are those of the two pictures together.
     """
-    left, top, width, height = cv2.boundingRect((body | observed).astype(np.uint8))
-    if not width:
+    region = body | observed
+    if not region.any():
         return 0, 0
-    far = round(AROUND * reach)
-    window = np.s_[max(0, top - far) : top + height + far, max(0, left - far) : left + width + far]
-    changed = changed_pixels(image, then)[window]
-    count = int(changed.sum())
-    if count <= MIN_MOVED * body.sum():
-        return 0, 0
-    width = 2 * max(1, round(CLOTHES * reach)) + 1
-    near = cv2.dilate(body[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
-    return int((changed & near).sum()), count
+    moved, inside = moved_pixels(changed_pixels(image, then), region, body, reach, CLOTHES)
+    return (inside, moved) if moved > MIN_MOVED * body.sum() else (0, 0)
 
 
 Grade = Literal["good", "doubtful", "useless"]
@@ -277,7 +270,7 @@ NOT_REPORTED = "the method does not say"
 MASKS_ALONE, STILL, MOVES = "there are masks alone", "nothing moves enough", "the camera moves"
 TOO_FEW = "too few frames show the person"
 IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
-STAYS = 1.0  # metres along the ground's axes: who stays within walks nowhere
+MAX_STATIONARY_METRES = 1.0  # along the ground's axes: who stays within walks nowhere
 
 
 def trust_of(
@@ -298,7 +291,7 @@ def trust_of(
     few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
     joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
     stands = standing(joints, fps) & usable[:, None]
-    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= STAYS
+    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= MAX_STATIONARY_METRES
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
     lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
