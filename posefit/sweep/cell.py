@@ -149,7 +149,7 @@ class TrackCell(Cell):
         measured = asdict(result.measures)
         row = {
             **{name: measured[name] for name in MEASURES if name not in RENAMED_MEASURES},
-            "warnings": result.course.warnings,
+            "warnings": result.log.warnings,
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from posefit.arrays import Array
 from posefit.fitting.optimiser import populations
 from posefit.fitting.problem import PoseProblem
-from posefit.fitting.tracker import Follower, Prediction
+from posefit.fitting.tracker import Predictor, Prediction
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit.report.figures import COLOURS
@@ -91,7 +91,7 @@ def watched_swarm(motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterati
     scene = paper_scene(motion, SHOWN_VIEW, (0, 1))
     options = completed(TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth)
     task, observation = task_of(scene, options, motion.training), scene.observations[0]
-    space = Follower(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(observation)
+    space = Predictor(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(observation)
     problem = PoseProblem(scene.body, scene.cameras, observation.silhouettes, space)
     search = SAPSO(space, np.random.default_rng(0), population_size=particles, iterations=iterations)
     steps = list(populations(search, problem.evaluate, particles * (iterations + 1)))
