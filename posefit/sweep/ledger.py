@@ -335,7 +335,6 @@ def _check_format(file: Path, database: sqlite3.Connection) -> bool:
 
 
 def _check_place(path: Path) -> None:
-    """Return nothing. Raises InputError where a folder is no place for a ledger."""
     folder = path.parent
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
