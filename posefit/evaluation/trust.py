@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evaluation.errors import LOST, Table, mean_known
-from posefit.fitting.tracker import Frame
+from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.quality import LAG, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
@@ -201,6 +201,11 @@ class Trust:
     held: float = _sign(
         (0.0, 0.25, 0.6), "the person is gone, or nearly, in {held:.0%} of the frames in between", "held {held:.0%}"
     )
+    cropped: float | None = _sign(
+        (0.0, 0.25, 0.6),
+        "the picture's border cuts the mask above and below in {cropped:.0%} of the frames: masks cropped to the "
+        "person do not show where they are",
+    )
     frontal: float | None = _sign(
         (0.0, 0.5, 1.0),
         "one camera sees the front or the back in {frontal:.0%} of the frames, where steps and lean do not show",
@@ -262,7 +267,7 @@ FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a p
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 SEVERAL = "several cameras see the depth"
 NOT_REPORTED = "the method does not say"
-MASKS_ALONE, STILL = "there are masks alone", "nothing moves enough"
+MASKS_ALONE, STILL, MOVES = "there are masks alone", "nothing moves enough", "the camera moves"
 TOO_FEW = "too few frames show the person"
 IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
 MAX_STATIONARY_METRES = 1.0  # along the ground's axes: who stays within walks nowhere
@@ -282,7 +287,7 @@ def trust_of(
     the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
     usable = table["usable"] == 1.0
-    cut = np.array([any(touches_border(view.mask) for view in each.silhouettes) for each in scene.observations])
+    cut, cropped = np.array([_borders(each) for each in scene.observations]).T
     few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
     joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
     stands = standing(joints, fps) & usable[:, None]
@@ -295,12 +300,17 @@ def trust_of(
         "depth_scatter": TOO_FEW if few else _or(depth_scatter(depths, usable, fps), TOO_FEW),
         "foot_share": TOO_FEW if few else IN_PLACE if in_place else float(stands.any(axis=1)[usable].mean()),
         "stance_spread_m": TOO_FEW if few else _or(stance_spread(joints, stands), "no foot stands twice"),
-        "explained": MASKS_ALONE if scene.pictures is None else _or(explained_share(scene, frames, usable), STILL),
+        "explained": MASKS_ALONE
+        if scene.pictures is None
+        else MOVES
+        if scene.camera_moves
+        else _or(explained_share(scene, frames, usable), STILL),
         "interval_mm": _or(mean_known(radii), NOT_REPORTED),
         "training_mm": SEVERAL if several else TOO_FEW if few else _training_mm(scene, frames, usable, training),
         "lost": _or(mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
         "unknown": _or(mean_known(unknown), NOT_REPORTED),
         "held": held_share(usable, cut),
+        "cropped": TOO_FEW if few else float(cropped[usable].mean()),
         "frontal": SEVERAL if several else _or(mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW),
         "iou": iou,
         "acceleration": TOO_FEW if few else _or(mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
@@ -321,6 +331,12 @@ def trust_of(
         unknown_signs=reasons,
         **figures,
     )
+
+
+def _borders(observation: Observation) -> tuple[bool, bool]:
+    """Return whether the picture's border cuts the person in some view, and whether above and below in all."""
+    masks = [silhouette.mask for silhouette in observation.silhouettes]
+    return any(map(touches_border, masks)), all(mask[0].any() and mask[-1].any() for mask in masks)
 
 
 def _or(value: float | None, why: str) -> float | str:

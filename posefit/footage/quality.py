@@ -53,7 +53,9 @@ SHORT, TALL = 0.45, 1.9  # times their height: what a person may seem, from abov
 class FrameQuality:
     """Compares the mask of one frame after the other with the pictures; its rows become quality.csv."""
 
-    def __init__(self, fps: float, background: Image | None = None) -> None:
+    def __init__(self, fps: float, background: Image | None = None, *, still: bool = True) -> None:
+        """Where the background need not be `still`, what moves outside a mask does not count."""
+        self._still = still
         self._edges = None if background is None else _edges(background)
         self._before: deque[tuple[Image, Mask]] = deque(maxlen=max(1, round(LAG * fps)))
         self._areas: deque[int] = deque(maxlen=AREA_FRAMES)
@@ -98,7 +100,7 @@ class FrameQuality:
 
     def _outside(self, image: Image, person: Person, side: int) -> float:
         """Return which share of the pixels that moved, at the person and around, lies outside the mask."""
-        if not self._before or not person.area:
+        if not self._still or not self._before or not person.area:
             return 0.0
         earlier, mask = self._before[0]
         covered = person.mask | mask

@@ -48,6 +48,18 @@ def width_of(text: str, scale: float = 0.5) -> int:
     return int(cv2.getTextSize(text, _FONT, scale, 1)[0][0])
 
 
+def wrapped(text: str, width: int, scale: float) -> list[str]:
+    """Return the lines of a text that are at most so many pixels wide, where no word is wider."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if width_of(longer, scale) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return [*filter(None, lines)]
+
+
 def hexadecimal(colour: tuple[int, int, int]) -> str:
     """Return a colour as a page has it."""
     blue, green, red = colour
