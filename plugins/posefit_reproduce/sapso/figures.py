@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from posefit.arrays import Array
 from posefit.fitting.optimiser import populations
 from posefit.fitting.problem import PoseProblem
-from posefit.fitting.tracker import Predictor, Prediction
+from posefit.fitting.tracker import Prediction, Predictor
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit.report.figures import COLOURS
