@@ -1,6 +1,6 @@
 r"""The report of a ledger: a page that any browser opens, figures and tables for papers, files for other tools.
 
-    from posefit.report.contest import contest_of, leaderboard
+    from posefit.report.leaderboard import contest_of, leaderboard
     from posefit.report.runs import runs_of
     from posefit.report.write import leaderboard_lines, write_report
     from posefit.sweep.ledger import Ledger
