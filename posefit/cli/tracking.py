@@ -182,6 +182,6 @@ def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]
     """Return what a method learns from, some people of the library left out."""
     from posefit.motion import recorded
 
-    if not any(recorded.is_library(one) for one in train):
+    if not any(recorded.is_library(clips) for clips in train):
         raise InputError(f"without_subject must be given with --train library, got {', '.join(train)}")
-    return [recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train]
+    return [recorded.leaving_out(clips, subjects) if recorded.is_library(clips) else clips for clips in train]
