@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from posefit.fitting.optimiser import NextFrame, OptimiserFactory
     from posefit.fitting.prior import PriorFactory
-    from posefit.fitting.tracker import TrackerFactory
+    from posefit.fitting.tracker import InitialiserFactory, TrackerFactory
     from posefit.silhouette.foreground import SegmenterFactory
 
 PROJECT = "posefit"
@@ -56,10 +56,11 @@ class Register(Protocol[Factory]):
     """Registers anything else that has a factory: its name, its factory and what it needs."""
 
     def __call__(self, name: str, factory: Factory, *, needs: Needs | None = None) -> None:
-        """Register a prior or a segmenter."""
+        """Register a prior, a start or a segmenter."""
 
 
 RegisterPrior: TypeAlias = Register["PriorFactory"]
+RegisterStart: TypeAlias = Register["InitialiserFactory"]
 RegisterSegmenter: TypeAlias = Register["SegmenterFactory"]
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
 
@@ -77,6 +78,11 @@ def posefit_register_priors(register: RegisterPrior) -> Any:
 @hookspec
 def posefit_register_trackers(register: RegisterTracker) -> Any:
     """Call `register(name, factory)` for each tracker; see `posefit.fitting.tracker`."""
+
+
+@hookspec
+def posefit_register_starts(register: RegisterStart) -> Any:
+    """Call `register(name, factory)` for each way to guess a first pose; see `posefit.fitting.start`."""
 
 
 @hookspec

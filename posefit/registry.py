@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
 
-Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
+Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 OWN = "this process"  # instead of the distribution of an optimiser that no plugin registered
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides

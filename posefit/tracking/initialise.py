@@ -55,12 +55,14 @@ def initialise(
 
     Also the clocks (2,), see `posefit.fitting.driving.clocks`, at the moment when everything was compiled.
     """
+    if task.yaw is None:
+        task = replace(task, start=method.start)
     _warm_up(method, task, scene)
     start, footage = clocks(), scene.truth is None
     restarts = (RESTARTS if footage and not method.looks_ahead else 0) if options.restarts is None else options.restarts
     body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
     if restarts:
-        progress.log(f"looking for the first pose, {restarts} times")
+        progress.log("looking for the first pose")
         task, _ = best_restart(task, scene.observations, method.follow, restarts, options.seed)
     shape = None
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:

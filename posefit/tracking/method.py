@@ -17,7 +17,15 @@ from posefit.fitting.box import Space
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.tracker import Frame, Observation, Prediction, SynthesisTracker, Task, Tracker
+from posefit.fitting.tracker import (
+    Frame,
+    InitialiserFactory,
+    Observation,
+    Prediction,
+    SynthesisTracker,
+    Task,
+    Tracker,
+)
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser, CheckedPrior, plugin_errors
 from posefit.footage.source import Footage, kind_of
 from posefit.motion import built_in, recorded
@@ -27,6 +35,7 @@ from posefit.silhouette.cost import BETA
 from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "annealed"
+DEFAULT_START, BLIND = "lookup", "blind"  # where it is installed; for none
 DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
 DEFAULT_TRACKER = "exemplars"  # where it is installed
 DEFAULT_TRACKER_EVALUATIONS = 9760  # of a frame
@@ -96,6 +105,7 @@ class Method:
     relocalise_gap: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
     audit: Audit  # of what its trackers report
     build: Callable[[Task], Tracker] = field(repr=False)
+    start: InitialiserFactory | None = field(default=None, repr=False)  # guesses first poses; None for blind searches
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""
@@ -148,7 +158,16 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
     label = f"{optimiser.name}@{name}"
     audit = Audit(label, prediction.beta)
-    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build)
+    start = start_of(prediction.start)
+    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build, start)
+
+
+def start_of(name: str | None = None) -> InitialiserFactory | None:
+    """Return what guesses first poses, by its name; the default one where it is installed; None for "blind"."""
+    if name == BLIND or (name is None and DEFAULT_START not in registry().offers["start"]):
+        return None
+    factory: InitialiserFactory = registry().offer("start", name or DEFAULT_START).factory
+    return factory
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
@@ -205,9 +224,8 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
         return tracker
 
     gap = 0 if offer.looks_ahead else None
-    return Method(
-        offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, Audit(offer.label, beta), build
-    )
+    audit = Audit(offer.label, beta)
+    return Method(offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, audit, build, start_of())
 
 
 def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:

@@ -85,7 +85,7 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     the posterior's recalibration; they sum to 1, less its probability that no mode is right.
     """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
-    clusters = _clusters(distances, posterior.weights, APART)
+    clusters = [(weight, row) for weight, row, _ in clusters_of(distances, posterior.weights, APART)]
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
         share = (1.0 - posterior.recalibration.none) / sum(powers)
@@ -135,12 +135,12 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior | None], apar
     weights = np.mean([frame.weights for frame in coherent], axis=0)
     poses = np.array([frame.poses for frame in coherent])
     translations = np.array([frame.translations for frame in coherent])
-    clusters = _clusters(distances, weights, apart)
-    return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row in clusters]
+    clusters = clusters_of(distances, weights, apart)
+    return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row, _ in clusters]
 
 
-def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[float, int]]:
-    """Return the weight and the medoid of each cluster, the heaviest first.
+def clusters_of(distances: Array, weights: Array, apart: float) -> list[tuple[float, int, NDArray[np.intp]]]:
+    """Return the weight, the medoid and all rows of each cluster, the heaviest first.
 
     A centre is the row with the greatest weight near it among those that are near no earlier centre; then every row
     joins its nearest centre.
@@ -157,7 +157,7 @@ def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[floa
     for k in range(len(centres)):
         rows = np.flatnonzero(owners == k)
         medoid = int(rows[(distances[np.ix_(rows, rows)] @ weights[rows]).argmin()])
-        clusters.append((float(weights[rows].sum()), medoid))
+        clusters.append((float(weights[rows].sum()), medoid, rows))
     return sorted(clusters, key=lambda cluster: -cluster[0])
 
 
