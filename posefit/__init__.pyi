@@ -42,7 +42,7 @@ from posefit.silhouette.cost import project as project
 from posefit.silhouette.cuda.device import moved_to as moved_to
 from posefit.silhouette.mask import Silhouette as Silhouette
 from posefit.statistics.intervals import iqm_intervals as iqm_intervals
-from posefit.statistics.ranks import friedman as friedman
+from posefit.statistics.ranks import wilcoxon as wilcoxon
 from posefit.suites.problem import Problem as Problem
 from posefit.suites.problem import Suite as Suite
 from posefit.suites.problem import suite as suite

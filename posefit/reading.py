@@ -28,15 +28,15 @@ NESTING = 10_000_000
 _DECIMAL = re.compile(r"(?<![\w.])[-+]?\d+\.\d+(?:[eE][-+]?\d+)?(?![\w.])")
 
 
-def quoted(value: object, most: int = SHOWN) -> str:
+def quoted(value: object) -> str:
     """Return a value as a message quotes it, cut where it is long."""
     if isinstance(value, str | bytes | bytearray):
-        value = value[: most + 1]  # the rest would not be shown, however long it is
+        value = value[: SHOWN + 1]  # the rest would not be shown, however long it is
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # a number of more digits than Python writes, or endless nesting
         text = f"one {type(value).__name__} that is too long to write"
-    return cut(text, most)
+    return cut(text)
 
 
 def cut(text: str, most: int = SHOWN) -> str:

@@ -52,9 +52,7 @@ def test_any_cut_and_any_flipped_bit_is_read_or_refused_with_one_line(path):
 
 def test_what_would_unpack_to_more_is_refused_before_it_is(path, monkeypatch):
     monkeypatch.setattr(archive, "_exactly", None)  # nothing is unpacked
-    with (
-        pytest.raises(ValueError, match=REFUSED + "4.*e-05 GB when unpacked, where 3e-05 GB are the most"),
-    ):
+    with pytest.raises(ValueError, match=REFUSED + "4.*e-05 GB when unpacked, where 3e-05 GB are the most"):
         read(path, 30_000)
     np.savez_compressed(path, a=np.zeros(5_000, dtype=bool))  # each becomes a number of eight bytes
     with pytest.raises(ValueError, match=REFUSED + "4e-05 GB when unpacked, where 3.9e-05 GB are the most"):

@@ -8,15 +8,7 @@ import sys
 import pytest
 
 from posefit.files import MARK as UNFINISHED
-from posefit.files import (
-    Unfinished,
-    check_new,
-    check_place,
-    new_file,
-    new_folder,
-    replaceable,
-    replaced_file,
-)
+from posefit.files import Unfinished, check_new, check_place, new_file, new_folder, replaceable, replaced_file
 
 MARK = b"<!-- ours -->"
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import architecture
 
-from generator import angles, author, commands, environments, equations, figures, joints, python, settings
+from generator import angles, commands, environments, equations, figures, joints, python, settings
 
 DOCS = Path(__file__).parents[1]
 PARTS = {
@@ -21,7 +21,6 @@ PARTS = {
     "reference/figures.md": figures.page,
     "reference/joints.md": joints.page,
     "reference/settings.md": settings.page,
-    "ways/optimiser.md": author.page,
 }
 _PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTALL)
 

@@ -1,5 +1,6 @@
 """The page of the command line: what `--help` prints, of every command; what `track` has is there once."""
 
+import re
 from collections.abc import Iterator
 
 import click
@@ -8,11 +9,13 @@ from posefit.cli import main
 
 WIDTH = 78  # columns: what click takes of a terminal of 80 or more
 FEW = 4  # options that a command may share with `posefit track` and list all the same
+_HELP = re.compile(r"(\n\n[A-Z][\w ]*:)?\n  -h, --help +Show this message and exit\.(?=\n|\Z)")
 
 
 def page() -> str:
-    """Return every command with its help, as Markdown."""
-    return "\n\n".join(f"## `{name}`\n\n```text\n{text}\n```{more}" for name, text, more in _helps(shared=False)) + "\n"
+    """Return every command with its help, as Markdown; without the option `--help`, which all have."""
+    parts = ((name, _HELP.sub("", text), more) for name, text, more in _helps(shared=False))
+    return "\n\n".join(f"## `{name}`\n\n```text\n{text}\n```{more}" for name, text, more in parts) + "\n"
 
 
 def helps() -> dict[str, str]:

@@ -48,7 +48,7 @@ def page() -> str:
         lines = [f"## {source}", f"{title}.", "| tag | where | tests |\n|---|---|---|"]
         for tag in (tag for tag in ordered if tag.source == source):
             named = "<br>".join(f"`{name}`" for name in tests_of(tag))
-            lines[-1] += f"\n| `{source} {tag.step}` | `{tag.path}` | {named} |"
+            lines[-1] += f"\n| `{tag.step}` | `{tag.path}` | {named} |"
         parts += lines
     return "\n\n".join(parts) + "\n"
 

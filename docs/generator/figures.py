@@ -12,24 +12,24 @@ RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
 # What summary.json says beside the figures: the question, not the answer.
 REQUEST = {
     "motion": ("", "name of the motion, the video or the masks"),
-    "source": ("", "what was given as the source, a list with one entry for each camera"),
+    "source": ("", "what was given as the source, one entry a camera"),
     "frames_chosen": ("frames", "start and stop of `--frames`; null is an end that was not given"),
     "method": ("", "the optimiser and the prior, or the tracker"),
-    "seed": ("", "the seed that everything random follows from"),
-    "frames": ("frames", "how many frames were followed"),
+    "seed": ("", "of everything random"),
+    "frames": ("frames", "how many were followed"),
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
-    "version": ("", "the version of posefit"),
-    "train": ("", "names of the motions that the prior learned from"),
-    "view_degrees": ("degrees", "the given directions of the cameras; null where unknown"),
+    "version": ("", "of posefit"),
+    "train": ("", "names of the motions learned from"),
+    "view_degrees": ("degrees", "directions of the cameras; null where unknown"),
     "translation": ("", "the root's position: known, searched or aligned"),
-    "first_pose": ("", "the first pose: searched, or given"),
-    "smooth": ("", "whether the root's way was smoothed and standing feet were held: [so](../howto/smoothing.md)"),
+    "first_pose": ("", "searched, or given"),
+    "smooth": ("", "whether the track was [smoothed](../howto/smoothing.md)"),
     "views": ("", "number of cameras"),
-    "camera": ("", "where the camera comes from: given by a calibration, guessed, or placed around a known motion"),
+    "camera": ("", "given by a calibration, guessed, or placed around a known motion"),
     "size_pixels": ("pixels", "width and height of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
-    "dimensions": ("", "coordinates of a proposal, the root's and the prior's; `null` of a tracker of its own"),
-    "settings": ("", "what was set, or follows from the budget, of optimiser, prior and tracker"),
+    "dimensions": ("", "coordinates of a proposal; `null` of a tracker of its own"),
+    "settings": ("", "what was set, or follows from the budget"),
 }
 
 # What a sweep's row says beside the figures.
@@ -49,40 +49,26 @@ SPENT = ("evaluations_used", "dimensions", "seconds", "warnings", "joint_errors_
 RESULT = {
     "hypotheses": (
         "",
-        "of each of several [hypotheses](../howto/hypotheses.md): its `beginning`, silhouette `cost`, `motion` term, "
-        "and whether it was `kept`; empty where there was one",
+        "of each [hypothesis](../howto/hypotheses.md): `beginning`, `cost`, `motion` term, and `kept`",
     ),
-    "build": (
-        "m",
-        "the build that was fitted: `stature_m`, `factors` on the average and their `spread`; or null",
-    ),
+    "build": ("m", "the build that was fitted: `stature_m`, `factors` on the average and their `spread`; or null"),
     "trace": ("", "of a single frame only: evaluations so far and best cost, after each population"),
     "warnings": ("", "what to look at before the result is trusted"),
     "guesses": ("", "what the source does not state and posefit assumed, such as the camera, the rate or a height"),
-    "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first; where a method says"),
-    "none_of_modes": (
-        "",
-        "how likely it is that none of a frame's modes is right, the mean over frames; where a method says",
-    ),
-    "unknown_sides": ("", "numbers of the frames whose left and right are called unknown; where a method says"),
-    "lost_frames": ("", "numbers of the frames that are called lost; where a method says"),
-    "relocalised": (
-        "",
-        "numbers of the frames in which it was looked all around again, after a gap or where costs stayed high",
-    ),
+    "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first"),
+    "none_of_modes": ("", "how likely it is that none of a frame's modes is right, the mean over frames"),
+    "unknown_sides": ("", "numbers of the frames whose left and right are called unknown"),
+    "lost_frames": ("", "numbers of the frames that are called lost"),
+    "relocalised": ("", "numbers of the frames from which the person was searched for all around again"),
     "retracked_outside": (
         "",
-        "the first and last frame between which a track of footage stayed where all others were tracked again, because "
-        "the body turned faster than a person can; null where it did not",
+        "first and last frame of what [was not tracked again](../howto/smoothing.md#a-body-that-spins)",
     ),
-    "backwards_share": (
-        "",
-        "share of frames in which the root faces away from its way over half a second, faster than 0.3 m/s",
-    ),
+    "backwards_share": ("", "share of frames in which the root faces away from its path, faster than 0.3 m/s"),
     "trust": ("", "of footage, whether the track [can be trusted](../howto/trust.md), and why"),
     "gait": ("", "[figures of the walk](../howto/measuring.md), or `why` there are none"),
 }
-HEAD = "| {0} | unit | meaning |\n|---|---|---|"
+HEAD = "| {0} | meaning |\n|---|---|"
 
 Descriptions = Mapping[str, tuple[str, str]]
 
@@ -95,16 +81,13 @@ def page() -> str:
         _table("key", _described(REQUEST)),
         _table("key", [*_measured(MEASURES.values()), *_described(RESULT)]),
         "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
-        "`baselines_mm` hold one number for each baseline:",
-        _table(
-            "baseline",
-            [(name, "", f"the {label}, with the true root and translation") for name, label in BASELINES.items()],
-        ),
+        f"`baselines_mm` hold one number for each baseline: {_baselines()}, with the true root and translation. "
         "`coverage` holds a share for each of `50`, `80` and `95`, and `interval_mm` a radius. A figure that needs the "
         "truth is `null` where it is unknown, and a figure of a method is `null` where the method does not report it.",
         "## Columns of `frames.csv`",
-        "One row a frame; those that need the truth are there only where it is known.",
-        _table("column", [*_measured(FRAME.values()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
+        "One row a frame; those that need the truth are there only where it is known. "
+        f"{_shared()} are as above, of one frame. Then there are",
+        _table("column", [*_measured(_frame_only()), ("PLACE_x, PLACE_y, PLACE_z", "m", _joints())]),
         "## Columns of a sweep's CSV",
         "`posefit report DIR --out FILE.html --csv FILE.csv` writes one row a cell; `Ledger.frame()` gives the same as "
         "a table of pandas. Columns of several values are `NAME.PART`, as in `error_degrees.mean` and "
@@ -126,13 +109,22 @@ def _described(values: Descriptions) -> list[tuple[str, str, str]]:
     return [(name, unit, meaning) for name, (unit, meaning) in values.items()]
 
 
+def _frame_only() -> list[Measure]:
+    return [measure for name, measure in FRAME.items() if name not in MEASURES]
+
+
+def _shared() -> str:
+    return ", ".join(f"`{name}`" for name in FRAME if name in MEASURES)
+
+
 def _joints() -> str:
-    return (
-        f"place in the world of each of the {len(PLACES)} joints, blank in frames that were held or are called lost: "
-        f"{', '.join(PLACES)}"
-    )
+    return f"place in the world of each of the {len(PLACES)} [joints](joints.md), blank where held or called lost"
+
+
+def _baselines() -> str:
+    return ", ".join(f"`{name}` (the {label})" for name, label in BASELINES.items())
 
 
 def _table(head: str, rows: Iterable[tuple[str, str, str]]) -> str:
-    lines = (f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in rows)
+    lines = (f"| `{name}` | {f'{unit}: ' if unit else ''}{meaning} |" for name, unit, meaning in rows)
     return "\n".join([HEAD.format(head), *lines])

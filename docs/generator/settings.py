@@ -1,4 +1,7 @@
-"""The page of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code."""
+"""The page of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code.
+
+Of optimisers that only adapt a library the page has the names.
+"""
 
 import inspect
 from collections.abc import Callable
@@ -9,6 +12,8 @@ from posefit.hooks import PROJECT
 from posefit.registry import KINDS, Offer, registry
 from posefit.settings import setting_text, settings_in, settings_of, without_settings
 
+ADAPTERS = "Each needs a library: `python -m pip install 'posefit[NAME]'`."
+
 
 def page() -> str:
     """Return the lists of all kinds, as Markdown."""
@@ -16,7 +21,14 @@ def page() -> str:
     parts = []
     for kind in KINDS:
         mine = [offer for offer in offers[kind].values() if offer.distribution == PROJECT]
-        parts += [f"## {kind.capitalize()}s", *map(_method, mine)]
+        adapters = [offer for offer in mine if kind == "optimiser" and offer.needs is not None]
+        parts += [f"## {kind.capitalize()}s", *(_method(offer) for offer in mine if offer not in adapters)]
+        if adapters:
+            names = ", ".join(f"`{offer.name}`" for offer in adapters)
+            parts += [
+                "### Adapters of libraries",
+                f"{names}: `posefit plugins show NAME` has their settings. {ADAPTERS}",
+            ]
     parts += ["## What drives an optimiser and a prior", _described("tracker", Prediction)]
     return "\n\n".join(parts) + "\n"
 
@@ -27,17 +39,18 @@ def _method(offer: Offer) -> str:
 
 
 def _described(name: str, factory: Callable[..., Any], more: str = "") -> str:
-    """Return what a docstring says of a method, and the table of its settings. Raises KeyError where it lacks one."""
+    """Return the first paragraph of a method's docstring and the list of its settings.
+
+    Raises KeyError where the docstring lacks a setting.
+    """
     text = inspect.getdoc(factory) or ""
     said, settings = settings_in(text), settings_of(factory)
     if not settings:
         return f"{text}{more}\n\nIt has no settings."
-    lines = ["| `--set` | symbol | type | default | meaning and source |", "|---|---|---|---|---|"]
+    lines = []
     for setting in settings:
         symbol, meaning = said[setting.name]
-        default = (
-            "" if setting.default is inspect.Parameter.empty else f"`{setting_text(setting.default) or chr(39) * 2}`"
-        )
-        cells = [f"`{name}.{setting.name}`", symbol, setting.type, default, meaning]
-        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-    return f"{without_settings(text)}{more}\n\n" + "\n".join(lines)
+        default = "" if setting.default is inspect.Parameter.empty else f"={setting_text(setting.default)}"
+        lines.append(f"- `{name}.{setting.name}{default}`{f' ({symbol})' if symbol else ''}: {meaning}")
+    summary = without_settings(text).split("\n\n")[0]
+    return f"{summary}{more}\n\n" + "\n".join(lines)

@@ -19,7 +19,8 @@ from posefit.footage.scene import rendered, synthetic
 from posefit.geometry.body import Body, varied
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
-from posefit.tracking.initialise import BODY_FRAMES, fitted_build
+from posefit.tracking.defaults import BODY_FRAMES
+from posefit.tracking.initialise import fitted_build
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
 from posefit_reproduce.jobs import each

@@ -6,6 +6,7 @@ from posefit.footage.scene import Scene
 from posefit.motion.clips import training_clips, training_motions
 from posefit.settings import settings_text
 from posefit.sweep.cell import TrackCell
+from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track
@@ -127,4 +128,5 @@ def track_of(cell: TrackCell, scene: Scene, **changes: Any) -> Track:
     """Return the track of a cell in a scene, which may differ from the cell's own, with some options changed."""
     training = training_motions(training_clips(cell.train, followed=cell.motion), scene.fps)
     options = {name: getattr(cell, name) for name in ("method", "evaluations", "translation", "seed")}
-    return track_scene(scene, training, TrackOptions(settings=settings_text(cell.settings), **(options | changes)))
+    chosen = TrackOptions(settings=settings_text(cell.settings), **(options | changes))
+    return track_scene(scene, training, completed(chosen, scene.truth))

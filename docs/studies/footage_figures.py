@@ -40,6 +40,7 @@ from posefit.output.drawing import draw_body, write
 from posefit.reading import existing, read_text
 from posefit.silhouette.foreground import Image
 from posefit.silhouette.mask import Silhouette
+from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit_reproduce.commands import CLIPS
@@ -146,7 +147,7 @@ def estimates_of(scene: Scene, training: Sequence[Motion], iterations: int, seed
     estimates: dict[str, Estimates] = {}
     for name in TRACKED:
         how = TrackOptions(**options_of(name, training, iterations), seed=seed, smooth=False, body_frames=0)
-        track = track_scene(replace(scene, yaw=None), training, how)
+        track = track_scene(replace(scene, yaw=None), training, completed(how, scene.truth))
         estimates[name] = dict(enumerate(track.frames))
     usable = [k for k in range(scene.count) if scene.observations[k].usable]
     chosen = [usable[k] for k in np.unique(np.linspace(0, len(usable) - 1, IMAGES).round().astype(int))]

@@ -89,6 +89,14 @@ class Hypotheses(NamedTuple):
         return self.poses[rows] + self.turns[rows], self.places[rows] + self.shifts[rows]
 
 
+class Counts(NamedTuple):
+    """How many hypotheses of a frame are fresh, how many of these start at diverse states, and how many continue."""
+
+    fresh: int
+    diverse: int  # the others are the path's, and reflections
+    continued: int
+
+
 class _FittedFrame(NamedTuple):
     """The hypotheses of a frame, and their weights."""
 
@@ -141,16 +149,12 @@ class HypothesisFilter:
         self._costs: deque[float] = deque(maxlen=max(round(MEMORY_SECONDS * task.fps), 1))  # of the best hypotheses
         self._evaluations = evaluations
 
-    def diverse_count(self, camera_count: int) -> int:
-        """Return how many diverse states of the beam start hypotheses where so many cameras show something."""
-        fresh, _ = self._counts(camera_count)
-        return fresh - 1 - int(REFLECTED_SHARE * fresh)
-
-    def _counts(self, camera_count: int) -> tuple[int, int]:
-        """Return how many hypotheses are fresh, and how many continue; several cameras leave less open."""
+    def counts(self, camera_count: int) -> Counts:
+        """Return how many hypotheses a frame has in which so many cameras show something; several leave less open."""
         evaluations = max(self._evaluations / camera_count, MIN_EVALUATIONS)
         fresh = max(int(FRESH_SHARE * evaluations / FRESH_EVALUATIONS), 2)
-        return fresh, int((evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS)
+        continued = int((evaluations - fresh * FRESH_EVALUATIONS) / CONTINUED_EVALUATIONS)
+        return Counts(fresh, fresh - 1 - int(REFLECTED_SHARE * fresh), continued)
 
     def follow(self, estimates: Iterable[Estimate], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield each estimate with the pose of the likeliest sequence, up to `delay` frames later."""
@@ -248,7 +252,7 @@ class HypothesisFilter:
             other_poses, other_places = estimate.alternatives
             poses, places = np.concatenate([poses, other_poses]), np.concatenate([places, other_places])
         frame_costs = estimate.frame_costs
-        count = self._counts(frame_costs.camera_count)[0] - len(poses)  # of reflections
+        count = self.counts(frame_costs.camera_count).fresh - len(poses)  # of reflections
         if not frame_costs.usable or count <= 0:
             return poses, places
         likeliest = (poses, places) if before is None or rows is None else before.hypotheses.continued(rows)
@@ -266,7 +270,7 @@ class HypothesisFilter:
 
     def _continuing(self, before: _FittedFrame, camera_count: int) -> Rows:
         """Return the hypotheses that continue: the likeliest so far, and of those near each other only one."""
-        _, count = self._counts(camera_count)
+        count = self.counts(camera_count).continued
         joints = before.hypotheses.joints.reshape(len(before.hypotheses.joints), -1).astype(np.float32)
         same = squared_distances(joints, joints) < SAME_DISTANCE**2 * len(JOINTS)
         rows: list[int] = []

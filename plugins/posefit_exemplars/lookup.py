@@ -8,7 +8,6 @@ After Brand, Shadow puppetry, 1999, and Li, Sun, Chen and Li's references 2 and 
 search then makes it fit.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple, Self
 
@@ -29,6 +28,7 @@ from posefit_exemplars.frame_costs import FrameCosts
 
 POSES = 2000  # drawn of the clips as `Exemplars.draw` does
 YAWS = 24  # that each is turned to
+YAW_STEP = 2.0 * np.pi / YAWS
 ELEVATION = np.radians(10.0)  # between the tables of cameras that look down, or up
 DISTANCE = 4.3  # metres from which a camera of the table sees the person
 FIELD_OF_VIEW = 0.85  # radians, of that camera
@@ -55,11 +55,13 @@ class Table(NamedTuple):
     def of(cls, exemplars: Exemplars, elevation: float) -> Self:
         """Return the table of the average body that a camera sees from an elevation, radians."""
         body = Body.of(exemplars.coding.skeleton)
-        states = exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE))
-        yaws = np.tile(2.0 * np.pi / YAWS * np.arange(YAWS), POSES)
+        states = np.arange(len(exemplars))
+        if len(states) > POSES:
+            states = np.unique(exemplars.draw(POSES, np.random.default_rng(RNG_STREAM_TABLE)))
+        yaws = np.tile(YAW_STEP * np.arange(YAWS), len(states))
         poses = exemplars.with_yaws(np.repeat(states, YAWS), yaws)
         camera, small = looking_at(0.0, elevation), list[Codes]()
-        for part in np.array_split(poses, POSES * YAWS // 2000):  # pictures take memory
+        for part in np.array_split(poses, YAWS):  # pictures take memory
             small.append(small_pictures(masks_of(body, camera, part, -body.skeleton.joints(part).mean(axis=1))))
         pixels = np.concatenate(small)
         mean = pixels.mean(axis=0)
@@ -141,24 +143,30 @@ class Lookup:
         The distance is squared, and the mean over the cameras that show the whole person; None where none does. Yaws
         are near a known one.
         """
-        total, views = np.float32(0.0), list[tuple[Table, float]]()
+        total, views = np.zeros(1), list[tuple[Table, float]]()
         for camera, silhouette in zip(self.task.cameras, observation.silhouettes, strict=True):
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
                 table = _table(self.exemplars, float(np.round(elevation / ELEVATION) * ELEVATION))
                 views.append((table, azimuth))  # whose yaws count from the camera
-                turn = round(float(wrapped(azimuth - views[0][1])) * YAWS / (2.0 * np.pi))
+                turn = round((azimuth - views[0][1]) / YAW_STEP)
                 total = total + np.roll(table.distances(picture), turn, axis=1)
         if not views:
             return None
-        yaws = wrapped(views[0][1] + 2.0 * np.pi / YAWS * np.arange(YAWS))
-        distances = np.asarray(total) / len(views)
+        yaws = wrapped(np.asarray(views[0][1] + YAW_STEP * np.arange(YAWS)))
+        distances = total / len(views)
         if yaw is not None:
             distances[:, np.abs(wrapped(yaws - yaw)) > YAW_TOLERANCE] = np.inf
-        flat = distances.ravel()
-        rows = np.argpartition(flat, count)[:count]
+        pairs = distances.reshape(len(distances), -1, 2)  # of two yaws side by side the better one is an alternative
+        better = pairs.argmin(axis=2)
+        flat = pairs.min(axis=2).ravel()
+        count = min(count, len(flat))
+        rows = np.argpartition(flat, count - 1)[:count]
         rows = rows[np.argsort(flat[rows], kind="stable")]
-        return views[0][0].states[rows // YAWS], yaws[rows % YAWS], float(flat[rows[0]])
+        rows = rows[np.isfinite(flat[rows])]
+        states, turns = np.divmod(rows, YAWS // 2)
+        chosen = yaws[2 * turns + better[states, turns]]
+        return views[0][0].states[states], chosen, float(flat[rows[0]])
 
     def posterior(self, observation: Observation) -> Posterior | None:
         """Return the poses that a frame may show, with weights; None where its silhouettes are like none of them."""

@@ -29,6 +29,7 @@ from posefit.geometry.symmetry import facing
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior, second_side
 from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.smoothing import Estimate
 
 MIN_COST, MIN_SPREAD = 0.1, 0.002  # per cent, and metres
 LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
@@ -86,6 +87,21 @@ def recalibrated(posterior: Posterior, pose: Array, cost: float, frame_costs: Fr
     cost = cost if frame_costs.usable else math.inf
     values = evidence(frame_costs.skeleton, posterior, pose, cost, frame_costs.camera_count)
     return replace(posterior, recalibration=calibration.recalibration(calibration.log(values)))
+
+
+def reported(estimate: Estimate) -> Frame:
+    """Return the frame of an estimate: its cost, its posterior, and what shows whether it is lost or exchanged."""
+    pose, place, frame_costs = estimate.pose, estimate.place, estimate.frame_costs
+    cost, areas = frame_costs.cost_and_areas(pose, place)
+    posterior, evaluations = None, int(np.ceil(estimate.evaluations)) + 1
+    details: dict[str, Any] = {"usable": frame_costs.usable}
+    if estimate.paths is not None:
+        details["sides"] = frame_costs.side_odds(pose, place)
+        details["mirror_costs"] = frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
+        evaluations += len(details["mirror_costs"])
+        posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, frame_costs)
+    trace = np.array([[evaluations, cost]])
+    return Frame(pose, place, cost, areas, evaluations, trace, posterior, details=details)
 
 
 MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back

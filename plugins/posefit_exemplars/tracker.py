@@ -18,8 +18,8 @@ from posefit_exemplars import hypotheses, markov
 from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.lookup import Lookup
-from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
+from posefit_exemplars.lookup import YAW_STEP, Lookup
+from posefit_exemplars.lost_model import reported, stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
@@ -33,7 +33,6 @@ GROUP_POSES = 20  # drawn at random, that stand for a group in a search everywhe
 YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
 WRONG_YAW_COST = 4.0  # over the temperature, of a state whose yaw is off by twice as much, for a thirtieth of a second
-YAW_STEP = np.radians(30.0)  # between yaws of a group that are searched
 SIMILAR_DISTANCE = 0.06  # metres: standard deviation of the codes of states that are averaged
 SIMILAR_YAW = np.radians(20.0)
 
@@ -103,7 +102,7 @@ class ExemplarTracker:
         estimates = self._path(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
-        frames = smoothed(estimates, self.smoothing, self.ahead)
+        frames = map(reported, smoothed(estimates, self.smoothing, self.ahead))
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
@@ -140,29 +139,11 @@ class ExemplarTracker:
         self, frame_costs: FrameCosts, before: Beam | None, everywhere: bool, rng: np.random.Generator
     ) -> tuple[Beam, Array, float]:
         """Return the states of a frame, from `everywhere` or where clips continue, their costs, and the evaluations."""
-        root = frame_costs.root
         if before is not None and not frame_costs.usable:
-            beam = beams.next_states(self.exemplars, before, self.step, BEAM_STATES, root)
+            beam = beams.next_states(self.exemplars, before, self.step, BEAM_STATES, frame_costs.root)
             return replace(beam, places=frame_costs.at_root(beam.places)), np.zeros(len(beam)), 0.0
-        # the reported pose, its mirror images, and the fraction of a small picture's share
-        reserve = 3 + frame_costs.camera_count
-        evaluations = self.evaluations
-        if before is not None and self.hypotheses is not None:  # several cameras leave less open
-            evaluations = max(evaluations / frame_costs.camera_count, (1.0 - FIT_SHARE) * MIN_EVALUATIONS)
-        # no more states than have a cost in a small picture
-        full = int(min(FULL_SHARE * evaluations, (evaluations - reserve) / (1.0 + frame_costs.small_share)))
-        small = int((evaluations - full - reserve) / frame_costs.small_share)
-        nearby = int(CONTINUED_SHARE * small) if before is not None or self.task.first_pose is not None else 0
-        parts, small_count = list[Beam](), 0
-        if everywhere or before is None:
-            elsewhere, small_count = self._elsewhere(frame_costs, before, small - nearby, rng)
-            parts.append(elsewhere)
-        if before is not None:
-            parts.append(beams.next_states(self.exemplars, before, self.step, nearby, root))
-        elif self.task.first_pose is not None:
-            first = self._first_states(self.task.first_pose, nearby)
-            parts = [replace(elsewhere, totals=elsewhere.totals + JUMP_COST), first]
-        beam = self._placed(frame_costs, beams.merged(*parts), before is not None)
+        full, small = self._counts(frame_costs, before is None)
+        beam, small_count = self._reachable(frame_costs, before, everywhere, small, rng)
         turn_costs = yaw_costs(beam.yaws, frame_costs.yaw) * 30.0 / self.task.fps
         totals = beam.totals + turn_costs + frame_costs.small(self._poses(beam), beam.places) / self.temperature
         small_count += len(beam)
@@ -174,6 +155,36 @@ class ExemplarTracker:
         best = beams.diverse_best(self.exemplars, beam, beam.totals + costs, BEAM_STATES)
         return beam.rows(best), costs[best], small_count * frame_costs.small_share + full_count
 
+    def _counts(self, frame_costs: FrameCosts, is_first: bool) -> tuple[int, int]:
+        """Return how many states of a frame have a cost in the whole picture, and how many in a small one."""
+        # the reported pose, its mirror images, and the fraction of a small picture's share
+        reserve = 3 + frame_costs.camera_count
+        evaluations = self.evaluations
+        if not is_first and self.hypotheses is not None:  # several cameras leave less open
+            evaluations = max(evaluations / frame_costs.camera_count, (1.0 - FIT_SHARE) * MIN_EVALUATIONS)
+        # no more states than have a cost in a small picture
+        full = int(min(FULL_SHARE * evaluations, (evaluations - reserve) / (1.0 + frame_costs.small_share)))
+        return full, int((evaluations - full - reserve) / frame_costs.small_share)
+
+    def _reachable(
+        self, frame_costs: FrameCosts, before: Beam | None, everywhere: bool, count: int, rng: np.random.Generator
+    ) -> tuple[Beam, int]:
+        """Return at most `count` states: where clips continue or a track starts, and some from `everywhere`.
+
+        With them comes the number of small pictures that the search everywhere evaluated.
+        """
+        parts, nearby, small_count = list[Beam](), int(CONTINUED_SHARE * count), 0
+        if before is not None:
+            parts.append(beams.next_states(self.exemplars, before, self.step, nearby, frame_costs.root))
+        elif self.task.first_pose is not None:
+            parts.append(self._first_states(self.task.first_pose, nearby))
+        if everywhere or before is None:
+            elsewhere, small_count = self._elsewhere(frame_costs, before, count - nearby if parts else count, rng)
+            if before is None and parts:
+                elsewhere = replace(elsewhere, totals=elsewhere.totals + JUMP_COST)
+            parts.insert(0, elsewhere)
+        return self._placed(frame_costs, beams.merged(*parts), before is not None), small_count
+
     def _elsewhere(
         self, frame_costs: FrameCosts, before: Beam | None, count: int, rng: np.random.Generator
     ) -> tuple[Beam, int]:
@@ -183,20 +194,19 @@ class ExemplarTracker:
         known = self.task.yaw if before is None and frame_costs.yaw is None else frame_costs.yaw
         nearest = self.lookup.nearest(frame_costs.observation, tried, known)
         if nearest is not None:
-            states, yaws, _ = nearest
+            states, yaws = np.resize(nearest[0], tried), np.resize(nearest[1], tried)
+            yaws += YAW_STEP * rng.uniform(-0.5, 0.5, tried)
         else:  # no camera shows the whole person
             middle, reach = (0.0, np.pi) if known is None else (known, YAW_TOLERANCE)
             states, yaws = self.exemplars.draw(tried, rng), middle + rng.uniform(-reach, reach, tried)
         beam = self._placed(frame_costs, self._started(states, yaws, before), False)
-        order = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")
-        kinds = np.column_stack([self.exemplars.groups[states[order]], np.round(wrapped(yaws[order]) / YAW_STEP)])
-        first = np.unique(kinds, axis=0, return_index=True)[1]  # the best of each group and about each yaw
-        best = order[np.sort(first)[:group_count]]
+        best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[: 4 * group_count]
         members, starts = self.exemplars.members, self.exemplars.starts
         groups = [members[starts[group] : starts[group + 1]] for group in self.exemplars.groups[states[best]]]
         poses = [rows if len(rows) <= GROUP_POSES else rng.choice(rows, GROUP_POSES, replace=False) for rows in groups]
         yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
-        return self._started(np.concatenate(poses), yaws, before), len(beam)
+        room = slice(count - tried)  # for that many poses, of more groups where they are small
+        return self._started(np.concatenate(poses)[room], yaws[room], before), len(beam)
 
     def _first_states(self, angles: Array, count: int) -> Beam:
         """Return the states, at most `count`, nearest to a first pose whose angles (63,) and yaw are known."""
@@ -229,7 +239,7 @@ class ExemplarTracker:
         """Return the estimate of a frame: the weighted mean of the states like that of the path."""
         beam, frame_costs, alternatives = frame.beam, frame.frame_costs, None
         if self.hypotheses is not None:
-            count = self.hypotheses.diverse_count(frame_costs.camera_count)
+            count = self.hypotheses.counts(frame_costs.camera_count).diverse
             diverse = beam.rows(beams.diverse_best(self.exemplars, beam, beam.totals, count))
             alternatives = self._poses(diverse), diverse.places
         codes = self.exemplars.codes[beam.states]

@@ -1,8 +1,6 @@
 """The full space: every joint angle that is free, between its limits. No compact space, and no constraint 2."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +9,10 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.check import choices
 from posefit.geometry.skeleton import Skeleton
-from posefit_priors.arrays import Shape, Stored, angles_of, indices_of
+from posefit_priors.pca import angles_of
 
 
-class Full(Stored):
+class Full:
     """The joint angles themselves are the latents, those that are free, with a range for each.
 
     An angle without range stays at its training mean and is no latent. Limits are widened where training poses pass
@@ -24,7 +22,6 @@ class Full(Stored):
         limits: "asf", the joint limits that the skeleton's file states, or "training", the range of training poses.
     """
 
-    SHAPES: ClassVar[Mapping[str, Shape]] = {"low": ("m",), "high": ("m",), "angles": ("m",), "rest": (63,)}
     low: Array  # (m,) radians
     high: Array  # (m,)
     angles: NDArray[np.intp]  # (m,) the free ones
@@ -68,10 +65,3 @@ class Full(Stored):
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return that all latents (n, m) are feasible (n,): the box is the only constraint."""
         return np.ones(len(latents), dtype=bool)
-
-    @classmethod
-    def load(cls, path: str | Path, prefix: str = "") -> Self:
-        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        prior = super().load(path, prefix)
-        prior.angles = indices_of(path, "angles", prior.angles, len(prior.rest))
-        return prior

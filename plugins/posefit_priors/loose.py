@@ -1,18 +1,14 @@
 """Principal components with freedom around them at the limbs: arms may swing as in no training pose."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.errors import InputError
 from posefit.fitting.check import at_least, positive
 from posefit.fitting.kernels import add_components
 from posefit.geometry.skeleton import JOINTS, Skeleton, angle_index, both
-from posefit_priors.arrays import Shape, Stored, indices_of
 from posefit_priors.pca import PCA, distances
 
 COMPONENTS = 12
@@ -23,7 +19,7 @@ ROUNDING = 1e-9  # radians by which a joint may pass its limit
 ARMS, LEGS = ("humerus", "radius"), ("femur", "tibia")
 
 
-class Loose(Stored):
+class Loose:
     """The space of `pca`, and a latent more for each angle of shoulders, elbows, hips and knees that moves in training.
 
     Such a latent, in radians, is added to the angle that the components give, within the skeleton's joint limits where
@@ -36,13 +32,6 @@ class Loose(Stored):
         slack: times chi, the distance of a pose from the clusters, at most; above 0. Ours.
     """
 
-    SHAPES: ClassVar[Mapping[str, Shape]] = {
-        "loose": ("k",),
-        "angles_low": ("k",),
-        "angles_high": ("k",),
-        "low": ("d",),
-        "high": ("d",),
-    }
     loose: NDArray[np.intp]  # (k,) of the joint angles
     angles_low: Array  # (k,) radians: their limits
     angles_high: Array  # (k,)
@@ -111,17 +100,3 @@ class Loose(Stored):
         add_components(writeable(latents[:, :m]), writeable(self._pca.components[:, self.loose]), angles)
         within = (angles >= self.angles_low - ROUNDING) & (angles <= self.angles_high + ROUNDING)
         return np.asarray(within.all(axis=1) & (distances(writeable(latents), self._pca.centres) < self._pca.reach))
-
-    def arrays(self) -> dict[str, Any]:
-        """Return the learned arrays by name."""
-        return {**super().arrays(), **{f"pca_{name}": value for name, value in self._pca.arrays().items()}}
-
-    @classmethod
-    def load(cls, path: str | Path, prefix: str = "") -> Self:
-        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        prior = super().load(path, prefix)
-        prior._pca = PCA.load(path, "pca_")
-        prior.loose = indices_of(path, "loose", prior.loose, len(prior._pca.mean))
-        if (wanted := len(prior._pca.low) + len(prior.loose)) != len(prior.low):
-            raise InputError(f"{path}: low must be of shape ({wanted},), got {prior.low.shape}")
-        return prior

@@ -1,8 +1,7 @@
 """The compact pose space: principal components, a range, and clusters that mark where poses are. SAPSO section 2."""
 
 import warnings
-from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,6 @@ from posefit.errors import InputError
 from posefit.fitting.check import at_least
 from posefit.fitting.kernels import add_components
 from posefit.geometry.skeleton import Skeleton
-from posefit_priors.arrays import Shape, Stored, angles_of
 
 COMPONENTS = 6  # m, section 2.1
 CLUSTERS = 5  # K, section 2.2
@@ -23,7 +21,7 @@ CLUSTERING_ROUNDS = 100  # of Lloyd's algorithm
 DECIMALS = 7  # of what is learned, in radians and shares
 
 
-class PCA(Stored):
+class PCA:
     """Principal components of joint angles with constraint 1, a range, and constraint 2, nearness to a cluster.
 
     Settings:
@@ -32,15 +30,6 @@ class PCA(Stored):
         quantile: chi is this quantile of the training distances, above 0 and at most 1. Interpretation S5.
     """
 
-    SHAPES: ClassVar[Mapping[str, Shape]] = {
-        "mean": (63,),
-        "components": ("m", 63),
-        "low": ("m",),
-        "high": ("m",),
-        "centres": ("k", "m"),
-        "reach": (),
-        "explained": ("m",),
-    }
     mean: Array  # (63,)
     components: Array  # (m, 63)
     low: Array  # (m,)
@@ -81,6 +70,18 @@ class PCA(Stored):
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""
         return np.asarray(distances(writeable(latents), self.centres) < self.reach)  # SAPSO 2.2 constraint 2
+
+
+def angles_of(angles: Array, least: int) -> Array:
+    """Return joint angles (T, 63) as float64. Raises ValueError where they are not, or fewer than `least` frames."""
+    angles = np.asarray(angles, dtype=np.float64)
+    if angles.ndim != 2 or angles.shape[1] != 63:
+        raise InputError(f"angles must have shape (T, 63), got {angles.shape}")
+    if len(angles) < least:
+        raise InputError(f"angles must hold at least {least} frames, got {len(angles)}")
+    if not np.isfinite(angles).all():
+        raise InputError(f"angles must be finite, got {np.count_nonzero(~np.isfinite(angles))} that are not")
+    return angles
 
 
 @jit

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -13,18 +12,15 @@ from posefit.errors import InputError
 from posefit.fitting.check import at_least, one_of
 from posefit.fitting.kernels import add_components
 from posefit.geometry.skeleton import Skeleton
-from posefit.limits import timed
-from posefit.reading import cut, parsed_json, quoted
-from posefit_priors.arrays import angles_of, load_arrays
-from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, clusters_of, distances
+from posefit.reading import quoted
+from posefit_priors.pca import CLUSTERS, COMPONENTS, QUANTILE, angles_of, clusters_of, distances
 
-# of `sklearn.decomposition`, those that have an inverse or are linear: a file may name no other class
+# of `sklearn.decomposition`, those that have an inverse or are linear
 VARIANTS = (
     "DictionaryLearning", "FactorAnalysis", "FastICA", "IncrementalPCA", "KernelPCA", "MiniBatchDictionaryLearning",
     "MiniBatchSparsePCA", "PCA", "SparsePCA", "TruncatedSVD",
 )  # fmt: skip
 KERNEL_POSES = 5_000  # of a KernelPCA, whose memory is their square
-LOADING_SECONDS = 10.0  # a space of a file may take to be learned again
 DEFAULTS: dict[str, dict[str, Any]] = {"KernelPCA": {"kernel": "rbf", "gamma": 0.2, "fit_inverse_transform": True}}
 
 
@@ -44,22 +40,20 @@ class Transformed:
     high: Array  # (m,)
     centres: Array  # (K, m)
     reach: Array  # ()
-    _limit: float | None = None  # seconds that the class may take to learn
 
     def __init__(self, *, variant: str = "KernelPCA", components: int = COMPONENTS, options: str = "{}") -> None:
         at_least("components", components, 1)
-        self._settings: list[Any] = [variant, components, options]  # in the order of a file
+        self._settings = variant, components, options
         _built(variant, components, options)
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where the class cannot, or has no inverse."""
-        self._angles = angles_of(angles, max(CLUSTERS, self._settings[1] + 1))
-        if self._settings[0] == "KernelPCA" and len(self._angles) > KERNEL_POSES:
-            raise InputError(f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(self._angles)}")
+        angles = angles_of(angles, max(CLUSTERS, self._settings[1] + 1))
+        if self._settings[0] == "KernelPCA" and len(angles) > KERNEL_POSES:
+            raise InputError(f"KernelPCA must learn from at most {KERNEL_POSES} poses, got {len(angles)}")
         self._model = _built(*self._settings)
-        with timed(self._limit):
-            self._model.fit(self._angles)
-        latents = self.transform(self._angles)
+        self._model.fit(angles)
+        latents = self.transform(angles)
         if latents.ndim != 2 or latents.shape[1] < 1 or not np.isfinite(latents).all():
             name = type(self._model).__name__
             raise InputError(f"variant must give finite latents (n, m), got {latents.shape} from {name}")
@@ -90,30 +84,6 @@ class Transformed:
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). As SAPSO 2.2."""
         return np.asarray(distances(writeable(latents), self.centres) < self.reach)
-
-    def save(self, path: str | Path) -> None:
-        """Write what the space was learned from to an .npz file; `load` learns it again."""
-        text = np.frombuffer(json.dumps(self._settings).encode(), dtype=np.uint8)
-        np.savez(path, angles=self._angles, words=text)
-
-    @classmethod
-    def load(cls, path: str | Path) -> "Transformed":
-        """Return the space that `save` wrote. Raises ValueError where the file is not one."""
-        arrays = load_arrays(path, {"angles": ("n", 63), "words": ("k",)})
-        names = ("variant", "components", "options")
-        letters = arrays["words"]
-        if ((letters < 0) | (letters > 255)).any():
-            raise InputError(f"{path}: words must be bytes, 0 to 255, got {letters.min():g} to {letters.max():g}")
-        try:
-            settings = dict(zip(names, parsed_json(letters.astype(np.uint8).tobytes().decode()), strict=True))
-            prior = cls(**settings)
-            prior._limit = LOADING_SECONDS
-            return prior.fit(arrays["angles"])
-        except TimeoutError:
-            raise InputError(f"{path}: expected a prior learned in {LOADING_SECONDS:g} s, got a slower one") from None
-        except Exception as error:  # of any transformer
-            came = cut(" ".join(str(error).split()))
-            raise InputError(f"{path}: expected the settings of a prior, got {came}") from None
 
 
 def _built(variant: str, components: int, options: str) -> Any:

@@ -85,7 +85,7 @@ def bench_command(threads: int | None, device: str | None, as_json: bool) -> Non
     if None not in (threads, device):
         raise InputError("bench must have --threads or --device, got both")
     if device is None:
-        from posefit_reproduce.bench.experiment import loop_figures
+        from posefit_reproduce.bench.loop import loop_figures
 
         say("timing; this takes half a minute ...")
         figures = loop_figures(threads)
@@ -106,7 +106,7 @@ def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield from _named_lines(value, f"{group}{name}.")
         else:
-            yield f"{group + name:38} " + (f"{value:.4g}" if isinstance(value, float) else str(value))
+            yield f"{group + name:50} " + (f"{value:.4g}" if isinstance(value, float) else str(value))
 
 
 def paper_experiment(clips: str | None, scale: Any) -> "Experiment":

@@ -81,11 +81,13 @@ class Table(NamedTuple):
 class Claim(NamedTuple):
     """That a mean is below a bound, or above it.
 
+    `subject` is what it is tried on: the claims of one text are one row of a table, with a column a subject.
     `values` (strata, seeds) are paired differences or figures of runs; a single number is a fact without chance in it.
     """
 
     text: str
     source: str
+    subject: str
     values: Array
     unit: str = "degrees"
     bound: float = 0.0
@@ -111,15 +113,26 @@ def interval(values: Array, level: float = LEVEL) -> Mean:
 
 
 def claims_table(name: str, claims: Sequence[Claim]) -> Table:
-    """Return claims with their verdicts. All intervals hold together at the level: Bonferroni's correction."""
-    tests = sum(claim.values.ndim > 0 for claim in claims)
-    rows = []
+    """Return claims with their verdicts, a column a subject in the order of the claim that has most of them.
+
+    All intervals hold together at the level: Bonferroni's correction.
+    """
+    level = 1.0 - (1.0 - LEVEL) / max(sum(claim.values.ndim > 0 for claim in claims), 1)
+    texts: dict[str, dict[str, Claim]] = {}
     for claim in claims:
-        verdict, mean = claim.verdict(1.0 - (1.0 - LEVEL) / max(tests, 1))
+        texts.setdefault(claim.text, {})[claim.subject] = claim
+    subjects = [*max(texts.values(), key=len)]
+    rows = []
+    for text, tried in texts.items():
+        claim, cells = next(iter(tried.values())), dict.fromkeys(subjects, "")
+        for subject, one in tried.items():
+            verdict, mean = one.verdict(level)
+            cells[subject] = f"**{verdict}** {bounded(mean)}"
         count = str(claim.values.size) if claim.values.ndim else "-"
-        bound = f"{'above' if claim.above else 'below'} {claim.bound:.3g}"
-        rows.append([claim.text, claim.source, f"**{verdict}**", count, bounded(mean), bound, claim.unit])
-    return Table(name, ["claim", "where", "verdict", "n", "effect, interval", "holds if", "unit"], rows, 3)
+        bound = f"{'above' if claim.above else 'below'} {{}} {claim.unit}"
+        bounds = dict.fromkeys(f"{one.bound:.3g}" for one in tried.values())
+        rows.append([text, claim.source, bound.format(" / ".join(bounds)), count, *cells.values()])
+    return Table(name, ["claim", "where", "holds if", "n", *subjects], rows, 3)
 
 
 def bounded(mean: Mean, digits: int = 2) -> str:

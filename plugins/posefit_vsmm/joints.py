@@ -8,6 +8,7 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit_vsmm.preprocess import Lines
@@ -17,6 +18,7 @@ BODY = ("torso", "left clavicle", "right clavicle", "left shoulder", "right shou
 _TORSO = np.array([AT[name] for name in BODY])
 _TIPS = np.array([AT[name] for name in ("head", "left hand", "right hand", "left foot", "right foot")])
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
+ONE_CROSSING = 2.0  # pixels: what is nearer together is one crossing of the skeleton line
 
 
 @cache
@@ -39,7 +41,8 @@ def detect(
 
     They are pixels near where they are expected (17, 2); one that is not detected is there, with a confidence of 0.
     What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
-    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out; `nearest` is the patent's assignment.
+    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out; `nearest` is the patent's assignment of
+    end points and crossings.
     """
     points, confidence = expected.copy(), np.zeros(len(POINTS))
 
@@ -58,7 +61,7 @@ def detect(
     points[_TORSO] = expected[_TORSO] + points[AT["root"]] - expected[AT["root"]]  # VSMM 2.3
     confidence[_TORSO] = 1.0
     elbows = {f"{side} elbow": _elbow(lines, points, confidence, expected, side, gates) for side in ("left", "right")}
-    knees = _knees(lines, points, confidence, expected, gates)
+    knees = _knees(lines, points, confidence, expected, gates, nearest)
     for name, point in {**elbows, **knees}.items():
         if point is not None:
             place(name, point)
@@ -87,19 +90,28 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
 def _tips(ends: Array, expected: Array, gates: Array, nearest: bool) -> tuple[dict[str, Array], int]:
     """Return which end points (n, 2) are hands and feet, and how many are unassigned. Interpretation V15.
 
-    All have their own, or each has the nearest. The head takes part, since the skeleton line ends in it too.
+    Each belongs to one: so that all are near together, or the nearest pair first. The head takes part, since the
+    skeleton line ends in it too.
     """
     from scipy.optimize import linear_sum_assignment  # half a second to import
 
     if not len(ends):
         return {}, 0
     distances = _distances(expected, ends) / gates[:, None]
-    rows, columns = linear_sum_assignment(np.minimum(distances, 1.0))
-    if nearest:
-        rows, columns = np.arange(len(_TIPS)), distances.argmin(axis=1)
+    rows, columns = _nearest_pairs(distances) if nearest else linear_sum_assignment(np.minimum(distances, 1.0))
     pairs = [(row, column) for row, column in zip(rows, columns, strict=True) if distances[row, column] < 1.0]
     tips = {POINTS[_TIPS[row]]: ends[column] for row, column in pairs if _TIPS[row] != AT["head"]}
     return tips, len(ends) - len(pairs)
+
+
+def _nearest_pairs(distances: Array) -> NDArray[np.intp]:
+    """Return rows and columns (2, k) of pairs by distances (n, m), the nearest first, none of them twice."""
+    pairs: list[tuple[int, int]] = []
+    for place in distances.argsort(axis=None, kind="stable"):
+        row, column = divmod(int(place), distances.shape[1])
+        if not any(row == first or column == second for first, second in pairs):
+            pairs.append((row, column))
+    return np.array(pairs, dtype=np.intp).reshape(-1, 2).T
 
 
 def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array) -> Array | None:
@@ -115,8 +127,14 @@ def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side
     return lines.skeleton[candidates[to_elbow[candidates].argmin()]] if len(candidates) else None
 
 
-def _knees(lines: Lines, points: Array, confidence: Array, expected: Array, gates: Array) -> dict[str, Array]:
-    """Return where the parallel to the line between the feet, through the middle of the legs, crosses the skeleton."""
+def _knees(
+    lines: Lines, points: Array, confidence: Array, expected: Array, gates: Array, nearest: bool = False
+) -> dict[str, Array]:
+    """Return where the parallel to the line between the feet, through the middle of the legs, crosses the skeleton.
+
+    Each knee is the crossing that is nearest to it; with `nearest` they are two crossings, also where both knees are
+    expected near one.
+    """
     left, right = AT["left foot"], AT["right foot"]
     along = points[right] - points[left]
     length = float(np.linalg.norm(along))
@@ -125,12 +143,21 @@ def _knees(lines: Lines, points: Array, confidence: Array, expected: Array, gate
         return {}
     across = np.array([-along[1], along[0]]) / length
     crossings = lines.skeleton[np.abs((lines.skeleton - legs.mean(axis=0)) @ across) < 1.0]  # VSMM 2.5
-    knees = {}
-    for name in ("left knee", "right knee") if len(crossings) else ():
-        distances = np.linalg.norm(crossings - expected[AT[name]], axis=1)
-        if distances.min() < gates[AT[name]]:
-            knees[name] = crossings[distances.argmin()]
-    if len(knees) == 2 and np.linalg.norm(knees["left knee"] - knees["right knee"]) < 2.0:
+    if not len(crossings):
+        return {}
+    names = ("left knee", "right knee")
+    distances = _distances(expected[[AT[name] for name in names]], crossings)
+    chosen = distances.argmin(axis=1)
+    if nearest:
+        together = distances[0][:, None] + distances[1]
+        order, along = (crossings @ along).argsort(), crossings @ along / length
+        groups = np.empty(len(order))
+        groups[order] = np.append(0.0, (np.diff(along[order]) > ONE_CROSSING).cumsum())
+        together[groups[:, None] == groups] = np.inf
+        chosen = np.array(np.unravel_index(together.argmin(), together.shape))
+    reached = distances[[0, 1], chosen] < gates[[AT[name] for name in names]]
+    knees = {name: crossings[k] for name, k, near in zip(names, chosen, reached, strict=True) if near}
+    if len(knees) == 2 and np.linalg.norm(knees["left knee"] - knees["right knee"]) < ONE_CROSSING:
         return {}  # one crossing is not two knees
     return knees
 

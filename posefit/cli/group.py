@@ -7,16 +7,21 @@ from typing import Any
 import click
 
 from posefit.reading import cut, quoted
+from posefit.registry import KINDS
 
 
 class Group(click.Group):
-    """For a name that is no command of it, it names the nearest of all commands of posefit, wherever that is."""
+    """For a name that is no command of it, it names the nearest of all commands of posefit, wherever that is.
+
+    For what plugins offer, such as `optimisers`, that is the command that lists them.
+    """
 
     def resolve_command(self, context: click.Context, args: list[str]) -> Any:
         """Return the command that the first word names. Raises click.UsageError where it names none."""
         if args[0][:1].isalnum() and self.get_command(context, args[0]) is None:
             root = context.find_root()
-            known = dict(_paths(root.command, root, "posefit"))
+            listed = dict.fromkeys((f"{kind}s" for kind in (*KINDS, "method")), "posefit plugins")
+            known = listed | dict(_paths(root.command, root, "posefit"))
             near = get_close_matches(cut(args[0]), known, 1)
             hint = f"; did you mean {known[near[0]]!r}?" if near else ""
             raise click.UsageError(f"No such command {quoted(args[0])}{hint}")

@@ -117,7 +117,6 @@ TRACK: tuple[Any, ...] = (
 )
 ENGINE = (
     click.option("--workers", type=int, metavar="N", help="Processes of this machine; by default one a core."),
-    click.option("--dask-local", type=int, metavar="N", help="Dask workers on this machine instead."),
     click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler instead, such as tcp://host:8786."),
     click.option("--cell-seconds", type=float, default=3600.0, show_default=True, help="How long a cell may take."),
     click.option(

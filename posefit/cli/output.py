@@ -1,10 +1,12 @@
 """Where commands say what they do: messages and progress go to stderr, results alone to stdout."""
 
 import io
+import json
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
+from functools import partial
 from typing import Any
 
 import click
@@ -18,34 +20,23 @@ MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 class _Messages(io.TextIOWrapper):
     """Standard error: what cannot be written to it is lost, and the work goes on."""
 
+    writing: Callable[[], AbstractContextManager[None]] = staticmethod(partial(suppress, OSError))
+
     def write(self, text: str) -> int:
-        """Write a text, or lose it."""
-        with suppress(OSError):
+        """Write a text."""
+        with self.writing():
             super().write(text)
         return len(text)
 
     def flush(self) -> None:
-        """Write what is buffered, or lose it."""
-        with suppress(OSError):
-            super().flush()
-
-
-class _Results(io.TextIOWrapper):
-    """Standard output: a result that cannot be written there is a user's mistake, and a closed pipe ends the output."""
-
-    def write(self, text: str) -> int:
-        """Write a text. Raises InputError where there is no room."""
-        with _room():
-            return super().write(text)
-
-    def flush(self) -> None:
-        """Write what is buffered. Raises InputError where there is no room."""
-        with _room():
+        """Write what is buffered."""
+        with self.writing():
             super().flush()
 
 
 @contextmanager
 def _room() -> Iterator[None]:
+    """Raise InputError where the body has no room to write to; a closed pipe ends the output."""
     try:
         yield
     except BrokenPipeError:
@@ -54,6 +45,12 @@ def _room() -> Iterator[None]:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115, as long as the process lives
         reason = error.strerror or error
         raise InputError(f"standard output: expected room to write results to, got {reason}") from None
+
+
+class _Results(_Messages):
+    """Standard output: a result that cannot be written there is a user's mistake."""
+
+    writing = staticmethod(_room)
 
 
 def open_streams() -> None:
@@ -73,6 +70,12 @@ def open_streams() -> None:
 def say(message: str) -> None:
     """Print a message on stderr."""
     click.echo("\n".join(map(printable, message.split("\n"))), err=True)
+
+
+def print_result(lines: Iterable[str], value: Any, as_json: bool) -> None:
+    """Print lines, or else a value, as one line of JSON."""
+    for line in [json.dumps(value)] if as_json else map(printable, lines):
+        click.echo(line)
 
 
 class Command(click.Command):

@@ -1,12 +1,11 @@
 """`posefit plugins` and `posefit check`."""
 
-import json
 from typing import Any
 
 import click
 
 from posefit.cli.group import Group
-from posefit.cli.output import results_alone
+from posefit.cli.output import print_result, results_alone
 
 
 @click.group(cls=Group, invoke_without_command=True)
@@ -24,11 +23,7 @@ def plugins(context: click.Context, as_json: bool) -> None:
 
     with results_alone():
         offers = registry().offers
-    if as_json:
-        click.echo(json.dumps([described(offer) for kind in KINDS for offer in offers[kind].values()]))
-        return
-    for line in listing(registry()):
-        click.echo(line)
+    print_result(listing(registry()), [described(offer) for kind in KINDS for offer in offers[kind].values()], as_json)
 
 
 @plugins.command()
@@ -97,14 +92,12 @@ def check(
         from posefit.testing.process import check_in_process
 
         report = check_in_process(kind, name, settings, only)
-    if as_json:
-        results = [
-            {"check": one.name, "outcome": one.outcome, "detail": one.detail, "traceback": one.traceback}
-            for one in report.results
-        ]
-        click.echo(json.dumps({"plugin": report.plugin, "summary": report.summary, "results": results}))
-    else:
-        click.echo(str(report))
+    results = [
+        {"check": one.name, "outcome": one.outcome, "detail": one.detail, "traceback": one.traceback}
+        for one in report.results
+    ]
+    value = {"plugin": report.plugin, "summary": report.summary, "results": results}
+    print_result(str(report).split("\n"), value, as_json)
     context.exit(0 if report else 1)
 
 

@@ -1,6 +1,5 @@
 """`posefit suite`."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,8 @@ import click
 
 from posefit.cli.group import Group
 from posefit.cli.options import parsed_by
-from posefit.cli.output import progress, results_alone, say
-from posefit.errors import InputError, printable
+from posefit.cli.output import print_result, progress, results_alone, say
+from posefit.errors import InputError
 from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
@@ -26,14 +25,12 @@ def suite(context: click.Context, as_json: bool) -> None:
         return
     from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 
-    if as_json:
-        click.echo(json.dumps([asdict(one) for one in FUNCTIONS]))
-        return
-    click.echo(f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100")
-    click.echo(f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out\n")
+    lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
+    lines += [f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out", ""]
     for one in FUNCTIONS:
         dimensions = ", ".join(map(str, one.dimensions))
-        click.echo(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+        lines.append(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+    print_result(lines, [asdict(one) for one in FUNCTIONS], as_json)
 
 
 @suite.command("run")
@@ -99,25 +96,19 @@ def suite_run(
 @suite.command("table")
 @click.argument("ledger", metavar="DIR")
 @click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
-@click.option("--coco", metavar="DIR", help="New folder for COCO's files, which cocopp reads.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
-def suite_table(ledger: str, iohprofiler: str | None, coco: str | None, as_json: bool) -> None:
+def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
     """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
     from posefit.files import check_free
     from posefit.reading import counted
-    from posefit.report.export import write_coco
     from posefit.sweep.ledger import Ledger
     from posefit.sweep.table import search_runs
 
     check_free(iohprofiler)
-    check_free(coco)
     results = Ledger(ledger)
     runs = list(search_runs(results.rows(), results.path))
     if failed := len(results.quarantined()):
         say(f"{counted(failed, 'cell')} failed, left out of all figures")
-    if coco is not None:
-        write_coco(runs, coco)
-        say(f"written to {coco}: COCO's files")
     _print(runs, iohprofiler, as_json)
 
 
@@ -133,12 +124,11 @@ def _numbers(start: int | None, stop: int | None) -> range:
 
 def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
-    from posefit.report.export import suite_runs, write_iohprofiler
+    from posefit.report.export import write_iohprofiler
     from posefit.suites.running import score_lines, suite_scores
 
     scores = suite_scores(runs)
     if out is not None:
-        write_iohprofiler(suite_runs(runs), out)
+        write_iohprofiler(runs, out)
         say(f"written to {out}: IOHprofiler's files")
-    for line in [json.dumps([asdict(one) for one in scores])] if as_json else map(printable, score_lines(scores)):
-        click.echo(line)
+    print_result(score_lines(scores), [asdict(one) for one in scores], as_json)

@@ -1,6 +1,5 @@
 """`posefit sweep` and `posefit report`."""
 
-import json
 from contextlib import nullcontext
 from itertools import islice
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import click
 
 from posefit.cli.options import ENGINE, JSON, QUIET, options
-from posefit.cli.output import results_alone, say
+from posefit.cli.output import print_result, results_alone, say
 from posefit.errors import printable
 
 LINES = 1000  # that are printed at a time
@@ -22,7 +21,7 @@ LINES = 1000  # that are printed at a time
 @click.option(
     "--dry-run",
     is_flag=True,
-    help="Print what cells there are and about how long all take, and run none; with --json each cell.",
+    help="Print what cells there are, and run none; with --json each cell.",
 )
 @click.option("--keep-old", is_flag=True, help="Rows of another version of posefit or a plugin count, too.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
@@ -50,9 +49,9 @@ def sweep(
     from posefit.sweep.plan import Plan
 
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
-    start = command.engine(Limits(min(seconds, command.TRIAL_SECONDS) if dry_run else seconds, gigabytes), **places)
+    start = command.engine(Limits(seconds, gigabytes), **places)
     if dry_run:
-        lines, some = command.preview(plan, out, shard, start, as_json), ""
+        lines, some = command.preview(plan, out, shard, as_json), ""
         while True:
             with results_alone() if as_json else nullcontext():  # a plugin may print, too
                 some = "\n".join(line if as_json else printable(line) for line in islice(lines, LINES))
@@ -66,10 +65,7 @@ def sweep(
         command.file_of(shard)
         cells, tell = Plan.read(plan), (lambda _: None) if quiet else say
         tally = command.swept(cells, out, start(), tell, shard=shard, **how)  # without an engine there is no folder
-    for line in (
-        [json.dumps({"out": out, **vars(tally)})] if as_json else map(printable, command.tally_lines(tally, out))
-    ):
-        click.echo(line)
+    print_result(command.tally_lines(tally, out), {"out": out, **vars(tally)}, as_json)
     click.get_current_context().exit(130 if tally.stopped else 1 if tally.quarantined else 0)
 
 
@@ -77,7 +73,6 @@ def sweep(
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
 @click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
-@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @JSON
 def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:
@@ -92,5 +87,4 @@ def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: An
     from posefit.report.write import leaderboard_lines, write_report
 
     summary = write_report(ledger, out, warn=say, **others)
-    for line in [json.dumps(summary)] if as_json else map(printable, leaderboard_lines(summary)):
-        click.echo(line)
+    print_result(leaderboard_lines(summary), summary, as_json)

@@ -116,6 +116,8 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
 
     how = extraction_of(options, video, settings)
     result = run(video, out, how, frames=frames, progress=progress)
+    if result["guesses"]:
+        say(f"guessed: {'; '.join(result['guesses'])}")
     for warning in result["warnings"]:
         say(f"warning: {warning}")
     if as_json:
@@ -129,14 +131,16 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
 
 def _arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Return the keywords of `posefit.track` that the command's options stand for."""
-    from posefit.tracking.method import resolved
+    from posefit.footage.source import kind_of
+    from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
     source = options["source"] = options["source"] or ("walk",)
     options["extraction"] = extraction_of(options, source[0])
     if left_out := options.pop("without_subject"):
         chosen = TrackOptions(**{name: options[name] for name in ("method", "settings", "train")})
-        options["train"] = without_subjects(resolved(source[0], chosen).train, left_out)
+        motion = source[0] if kind_of(source[0]) == "motion" else None
+        options["train"] = without_subjects(completed(chosen, motion).train, left_out)
     return options
 
 

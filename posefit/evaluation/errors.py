@@ -184,7 +184,7 @@ def _certainty(scene: Scene, frames: Sequence[Frame], swapped: Array | None) -> 
         "interval_mm": _by_level(radii_mm),
         "unknown_rate": mean_known(sides),
         "swapped_known_rate": None if swapped is None else mean_known(swapped[sides == 0.0]),
-        "lost_said_rate": mean_known((lost[np.isfinite(lost)] >= LOST).astype(np.float64)),
+        "lost_flagged_rate": mean_known((lost[np.isfinite(lost)] >= LOST).astype(np.float64)),
     }
     return {"unknown_sides": sides, "lost": lost, "interval_mm": radius_mm}, measures
 

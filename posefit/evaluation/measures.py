@@ -94,13 +94,13 @@ class Measures:
         "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over all but the root",
     )
     unknown_rate: float | None = _share(
-        "said unknown", "share of frames whose left and right the method calls unknown, where it reports it"
+        "flagged unknown", "share of frames whose left and right the method calls unknown, where it reports it"
     )
     swapped_known_rate: float | None = _share(
         "swapped where known", "share swapped of the frames whose left and right it calls known"
     )
-    lost_said_rate: float | None = _share(
-        "said lost", "share of frames that the method calls lost, where it reports it"
+    lost_flagged_rate: float | None = _share(
+        "flagged lost", "share of frames that the method calls lost, where it reports it"
     )
     acceleration: float | None = _figure(
         "acceleration", "m/s2", 1, "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter"

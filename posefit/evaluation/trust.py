@@ -6,7 +6,7 @@ track doubtful, and one from which on useless. docs/howto/trust.md has the limit
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
 import cv2
@@ -145,65 +145,93 @@ MIN_FRAMES = 12  # fewer are too few to judge depth, feet and motion by
 
 @dataclass(frozen=True)
 class Sign:
-    """How far a figure may be off its best value until a track is doubtful or useless, and the words for it."""
+    """How far a figure may be off its best value until a track is doubtful or useless, and its words.
 
-    name: str
-    best: float
-    doubtful: float
-    useless: float
-    words: str  # a format of the figures
+    Words are formats of all figures: what speaks `against` a track, and how the figure is `listed`.
+    """
+
+    limits: tuple[float, float, float] | None  # the best, and how far off is doubtful and useless; None: never
+    against: str = ""
+    listed: str = ""
 
 
-# The limits are ours, from footage made from the truth and the demonstration video: docs/howto/trust.md has them.
-SIGNS = (
-    Sign("lost", 0.0, 0.15, 0.5, "the person is lost in {lost:.0%} of the frames"),
-    Sign("held", 0.0, 0.25, 0.6, "the person is gone, or nearly, in {held:.0%} of the frames in between"),
-    Sign(
-        "training_mm",
-        0.0,
-        60.0,
-        200.0,
+def _sign(limits: tuple[float, float, float] | None, against: str = "", listed: str = "") -> Any:
+    return field(metadata={"sign": Sign(limits, against, listed)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trust:
+    """Whether a track can be trusted: a sentence, a grade, what speaks against it, and every sign; None is unknown.
+
+    The limits are ours, from footage made from the truth and the demonstration video: docs/howto/trust.md has them.
+    """
+
+    sentence: str
+    grade: Grade
+    against: list[str]
+    frames: int  # that show enough of the person
+    height_m: float
+    size_m: float | None
+    size_ratio: float | None = _sign(
+        (1.0, 0.08, 0.3),
+        "the person seems to be {size_m:.2f} m tall, not {height_m:.2f} m",
+        "size {size_m:.2f} m, the fitted body's {height_m:.2f} m",
+    )
+    depth_scatter: float | None = _sign(
+        (0.0, 0.04, 0.2), "the distance jumps by {depth_scatter:.0%}", "distance steady to {depth_scatter:.1%}"
+    )
+    foot_share: float | None = _sign(
+        (1.0, 0.8, 1.0),
+        "a foot stands in {foot_share:.0%} of the frames only",
+        "a foot stands in {foot_share:.0%} of frames",
+    )
+    stance_spread_m: float | None = _sign(
+        (0.0, 0.15, 0.6),
+        "feet stand at heights {stance_spread_m:.2f} m apart",
+        "at heights {stance_spread_m:.2f} m apart",
+    )
+    explained: float | None = _sign(
+        (1.0, 0.3, 0.6),
+        "the body covers {explained:.0%} of what moves only",
+        "the body covers {explained:.0%} of what moves",
+    )
+    interval_mm: float | None = _sign(None, listed="80% of joints expected within {interval_mm:.0f} mm")
+    training_mm: float | None = _sign(
+        (0.0, 60.0, 200.0),
         "one camera leaves depth to the motions learned from, and the nearest are {training_mm:.0f} mm away",
-    ),
-    Sign(
-        "frontal",
-        0.0,
-        0.5,
-        1.0,
+        "{training_mm:.0f} mm from the motions learned from",
+    )
+    lost: float | None = _sign((0.0, 0.15, 0.5), "the person is lost in {lost:.0%} of the frames", "lost {lost:.0%}")
+    unknown: float | None = _sign(
+        (0.0, 0.2, 1.0), "left and right are unknown in {unknown:.0%} of the frames", "sides unknown {unknown:.0%}"
+    )
+    held: float = _sign(
+        (0.0, 0.25, 0.6), "the person is gone, or nearly, in {held:.0%} of the frames in between", "held {held:.0%}"
+    )
+    frontal: float | None = _sign(
+        (0.0, 0.5, 1.0),
         "one camera sees the front or the back in {frontal:.0%} of the frames, where steps and lean do not show",
-    ),
-    Sign("unknown", 0.0, 0.2, 1.0, "left and right are unknown in {unknown:.0%} of the frames"),
-    Sign("iou", 1.0, 0.35, 0.55, "the body and the mask overlap by {iou:.0%} only"),
-    Sign("size_ratio", 1.0, 0.08, 0.3, "the person seems to be {size_m:.2f} m tall, not {height_m:.2f} m"),
-    Sign("depth_scatter", 0.0, 0.04, 0.2, "the distance jumps by {depth_scatter:.0%}"),
-    Sign("foot_share", 1.0, 0.8, 1.0, "a foot stands in {foot_share:.0%} of the frames only"),
-    Sign("stance_spread_m", 0.0, 0.15, 0.6, "feet stand at heights {stance_spread_m:.2f} m apart"),
-    Sign("explained", 1.0, 0.3, 0.6, "the body covers {explained:.0%} of what moves only"),
-    Sign("acceleration", 0.0, 14.0, 60.0, "joints jerk, by {acceleration:.0f} m/s2"),
-)
-# How the figures that are known are listed.
-LISTED = {
-    "size_ratio": "size {size_m:.2f} m, the fitted body's {height_m:.2f} m",
-    "depth_scatter": "distance steady to {depth_scatter:.1%}",
-    "foot_share": "a foot stands in {foot_share:.0%} of frames",
-    "stance_spread_m": "at heights {stance_spread_m:.2f} m apart",
-    "explained": "the body covers {explained:.0%} of what moves",
-    "interval_mm": "80% of joints expected within {interval_mm:.0f} mm",
-    "training_mm": "{training_mm:.0f} mm from the motions learned from",
-    "lost": "lost {lost:.0%}",
-    "unknown": "sides unknown {unknown:.0%}",
-    "held": "held {held:.0%}",
-}
+    )
+    iou: float = _sign((1.0, 0.35, 0.55), "the body and the mask overlap by {iou:.0%} only")
+    acceleration: float | None = _sign((0.0, 14.0, 60.0), "joints jerk, by {acceleration:.0f} m/s2")
+    unknown_signs: Mapping[str, str]  # why each is unknown
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+SIGNS: dict[str, Sign] = {each.name: each.metadata["sign"] for each in fields(Trust) if "sign" in each.metadata}
 
 
 def signs_against(figures: Mapping[str, Any]) -> list[tuple[Grade, str]]:
     """Return what speaks against a track, the worst first, by figures named as `SIGNS`; None of them is not known."""
     few = f"{figures['frames']} frames that show the person are too few to judge by"
     signs = [(1.0 - figures["frames"] / MIN_FRAMES, few)]
-    for sign in SIGNS:
-        if figures[sign.name] is not None:
-            off = abs(figures[sign.name] - sign.best)
-            signs.append(((off - sign.doubtful) / (sign.useless - sign.doubtful), sign.words.format(**figures)))
+    for name, sign in SIGNS.items():
+        if sign.limits is not None and figures[name] is not None:
+            best, doubtful, useless = sign.limits
+            severity = (abs(figures[name] - best) - doubtful) / (useless - doubtful)
+            signs.append((severity, sign.against.format(**figures)))
     signs.sort(key=lambda severity_and_words: severity_and_words[0], reverse=True)
     return [("useless" if severity > 1.0 else "doubtful", words) for severity, words in signs if severity > 0.0]
 
@@ -232,36 +260,8 @@ def trust_line(trust: Mapping[str, Any]) -> str:
 
 
 def _listed(figures: Mapping[str, Any]) -> str:
-    return ", ".join(words.format(**figures) for name, words in LISTED.items() if figures[name] is not None)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trust:
-    """Whether a track can be trusted: a sentence, a grade, what speaks against it, and every sign; None is unknown."""
-
-    sentence: str
-    grade: Grade
-    against: list[str]
-    frames: int  # that show enough of the person
-    size_ratio: float | None
-    size_m: float | None
-    height_m: float
-    depth_scatter: float | None
-    foot_share: float | None
-    stance_spread_m: float | None
-    explained: float | None
-    lost: float | None
-    unknown: float | None
-    interval_mm: float | None
-    training_mm: float | None
-    frontal: float | None
-    held: float
-    iou: float
-    acceleration: float | None
-    unknown_signs: Mapping[str, str]  # why each is unknown
-
-    def __str__(self) -> str:
-        return self.sentence
+    known = (sign.listed.format(**figures) for name, sign in SIGNS.items() if figures[name] is not None)
+    return ", ".join(filter(None, known))
 
 
 SAMPLED_FRAMES = 60  # spread over the footage, whose sizes and poses are compared
@@ -269,6 +269,7 @@ FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a p
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 SEVERAL = "several cameras see the depth"
 NOT_REPORTED = "the method does not say"
+MASKS_ALONE, STILL = "there are masks alone", "nothing moves enough"
 TOO_FEW = "too few frames show the person"
 IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
 STAYS = 1.0  # metres along the ground's axes: who stays within walks nowhere
@@ -289,69 +290,59 @@ def trust_of(
     """
     usable = table["usable"] == 1.0
     cut = np.array([any(touches_border(view.mask) for view in each.silhouettes) for each in scene.observations])
-    many = usable.sum() >= MIN_FRAMES
+    few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
     joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
-    stands = standing(joints, scene.fps) & usable[:, None]
-    walks = many and np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() > STAYS
+    stands = standing(joints, fps) & usable[:, None]
+    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= STAYS
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
-    several = len(scene.cameras) > 1
-    ratio = _size(scene, frames, usable) if several else None
+    turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
     lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
-    figures: dict[str, Any] = {
-        "frames": int(usable.sum()),
-        "size_ratio": ratio,
-        "size_m": None if ratio is None else ratio * stature,
-        "height_m": stature,
-        "depth_scatter": depth_scatter(depths, usable, scene.fps) if many else None,
-        "foot_share": float(stands.any(axis=1)[usable].mean()) if walks else None,
-        "stance_spread_m": stance_spread(joints, stands) if many else None,
-        "explained": explained_share(scene, frames, usable),
-        "lost": mean_known(np.where(np.isnan(lost), lost, lost >= LOST)),
-        "unknown": mean_known(unknown),
-        "interval_mm": mean_known(radii),
-        "training_mm": None if several else _training_mm(scene, frames, usable, training),
-        "frontal": None if several else _frontal_share(scene, frames, usable),
+    signs: dict[str, float | str] = {  # a text is why it is unknown
+        "size_ratio": _or(_size(scene, frames, usable), TOO_FEW) if several else ONE_CAMERA,
+        "depth_scatter": TOO_FEW if few else _or(depth_scatter(depths, usable, fps), TOO_FEW),
+        "foot_share": TOO_FEW if few else IN_PLACE if in_place else float(stands.any(axis=1)[usable].mean()),
+        "stance_spread_m": TOO_FEW if few else _or(stance_spread(joints, stands), "no foot stands twice"),
+        "explained": MASKS_ALONE if scene.pictures is None else _or(explained_share(scene, frames, usable), STILL),
+        "interval_mm": _or(mean_known(radii), NOT_REPORTED),
+        "training_mm": SEVERAL if several else TOO_FEW if few else _training_mm(scene, frames, usable, training),
+        "lost": _or(mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
+        "unknown": _or(mean_known(unknown), NOT_REPORTED),
         "held": held_share(usable, cut),
+        "frontal": SEVERAL if several else _or(mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW),
         "iou": iou,
-        "acceleration": mean_known(acceleration(joints, scene.fps)[usable]) if many else None,
+        "acceleration": TOO_FEW if few else _or(mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
     }
-    signs = signs_against(figures)
-    reasons = {
-        "size_ratio": TOO_FEW if several else ONE_CAMERA,
-        "depth_scatter": TOO_FEW,
-        "foot_share": IN_PLACE if many else TOO_FEW,
-        "stance_spread_m": "no foot stands twice" if many else TOO_FEW,
-        "explained": "there are masks alone" if scene.pictures is None else "nothing moves enough",
-        "lost": NOT_REPORTED,
-        "unknown": NOT_REPORTED,
-        "interval_mm": NOT_REPORTED,
-        "frontal": SEVERAL if several else TOO_FEW,
-        "training_mm": SEVERAL if several else "no motion was learned from" if many else TOO_FEW,
+    reasons = {name: value for name, value in signs.items() if isinstance(value, str)}
+    figures: dict[str, Any] = {**signs, **dict.fromkeys(reasons)}
+    ratio = figures["size_ratio"]
+    figures |= {
+        "frames": int(usable.sum()),
+        "height_m": stature,
+        "size_m": None if ratio is None else ratio * stature,
     }
+    against = signs_against(figures)
     return Trust(
-        sentence=sentence(figures, signs),
-        grade=grade_of(signs),
-        against=[words for _, words in signs],
-        unknown_signs={name: why for name, why in reasons.items() if figures[name] is None},
+        sentence=sentence(figures, against),
+        grade=grade_of(against),
+        against=[words for _, words in against],
+        unknown_signs=reasons,
         **figures,
     )
 
 
-def _frontal_share(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:
-    """Return the share of usable frames (T,) within 20 degrees of the front or the back, by the first camera."""
-    turns = [frame.pose[0] - facing(scene.cameras[0], frame.translation) for frame in frames]
-    return mean_known((np.abs(np.sin(turns)) < FRONTAL)[usable].astype(np.float64))
+def _or(value: float | None, why: str) -> float | str:
+    return why if value is None else value
 
 
 def _training_mm(
     scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], training: Sequence[Motion]
-) -> float | None:
-    """Return how far the poses of usable frames (T,) are from motions, millimetres, the mean; None of too few."""
+) -> float | str:
+    """Return how far the poses of usable frames (T,) are from motions, millimetres, the mean."""
     poses = np.array([frame.pose for frame in frames])[usable]
-    if len(poses) < MIN_FRAMES:
-        return None
     sampled = poses[:: max(1, len(poses) // SAMPLED_FRAMES)]
-    return mean_known(1e3 * training_distances(scene.body.skeleton, sampled, training))
+    return _or(
+        mean_known(1e3 * training_distances(scene.body.skeleton, sampled, training)), "no motion was learned from"
+    )
 
 
 def _size(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:

@@ -6,7 +6,6 @@ pose.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Protocol, Self
 
 import numpy as np
@@ -53,10 +52,6 @@ class Prior(Latents, Protocol):
 
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn from joint angles (T, 63) in radians, of a person with this skeleton, and return itself."""
-        ...
-
-    def save(self, path: str | Path) -> None:
-        """Write everything `fit` learned to an .npz file."""
         ...
 
 

@@ -26,6 +26,7 @@ SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiple
 KEPT = 3  # frames: how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
+RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
 COORDINATES = "coordinates"  # in the details of a frame: (d,) of its pose in the search space
 FLOOR = 0.05  # Interpretation S5: their floor, in half-ranges of the box, so that a still subject keeps some spread
 
@@ -147,8 +148,8 @@ class Prediction:
         tilt: pitch and roll are "learned" with the latents, or a "box" around upright; by default learned, and a box
             to the letter of the paper. Interpretation S16.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
-        start: the name of what guesses the first pose, "blind" for nothing; by default the look-up of silhouettes. Ours.
-        relocalise_gap: frames of a gap after which several starts look all around; 0 never, none 5 in footage. Ours.
+        start: what guesses the first pose where the yaw is unknown, by name, "blind" for nothing; by default "lookup".
+        relocalise_gap: in footage, frames of a gap after which several starts look all around; 0 never. Ours.
         variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
             (S16), and a root that turns about x, then y, then z (S3).
     """
@@ -159,7 +160,7 @@ class Prediction:
     tilt: Literal["learned", "box"] | None = None
     beta: float = BETA
     start: str | None = None
-    relocalise_gap: int | None = None
+    relocalise_gap: int = RELOCALISE_GAP
     variant: Literal["default", "paper"] = "default"
 
     def __post_init__(self) -> None:
@@ -171,7 +172,7 @@ class Prediction:
         for name in ("spread", "root_range_degrees"):
             for value in np.atleast_1d(getattr(self, name)):
                 at_least(name, value, 0.0)
-        whole("relocalise_gap", self.relocalise_gap or 0, 0)
+        whole("relocalise_gap", self.relocalise_gap, 0)
 
     def tilted(self, prior: Prior, training: Sequence[Motion]) -> Tilt | None:
         """Return the tilt that goes with a prior's latents in the training motions; None where nothing is learned."""

@@ -16,6 +16,7 @@ from posefit.fitting.prior import Prior
 from posefit.geometry.skeleton import Skeleton
 from posefit.silhouette.drawn import PoseCount
 
+FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
 POSEFIT = Path(__file__).parents[1]  # whose lines are not a plugin's
 
 
@@ -37,27 +38,13 @@ class CheckedOptimiser:
         """Return the optimiser's next population. Raises BrokenRuleError where it is none."""
         with self._called("ask"):
             proposals = self._optimiser.ask()
-        self._check(proposals)
+        check_population(proposals, self._space, self._name)
         count, budget = len(proposals), self._evaluations
         if self._first and not count:
             raise self._broken("ask must return a first population of one proposal or more, got none")
         if self._first and budget is not None and count > budget:
             raise BudgetError(f"{self._name}: evaluations must hold one population of {count}, got {budget}")
         return proposals
-
-    def _check(self, proposals: Array) -> None:
-        """Raise BrokenRuleError where proposals are not (n, d) numbers in the box."""
-        plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
-        if not plain or proposals.shape[1:] != (self._space.dimensions,):
-            came = f"shape {proposals.shape}" if plain else type(proposals).__name__
-            raise self._broken(f"ask must return an array of shape (n, {self._space.dimensions}), got {came}")
-        if proposals.dtype.kind != "f":
-            raise self._broken(f"ask must return numbers of type float64, got {proposals.dtype}")
-        farthest = np.abs(proposals).max(initial=0.0)
-        if np.isnan(farthest):
-            raise self._broken("ask must return finite proposals, got nan")
-        if farthest > 1.0:
-            raise self._broken(f"ask must return proposals in [-1, 1], got {proposals.flat[abs(proposals).argmax()]}")
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Pass the costs on."""
@@ -81,6 +68,23 @@ class CheckedOptimiser:
 
     def _broken(self, rule: str) -> BrokenRuleError:
         return BrokenRuleError(f"{self._name}: {rule}")
+
+
+def check_population(proposals: Any, space: Space, name: str) -> None:
+    """Return nothing. Raises BrokenRuleError, which begins with `name`, where proposals are not (n, d) in the box."""
+    plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
+    rule = ""
+    if not plain or proposals.shape[1:] != (space.dimensions,):
+        came = f"shape {proposals.shape}" if plain else type(proposals).__name__
+        rule = f"an array of shape (n, {space.dimensions}), got {came}"
+    elif proposals.dtype.kind != "f":
+        rule = f"numbers of type float64, got {proposals.dtype}"
+    elif np.isnan(farthest := np.abs(proposals).max(initial=0.0)):
+        rule = "finite proposals, got nan"
+    elif farthest > 1.0:
+        rule = f"proposals in [-1, 1], got {proposals.flat[np.abs(proposals).argmax()]}"
+    if rule:
+        raise BrokenRuleError(f"{name}: ask must return {rule}")
 
 
 @contextmanager
@@ -107,8 +111,8 @@ def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
     # where the plugin raised it, or passed it on from a library
     frames = [frame for frame in extract_tb(error.__traceback__) if POSEFIT not in Path(frame.filename).parents]
-    own = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
-    place = f" ({Path(own[-1].filename).name}:{own[-1].lineno})" if own else ""
+    of_plugin = [frame for frame in frames if Path(frame.filename).parent == Path(frames[0].filename).parent]
+    place = f" ({Path(of_plugin[-1].filename).name}:{of_plugin[-1].lineno})" if of_plugin else ""
     return BrokenRuleError(f"{name}: {what} must not fail, got {type(error).__name__}: {error}{place}")
 
 
@@ -136,12 +140,41 @@ class CheckedPrior:
         """Return which latents (n, m) are poses at all (n,)."""
         return self._call("feasible", latents)
 
-    def save(self, path: str | Path) -> None:
-        """Write what it learned to an .npz file."""
-        self._call("save", path)
-
     def _call(self, method: str, *arguments: Any) -> Any:
         try:  # not `plugin_errors`, which takes as long as a few poses
             return getattr(self._prior, method)(*arguments)
         except (Exception, SystemExit) as error:
             raise _broken_by(self._name, method, error) from error
+
+
+def check_prior(prior: Prior, training: Array, name: str) -> None:
+    """Return nothing. Raises BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
+
+    `training` (T, 63) are the joint angles that it has learned from.
+    """
+
+    def broken(rule: str) -> BrokenRuleError:
+        return BrokenRuleError(f"{name}: {rule}")
+
+    low, high = np.asarray(prior.low), np.asarray(prior.high)
+    if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
+        raise broken(f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}")
+    for k in np.flatnonzero(low > high):
+        raise broken(f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}")
+    angles = training[:3]
+    latents = np.asarray(prior.transform(angles))
+    back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
+    for method, value, shape in (
+        ("transform", latents, (len(angles), len(low))),
+        ("inverse_transform", back, angles.shape),
+        ("feasible", feasible, (len(angles),)),
+    ):
+        if np.shape(value) != shape:
+            raise broken(f"{method} must return shape {shape}, got {np.shape(value)}")
+        if not np.isfinite(value).all():
+            raise broken(f"{method} must return finite numbers, got some that are not")
+    sample = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
+    drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
+    if not (np.any(feasible) or any(np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn))):
+        came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
+        raise broken(f"feasible must allow some poses, got {came}")

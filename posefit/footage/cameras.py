@@ -67,25 +67,13 @@ def combined(
         guesses.append("a level camera, 40 degrees across: distances and sizes are as good as that")
     world, metres, of_cameras = world_of(known, up, unit)
     unit_is_open = unit is None and any(isinstance(camera, Calibration) for camera in known)
-    masks: list[PackedMasks] = []
-    cameras: list[Camera] = []
-    pictures = views[0].pictures
-    for k, view in enumerate(views):
-        size = view.masks.size
-        camera = known[k] if known else Camera.around(np.zeros(3), 0.0, 0.0, size)
-        maps = None
-        if isinstance(camera, Calibration):
-            calibration = camera if view.filmed else _fitting(camera, size, scaled=True)
-            camera = calibration.in_metres(metres).camera(size, world)
-            maps = calibration.maps(size) if calibration.distorted else None
-        if (camera.width, camera.height) != size:
-            raise _of_another_size("", size, (camera.width, camera.height))
-        cameras.append(camera)
-        masks.append(view.masks if maps is None else undistorted(view.masks, calibration, maps))
-        if k == 0 and pictures is not None and maps is not None:
-            pictures = partial(_straightened, pictures, maps)
+    if known:
+        cameras, views = map(list, zip(*map(partial(_straight, world, metres), known, views), strict=True))
+    else:
+        cameras = [Camera.around(np.zeros(3), 0.0, 0.0, views[0].masks.size)]
     # several cameras distinguish front and back themselves
-    observations = Views(masks, yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate))
+    yaws = yaws_of(views[0].facings if len(views) == 1 else (), cameras[0], rate)
+    observations = Views([view.masks for view in views], yaws)
     if len(views) > 1 and (apparent := apparent_sizes(observations, cameras)):
         miss, tall = apparent
         if unit_is_open and np.median(tall) > 0.0:
@@ -115,9 +103,24 @@ def combined(
         "given" if known else "guessed",
         [warning for view in views for warning in view.warnings] + _unequal(views),
         [*guesses, *of_cameras.values()],
-        pictures,
+        views[0].pictures,
         views[0].masks.first,
     )
+
+
+def _straight(world: Array, metres: float, known: Camera | Calibration, view: CameraView) -> tuple[Camera, CameraView]:
+    """Return the camera of a view, and the view as a pinhole camera has it. Raises InputError where they do not fit."""
+    size = view.masks.size
+    if isinstance(known, Calibration):
+        calibration = known if view.filmed else _fitting(known, size, scaled=True)
+        known = calibration.in_metres(metres).camera(size, world)
+        if calibration.distorted:
+            maps = calibration.maps(size)
+            pictures = None if view.pictures is None else partial(_straightened, view.pictures, maps)
+            view = replace(view, masks=undistorted(view.masks, calibration, maps), pictures=pictures)
+    if (known.width, known.height) != size:
+        raise _of_another_size("", size, (known.width, known.height))
+    return known, view
 
 
 def world_of(

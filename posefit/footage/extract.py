@@ -14,8 +14,6 @@ from posefit.footage.segmentation import Extraction, Progress, Segmentation
 from posefit.footage.video import Video, VideoWriter
 from posefit.silhouette.foreground import Image, Person
 
-FILES = ("masks.npz", "preview.mp4", "quality.csv")
-
 
 def extract(
     source: str | Path,
@@ -46,7 +44,7 @@ def extract(
             writer = csv.DictWriter(file, list(segmentation.rows[0]))
             writer.writeheader()
             writer.writerows(segmentation.rows)
-    return {"video": str(source), "method": how.name, **segmentation.summary}
+    return {"video": str(source), "method": how.name, **segmentation.summary, "guesses": [*video.guesses]}
 
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:

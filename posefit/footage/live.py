@@ -19,8 +19,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.images import PIXELS
-from posefit.footage.quality import FrameQuality
-from posefit.footage.segmentation import Extraction, Segmentation
+from posefit.footage.segmentation import Extraction, PersonSegmenter
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion.clips import FPS
@@ -64,6 +63,7 @@ class Stream:
 
     def __init__(self, source: str, pipe: BinaryIO | None = None) -> None:
         self.name, self.fps, self.count = source, FPS, 0
+        self.rate: float | None = None  # frames a second, where the source states them
         self._latest: LiveImage | None = None
         self._ended = False
         self._error: InputError | None = None
@@ -81,7 +81,8 @@ class Stream:
             if not capture.isOpened():
                 raise InputError(f"live must be a device or an address that can be opened, or -, got {quoted(source)}")
             rate = capture.get(cv2.CAP_PROP_FPS)
-            self.fps = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else FPS
+            self.rate = rate if np.isfinite(rate) and 1.0 <= rate <= 1000.0 else None
+            self.fps = self.rate or FPS
             frames = _captured(capture)
         threading.Thread(target=self._read, args=(frames,), daemon=True).start()
 
@@ -178,13 +179,9 @@ def live_masks(stream: Stream, how: Extraction | None, log: Callable[[str], None
         how = Extraction(background=f"0:{len(learned)}")
     else:
         images = chain([first], images)
-    segmentation = Segmentation(Video.of_images(learned, Path(stream.name), stream.fps), how, (None, None))
-    segmenter = segmentation.learned()
-    quality = FrameQuality(stream.fps, getattr(segmenter, "background", None))
+    segmenter = PersonSegmenter(Video.of_images(learned, Path(stream.name), stream.fps), how)
     for live in images:
-        image = scaled(live.image, segmentation.size)
-        person, row = segmentation.person(segmenter, image, quality, live.number)
-        landmarks = segmentation.landmarks_of(segmenter)
+        person, row, _, landmarks = segmenter.frame(scaled(live.image, segmenter.size), live.number)
         yield LiveMask(live, person.mask, person.valid, bool(row["usable"]), landmarks)
 
 

@@ -15,12 +15,12 @@ import re
 import tempfile
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import cv2
 import numpy as np
@@ -140,35 +140,9 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
     files, guesses = numbered(images, name)
     every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
     chosen = every[slice(*span(frames, len(every)))]
-    counts, shape, known = ValueCounts(), (0, 0), [file is not None for file, _ in chosen]
-    stored: list[tuple[int, np.dtype[Any]]] = []
-    with tempfile.SpooledTemporaryFile(SPOOLED) as spool:
-        for file, group in groupby(((file, page) for file, page in chosen if file is not None), key=itemgetter(0)):
-            wanted = len(stored) + len(pages := [page for _, page in group])
-            for marks in read_marks(file, pages, label is not None):
-                if marks.photo:
-                    raise _many_colours(str(file) if stored else name)
-                if not stored:
-                    shape = marks.values.shape
-                    check_decoded(name, marks.values.nbytes * sum(known))
-                if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
-                    raise InputError(f"{file}: masks must be finite, got nan or infinity")
-                if marks.values.shape != shape:
-                    raise InputError(f"{file}: mask must have shape {shape}, got {marks.values.shape}")
-                counts.add(marks.values, marks.soft)
-                stored.append((spool.write(zlib.compress(marks.values.tobytes(), 1)), marks.values.dtype))
-            if len(stored) < wanted:
-                raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
-        is_person, kind = counts.classifier(label, name)
-        size, lengths = (shape[1], shape[0]), iter(stored)
-        masks = empty_planes(len(chosen), size)
-        spool.seek(0)
-        for k in range(len(chosen)):
-            masks[k] = 0
-            if known[k]:
-                length, dtype = next(lengths)
-                values = np.frombuffer(zlib.decompress(spool.read(length)), dtype).reshape(shape)
-                masks[k] = np.packbits(is_person(values))
+    known = [file is not None for file, _ in chosen]
+    with tempfile.SpooledTemporaryFile(SPOOLED) as temporary:
+        masks, size, kind = _image_masks(chosen, name, label, _Spool(temporary))
     valid = None
     if not all(known):
         valid = empty_planes(len(chosen), size)
@@ -176,6 +150,56 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
     paged = {file for file, page in chosen if page}
     names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
     return PackedMasks(names, size, masks, valid, np.array(known), guesses=[*guesses, *kind])
+
+
+def _image_masks(
+    images: Sequence[tuple[Path | None, int]], name: str, label: int | None, spool: "_Spool"
+) -> tuple[Planes, tuple[int, int], list[str]]:
+    """Return the masks of images, files and pages, none of it for None; their size, and what was guessed of values."""
+    counts, known = ValueCounts(), sum(file is not None for file, _ in images)
+    for file, group in groupby(((file, page) for file, page in images if file is not None), key=itemgetter(0)):
+        wanted = len(spool) + len(pages := [page for _, page in group])
+        for marks in read_marks(file, pages, label is not None):
+            if marks.photo:
+                raise _many_colours(str(file) if len(spool) else name)
+            if not len(spool):
+                check_decoded(name, marks.values.nbytes * known)
+            if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
+                raise InputError(f"{file}: masks must be finite, got nan or infinity")
+            if len(spool) and marks.values.shape != spool.shape:
+                raise InputError(f"{file}: mask must have shape {spool.shape}, got {marks.values.shape}")
+            counts.add(marks.values, marks.soft)
+            spool.add(marks.values)
+        if len(spool) < wanted:
+            raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+    is_person, kind = counts.classifier(label, name)
+    size, values = (spool.shape[1], spool.shape[0]), iter(spool)
+    masks = empty_planes(len(images), size)
+    for k, (file, _) in enumerate(images):
+        masks[k] = 0 if file is None else np.packbits(is_person(next(values)))
+    return masks, size, kind
+
+
+class _Spool:
+    """The values of images of one shape, compressed, in a file."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self.shape: tuple[int, ...] = (0, 0)
+        self._file = file
+        self._stored: list[tuple[int, np.dtype[Any]]] = []
+
+    def __len__(self) -> int:
+        return len(self._stored)
+
+    def add(self, values: Values) -> None:
+        """Store the values of the next image."""
+        self.shape = values.shape
+        self._stored.append((self._file.write(zlib.compress(values.tobytes(), 1)), values.dtype))
+
+    def __iter__(self) -> Iterator[Values]:
+        self._file.seek(0)
+        for length, dtype in self._stored:
+            yield np.frombuffer(zlib.decompress(self._file.read(length)), dtype).reshape(self.shape)
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:

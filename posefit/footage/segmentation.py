@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from inspect import Parameter
 from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import cv2
 import numpy as np
@@ -29,6 +29,7 @@ from posefit.silhouette.mask import Mask
 T = TypeVar("T", bound=np.generic)
 Box = tuple[int, int, int, int]  # x, y, width, height
 Progress = Callable[[Iterator[Any], int], Iterator[Any]]
+OnFrame = Callable[[Image, Person, bool], None]  # a frame, the person in it, and whether it is usable
 
 DEFAULT_SEGMENTER = "mixture"
 BACKGROUND_SEGMENTER = "mean"  # where a background is given
@@ -147,6 +148,64 @@ class VideoFootage:
         return np.ascontiguousarray(image[y : y + tall, x : x + wide])
 
 
+class SegmentedFrame(NamedTuple):
+    """The person in a frame of the working size, and what a segmenter knows besides."""
+
+    person: Person
+    row: dict[str, Any]  # of quality.csv
+    facing: float  # as `Segmenter.facing`; NaN where unknown
+    landmarks: Array  # (27, 3) as `Segmenter.landmarks`, at their place in the frame; 0 for none
+
+
+class PersonSegmenter:
+    """Takes the person out of the frames of a video, one after the other; it learns the background before the first."""
+
+    def __init__(self, video: Video, how: Extraction) -> None:
+        """Check that the extraction fits the video. Raises InputError where it does not."""
+        scale = min(1.0, how.width / video.size[0])
+        self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
+        self.method, self.learned = how.name, "background" not in how.settings
+        self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
+        self._film, self._how = VideoFootage(video, self.size, self._roi or (0, 0, *self.size)), how
+        self._segmenter = None if self.learned else how.segmenter(self._film)  # a background is checked now
+        self._quality: FrameQuality | None = None
+
+    def frame(self, image: Image, number: int) -> SegmentedFrame:
+        """Return the person in the next frame, which is of the working size."""
+        segmenter = self._segmenter = self._segmenter or self._how.segmenter(self._film)
+        if self._quality is None:
+            self._quality = FrameQuality(self._film.video.fps, getattr(segmenter, "background", None))
+        result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
+        part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
+        row = self._quality.row(self._film.cut(image), part, number)
+        return SegmentedFrame(result, row, float(getattr(segmenter, "facing", math.nan)), self._landmarks(segmenter))
+
+    def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
+        """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
+        x, y, wide, tall = self._film.part
+        with plugin_errors(f"segmenter {self.method!r}", "segment"):
+            planes = [np.asarray(plane) for plane in segmenter.segment(self._film.cut(image))]
+        if len(planes) != 2 or any(plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes):
+            came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)
+            raise BrokenRuleError(
+                f"segmenter {self.method!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
+            )
+        whole = np.zeros((2, *image.shape[:2]), dtype=bool)
+        whole[:, y : y + tall, x : x + wide] = planes
+        return whole[0], whole[1]
+
+    def _landmarks(self, segmenter: Segmenter) -> Array:
+        landmarks = getattr(segmenter, "landmarks", None)
+        given = np.array(np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks, dtype=np.float64)
+        if given.shape != (len(JOINTS), 3) or not np.isfinite(given).all() or given[:, 2].min() < 0.0:
+            raise BrokenRuleError(
+                f"segmenter {self.method!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
+                f"confidence 0 or more, got shape {given.shape}"
+            )
+        given[:, :2] += self._film.part[:2]
+        return given
+
+
 class Segmentation:
     """One pass through a video; its rows, verdict and warnings are complete when it has ended."""
 
@@ -154,75 +213,51 @@ class Segmentation:
         """Check that the extraction fits the video. Raises InputError where it does not."""
         count = video.count()
         self.start, self.stop = span(frames, count)
-        self._missing = max(0, video.claimed - count)
-        scale = min(1.0, how.width / video.size[0])
-        self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
+        self.video, self._segmenter = video, PersonSegmenter(video, how)
+        self.method, self.size = self._segmenter.method, self._segmenter.size
         self.rows: list[dict[str, Any]] = []
-        self.video, self.method = video, how.name
-        self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
-        self._film = VideoFootage(video, self.size, self._roi or (0, 0, *self.size))
-        self._given, self._how = "background" in how.settings, how
-        self._segmenter = how.segmenter(self._film) if self._given else None  # a background is checked now
+        self._missing = max(0, video.claimed - count)
         self._masks, self._valid = (empty_planes(len(self), self.size) for _ in range(2))
-        self._pass: tuple[Iterator[Image], Segmenter, FrameQuality, CameraMotion] | None = None  # while frames are read
-        self._shifts: list[float] = []
-        self._facings: list[float] = []  # of each frame, as `Segmenter.facing`; NaN where unknown
-        self._landmarks: list[Array] = []  # of each frame, as `Segmenter.landmarks`, in scaled pixels
-        self._middles: list[float] = []  # of the mask's pixels in each frame, from the left; NaN where it is empty
+        self._images: Iterator[Image] | None = None  # while frames are read
+        self._motion, self._shifts = CameraMotion(self.size), list[float]()
+        # of each frame: facing, the middle of the mask's pixels from the left, NaN where it is empty, and landmarks
+        self._signs: list[tuple[float, float, Array]] = []
 
     def __len__(self) -> int:
         return self.stop - self.start
 
-    def masks(
-        self, progress: Progress | None = None, on_frame: Callable[[Image, Person, bool], None] | None = None
-    ) -> PackedMasks:
+    def masks(self, progress: Progress | None = None, on_frame: OnFrame | None = None) -> PackedMasks:
         """Return the masks of the video, which is decoded once, after the background was learned.
 
         `on_frame` gets each frame, scaled, the person in it, and whether it is usable. Raises InputError where no frame
         shows a person.
         """
         self.read(len(self) - len(self.rows), progress, on_frame)
-        self._pass = None
-        if not self.shown:
+        self._images = None
+        if not any(row["area"] for row in self.rows):
             damage = f"; {self._damage}" if self._missing else ""
             none = "expected a person who moves before a still background, got none in any frame"
-            raise InputError(f"{self.video.path}: {none}{damage or advice(self.method, learned=not self._given)}")
+            raise InputError(
+                f"{self.video.path}: {none}{damage or advice(self.method, learned=self._segmenter.learned)}"
+            )
         return self.packed()
 
-    def read(
-        self,
-        count: int,
-        progress: Progress | None = None,
-        on_frame: Callable[[Image, Person, bool], None] | None = None,
-    ) -> None:
+    def read(self, count: int, progress: Progress | None = None, on_frame: OnFrame | None = None) -> None:
         """Take the person out of so many more frames."""
-        if self._pass is None:
-            segmenter = self.learned()
-            quality = FrameQuality(self.video.fps, getattr(segmenter, "background", None))
-            frames = self.video.frames(self.start, self.stop, self.size)
-            self._pass = frames, segmenter, quality, CameraMotion(self.size)
-        frames, segmenter, quality, motion = self._pass
-        chosen = islice(frames, count)
+        self._images = self._images or self.video.frames(self.start, self.stop, self.size)
+        chosen = islice(self._images, count)
         for image in progress(chosen, count) if progress else chosen:
             k = len(self.rows)
             if k % PERIOD == 0:
-                self._shifts.append(motion.shift(image))
-            result, row = self.person(segmenter, image, quality, self.start + k)
-            self._facings.append(float(getattr(segmenter, "facing", math.nan)))
-            self._landmarks.append(self.landmarks_of(segmenter))
-            self._middles.append(
-                float((np.flatnonzero(result.mask) % self.size[0]).mean()) if result.area else math.nan
-            )
+                self._shifts.append(self._motion.shift(image))
+            person, row, facing, landmarks = self._segmenter.frame(image, self.start + k)
+            middle = float((np.flatnonzero(person.mask) % self.size[0]).mean()) if person.area else math.nan
+            self._signs.append((facing, middle, landmarks))
             row["usable"] = int(row["usable"] and self.video.is_filmed(self.start + k))
             self.rows.append(row)
-            self._masks[k], self._valid[k] = np.packbits(result.mask), np.packbits(result.valid)
+            self._masks[k], self._valid[k] = np.packbits(person.mask), np.packbits(person.valid)
             if on_frame is not None:
-                on_frame(image, result, bool(row["usable"]))
-
-    @property
-    def shown(self) -> bool:
-        """Whether any frame so far shows a person."""
-        return any(row["area"] for row in self.rows)
+                on_frame(image, person, bool(row["usable"]))
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -239,59 +274,21 @@ class Segmentation:
         """Return the masks of the frames so far."""
         count, usable = len(self.rows), self.usable
         names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
-        landmarks = np.array(self._landmarks)
+        landmarks = np.array([landmarks for *_, landmarks in self._signs])
         known = landmarks if landmarks[..., 2].any() else None
         masks, valid, guesses = self._masks[:count], self._valid[:count], self.video.guesses
         return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, self.start, guesses)
 
-    def learned(self) -> Segmenter:
-        """Return the segmenter, which has learned the background."""
-        return self._segmenter or self._how.segmenter(self._film)
-
-    def person(
-        self, segmenter: Segmenter, image: Image, quality: FrameQuality, number: int
-    ) -> tuple[Person, dict[str, Any]]:
-        """Return the person in a frame of the working size, and the frame's quality."""
-        result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
-        part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
-        return result, quality.row(self._film.cut(image), part, number)
-
-    def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
-        """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
-        x, y, wide, tall = self._film.part
-        with plugin_errors(f"segmenter {self.method!r}", "segment"):
-            planes = [np.asarray(plane) for plane in segmenter.segment(self._film.cut(image))]
-        if len(planes) != 2 or any(plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes):
-            came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)
-            raise BrokenRuleError(
-                f"segmenter {self.method!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
-            )
-        whole = np.zeros((2, *image.shape[:2]), dtype=bool)
-        whole[:, y : y + tall, x : x + wide] = planes
-        return whole[0], whole[1]
-
-    def landmarks_of(self, segmenter: Segmenter) -> Array:
-        """Return a segmenter's landmarks (27, 3) of the latest frame, at their place in the whole frame; 0 for none."""
-        landmarks = getattr(segmenter, "landmarks", None)
-        given = np.array(np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks, dtype=np.float64)
-        if given.shape != (len(JOINTS), 3) or not np.isfinite(given).all() or given[:, 2].min() < 0.0:
-            raise BrokenRuleError(
-                f"segmenter {self.method!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
-                f"confidence 0 or more, got shape {given.shape}"
-            )
-        given[:, :2] += self._film.part[:2]
-        return given
-
     @property
     def facings(self) -> Array:
         """Which way the person faces in each frame, as `Segmenter.facing`; NaN where unknown or going along."""
-        sides = [row["longer_side"] for row in self.rows]
-        return facings_on_the_spot(self._facings, self._middles, sides, self.video.fps)
+        facings, middles = [facing for facing, _, _ in self._signs], [middle for _, middle, _ in self._signs]
+        return facings_on_the_spot(facings, middles, [row["longer_side"] for row in self.rows], self.video.fps)
 
     @property
     def verdict(self) -> Verdict | None:
         """What is wrong with the masks, if anything; known when the pass has ended."""
-        result = verdict(self.rows, self.method, learned=not self._given)
+        result = verdict(self.rows, self.method, learned=self._segmenter.learned)
         return result and replace(result, text=f"{self.video.path}: {result.text}")
 
     @property

@@ -105,10 +105,10 @@ def scene_of(
         ]
         stated = FileOptions(asf, None if known else unit, None if known else up, rate)
         motion = load_motion(cast(Source, sources[0]), fps or FPS, stated)
-        return _logged(synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()]), progress)
+        return logged(synthetic(motion, view_degrees, size or SIZE, cameras, frames, [*guesses.values()]), progress)
     if len(view_degrees) > 1:
         raise InputError(f"view_degrees must be one for footage, of its first camera, got {len(view_degrees)}")
-    body, notes = body_of(asf, height, None if camera else unit)
+    body, notes, of_height = body_of(asf, height, None if camera else unit)
     facing = view_degrees[0] if view_degrees else None
 
     def scene(views: Sequence[CameraView]) -> Scene:
@@ -127,12 +127,11 @@ def scene_of(
         masks = [cleaned(read_masks(place, frames, label), name_of(place), holes) for place in places]
         views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
     result = scene(views)
-    of_height = [f"a person of {body.stature:.2f} m"] if height is None and asf is None else []
     result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
-    return _logged(result, progress)
+    return logged(result, progress)
 
 
-def _logged(scene: Scene, progress: Progress) -> Scene:
+def logged(scene: Scene, progress: Progress) -> Scene:
     """Return a scene whose guesses are logged."""
     if scene.guesses:
         progress.log(f"guessed: {'; '.join(scene.guesses)}")
@@ -147,13 +146,15 @@ def film_of(source: str | Path | tuple[Path, ...], fps: float | None) -> Video:
     return Video.of_pictures(images_in(path), path, fps) if path.is_dir() else Video.of(path)
 
 
-def body_of(asf: str | Path | None, height: float | None, unit: Unit | None = None) -> tuple[Body, Sequence[str]]:
-    """Return the body of a skeleton file, or the average one, scaled to a height in metres; and what was guessed."""
+def body_of(
+    asf: str | Path | None, height: float | None, unit: Unit | None = None
+) -> tuple[Body, Sequence[str], Sequence[str]]:
+    """Return the body of a skeleton file, or the average one, scaled to a height in metres; warnings, and guesses."""
     acclaim = Acclaim(built_in.average_skeleton(), 1.0) if asf is None else parse_asf(asf, unit)
     body = Body.of(acclaim.skeleton)
-    if height is None:
-        return body, acclaim.notes
-    return body.scaled(height / body.stature, height / body.stature), ()
+    if height is not None:
+        return body.scaled(height / body.stature, height / body.stature), (), ()
+    return body, acclaim.notes, [f"a person of {body.stature:.2f} m"] if asf is None else ()
 
 
 def _filmed(

@@ -162,12 +162,9 @@ def _check_no_text(path: Path) -> None:
     """Return nothing. Raises InputError for a text, such as a playlist, by which FFmpeg would open other files."""
     with path.open("rb") as file:
         head = file.read(HEAD)
-    if head and not head.startswith(b"YUV4MPEG2") and (head.startswith((b"ffconcat", b"#EXTM3U")) or _is_text(head)):
+    is_text = head and not head.startswith(b"YUV4MPEG2") and all(byte >= 32 or byte in b"\t\n\r\f" for byte in head)
+    if is_text or head.startswith((b"ffconcat", b"#EXTM3U")):
         raise InputError(f"{path}: expected a video that OpenCV can read, got a text")
-
-
-def _is_text(head: bytes) -> bool:
-    return all(byte >= 32 or byte in b"\t\n\r\f" for byte in head)
 
 
 def _check_written(path: Path, first: Any, capture: Any) -> None:

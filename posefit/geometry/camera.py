@@ -52,12 +52,7 @@ class Camera:
 
     @classmethod
     def around(
-        cls,
-        target: Array,
-        azimuth: float,
-        distance: float,
-        size: tuple[int, int],
-        field_of_view: float = FIELD_OF_VIEW,
+        cls, target: Array, azimuth: float, distance: float, size: tuple[int, int], field_of_view: float = FIELD_OF_VIEW
     ) -> "Camera":
         """Return an upright camera of `size` (width, height) that looks level at `target` (3,).
 

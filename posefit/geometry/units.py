@@ -30,15 +30,15 @@ def metres_of(unit: Unit) -> float:
     return METRES[unit]
 
 
-def unit_of(length: float, plausible: tuple[float, float] = STATURES) -> Unit | None:
-    """Return the unit in which a length lies between two plausible ones, in metres; None where it is in none.
+def unit_of(stature: float) -> Unit | None:
+    """Return the unit in which a person may stand so tall; None where there is none, or a length that is none.
 
-    Where several are plausible it is the one that is nearest to the middle of both, by ratio.
+    Where several are possible it is the one that is nearest to the middle of `STATURES`, by ratio.
     """
-    if not (math.isfinite(length) and length > 0.0):
+    if not (math.isfinite(stature) and stature > 0.0):
         return None
-    low, high = plausible
+    low, high = STATURES
     middle = math.log(low * high) / 2.0
-    off = {unit: abs(float(math.log(length * METRES[unit])) - middle) for unit in UNITS}
+    off = {unit: abs(float(math.log(stature * METRES[unit])) - middle) for unit in UNITS}
     best = min(UNITS, key=off.__getitem__)
-    return best if low <= length * METRES[best] <= high else None
+    return best if low <= stature * METRES[best] <= high else None

@@ -22,7 +22,7 @@ from posefit.geometry.rotation import (
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
 from posefit.geometry.units import CMU_UNIT, Unit
 from posefit.limits import RATES
-from posefit.motion.asf import checked_unit, lines_of, mistake, parse_asf, shown, values_of
+from posefit.motion.asf import lines_of, mistake, parse_asf, shown, values_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size
 
@@ -58,21 +58,18 @@ def read_amc(
     of bones outside the 27 joints are read and left out. All angles are unwrapped along time. Every frame must give
     all channels of `skeleton`, in any order. Raises ValueError with file and line.
     """
-    path, unit = Path(path), checked_unit(metres_per_unit)
+    path = Path(path)
     check_size(path, SIZE_LIMIT)
     spans, columns, targets = _layout(skeleton)
     values, radians, stated = _frames(path, spans, skeleton.name)
-    notes: tuple[str, ...] = ()
-    if (rate := fps or stated) is None:
-        rate, notes = (
-            FPS,
-            (f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it",),
-        )
+    rate = fps or stated or FPS
+    assumed = f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it"
+    notes = () if fps or stated else (assumed,)
     angles = values if radians else np.deg2rad(values)
     poses = np.zeros((len(values), ANGLES))
     poses[:, :3] = root_angles_from_rotation(rotation_from_joint_angles(angles[:, 3:6]))
     poses[:, targets] = angles[:, columns]
-    return Motion(path.stem, skeleton, unwrapped(poses), values[:, :3] * unit, rate, notes=notes)
+    return Motion(path.stem, skeleton, unwrapped(poses), values[:, :3] * metres_per_unit, rate, notes=notes)
 
 
 def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:
@@ -153,19 +150,18 @@ def _check_whole(path: Path, number: int, spans: Spans, bones_read: set[bytes], 
         raise mistake(path, number, f"bone {shown(missing)} in frame {frame}", came)
 
 
-def write_amc(path: str | Path, motion: Motion, *, metres_per_unit: float = CMU_UNIT) -> None:
-    """Write an .amc file that reads back as the same motion, up to whole turns; a comment states its rate.
+def write_amc(path: str | Path, motion: Motion) -> None:
+    """Write an .amc file in the CMU database's unit that reads back as the same motion, up to whole turns.
 
-    Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError where the motion turns a
-    joint about an axis that its skeleton has no channel for, as the file could not hold that.
+    A comment states its rate. Channels that a pose does not hold, such as fingers, are written as 0. Raises ValueError
+    where the motion turns a joint about an axis that its skeleton has no channel for, as the file could not hold that.
     """
-    unit = checked_unit(metres_per_unit)
     lost = np.abs(motion.poses[:, ~motion.skeleton.free]).max(initial=0.0)
     if lost > 1e-9:
         raise InputError(f"motion must turn joints about their free axes only, got {lost:.3g} rad about another one")
     spans, columns, targets = _layout(motion.skeleton)
     values = np.zeros((len(motion), max(stop for _, stop in spans.values())))
-    values[:, :3] = motion.translations / unit
+    values[:, :3] = motion.translations / CMU_UNIT
     root = joint_angles_from_rotation(rotation_from_root_angles(motion.poses[:, :3]))
     values[:, 3:6] = np.rad2deg(steady_angles(root))
     values[:, columns] = np.rad2deg(unwrapped(motion.poses[:, targets]))

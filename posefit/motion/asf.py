@@ -37,13 +37,6 @@ def lines_of(path: Path, longest: int) -> Iterator[tuple[int, bytes]]:
             yield number, line
 
 
-def checked_unit(metres_per_unit: float) -> float:
-    """Return a unit's length. Raises ValueError where it is not positive and finite."""
-    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0.0):
-        raise InputError(f"metres_per_unit must be a positive number, got {metres_per_unit}")
-    return float(metres_per_unit)
-
-
 def shown(*words: bytes | str) -> str:
     """Return words of a file as a message quotes them."""
     texts = (word if isinstance(word, str) else word[: 4 * SHOWN].decode("utf-8", errors="replace") for word in words)
@@ -270,16 +263,15 @@ def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
             raise line.mistake(f"bone {name!r} under {JOINTS[above]!r}", f"it under {quoted(parent)}")
 
 
-def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = CMU_UNIT) -> None:
-    """Write an .asf file that reads back as the same skeleton. Lengths are divided by `metres_per_unit`.
+def write_asf(path: str | Path, skeleton: Skeleton) -> None:
+    """Write an .asf file in the CMU database's unit that reads back as the same skeleton.
 
     Bones of which only the channels are known, such as fingers, get the length 0.
     """
-    unit = checked_unit(metres_per_unit)
     axes = np.rad2deg(joint_angles_from_rotation(skeleton.axes))
     header = (
         f":version 1.10\n:name {'_'.join(skeleton.name.split()) or 'skeleton'}\n:units\n  mass 1.0\n"
-        f"  length {INCH / unit!r}\n  angle deg\n:root\n  order {' '.join(ROOT_CHANNELS)}\n  axis XYZ\n"
+        f"  length {INCH / CMU_UNIT!r}\n  angle deg\n:root\n  order {' '.join(ROOT_CHANNELS)}\n  axis XYZ\n"
         "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n"
     )
     text = [header]
@@ -299,7 +291,7 @@ def write_asf(path: str | Path, skeleton: Skeleton, *, metres_per_unit: float = 
             dof += "    limits " + "\n           ".join(f"({low!r} {high!r})" for low, high in rows) + "\n"
         text.append(
             f"  begin\n    id {number}\n    name {name}\n    direction {_spaced(direction)}\n"
-            f"    length {length / unit!r}\n    axis {_spaced(axis)} XYZ\n{dof}  end\n"
+            f"    length {length / CMU_UNIT!r}\n    axis {_spaced(axis)} XYZ\n{dof}  end\n"
         )
     text.append(":hierarchy\n  begin\n")
     parents = {name: JOINTS[above] for name, above in zip(BONES, PARENTS[1:], strict=True)}

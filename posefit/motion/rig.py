@@ -9,6 +9,7 @@ off the frame that is most like it, each bone turned the shortest way from the o
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Self
 
 import numpy as np
 
@@ -62,6 +63,36 @@ class Rig:
     rest: tuple[Array, Array] = field(repr=False)  # turns (nodes, 3, 3) and places (nodes, 3)
     moving: tuple[Array, Array] = field(repr=False)  # turns (nodes, T, 3, 3) and places (nodes, T, 3)
 
+    def of(self, node: int) -> "_Bone":
+        """Return the bone that ends in a node: the one before it carries it."""
+        return _Bone(self.parents[node], self.moving[1][node], self.rest[1][node])
+
+    def ending(self, node: int, tip: Array | None, share: float = 1.0) -> "_Bone":
+        """Return the bone that ends in a point of a node, a share of the way to its tip (3,), if that is known."""
+        if tip is None:
+            return _Bone(node)
+        (turns, places), (rest_turns, rest_places) = self.moving, self.rest
+        at = share * tip
+        return _Bone(node, places[node] + turns[node] @ at, rest_places[node] + rest_turns[node] @ at)
+
+    def tip(self, node: int, least: float) -> Array | None:
+        """Return where a node's bone ends, in the node; None where nothing is so far off.
+
+        That is at its farthest End Site, or else at the farthest node that hangs from it.
+        """
+        children = [child for child, parent in enumerate(self.parents) if parent == node]
+        turns, places = self.rest
+        ends = [child for child in children if not self.names[child]] or children
+        tips = [turns[node].T @ (places[end] - places[node]) for end in ends]
+        best = max(tips, key=lambda end: float(np.linalg.norm(end)), default=None)
+        return best if best is not None and float(np.linalg.norm(best)) > least else None
+
+    def length(self, side: str) -> float:
+        """Return how long a leg is."""
+        places = self.moving[1]
+        thigh, shin, foot = (places[self.joints.limbs[side, joint]] for joint in ("thigh", "shin", "foot"))
+        return float((np.linalg.norm(shin - thigh, axis=1) + np.linalg.norm(foot - shin, axis=1)).mean())
+
 
 @dataclass(frozen=True, eq=False)
 class Retargeted:
@@ -82,46 +113,16 @@ class _Bone:
     at: Array | None = None
     rest: Array | None = None
 
+    @classmethod
+    def between(cls, node: int, start: "_Bone", end: "_Bone", share: float) -> Self:
+        """Return the bone that a node carries, and that ends at a share of the way between the ends of two others.
 
-class _Places:
-    """Places that nodes carry, in the frames and at rest, and others between them."""
-
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
-
-    def of(self, node: int) -> _Bone:
-        """Return the bone that ends in a node: the one before it carries it."""
-        return _Bone(self.rig.parents[node], self.rig.moving[1][node], self.rig.rest[1][node])
-
-    def carried(self, node: int, tip: Array) -> _Bone:
-        """Return the bone that ends in a point (3,) of a node."""
-        turns, places = self.rig.moving
-        rest_turns, rest_places = self.rig.rest
-        return _Bone(node, places[node] + turns[node] @ tip, rest_places[node] + rest_turns[node] @ tip)
-
-    def between(self, node: int, start: _Bone, end: _Bone, share: float) -> _Bone:
-        """Return the bone that a node carries, and that ends at a share of the way between the ends of two others."""
-        assert start.at is not None
-        assert end.at is not None
-        assert start.rest is not None
-        assert end.rest is not None
-        ends = (start.at, end.at), (start.rest, end.rest)
-        return _Bone(node, *((1.0 - share) * first + share * last for first, last in ends))
-
-    def tip(self, node: int, least: float) -> Array | None:
-        """Return where a node's bone ends, in the node; None where nothing is so far off.
-
-        That is at its farthest End Site, or else at the farthest node that hangs from it.
+        Where these are unknown, so is its own.
         """
-        children = [child for child, parent in enumerate(self.rig.parents) if parent == node]
-        ends = [child for child in children if not self.rig.names[child]] or children
-        best = max(map(self._offset, ends), key=lambda end: float(np.linalg.norm(end)), default=None)
-        return best if best is not None and float(np.linalg.norm(best)) > least else None
-
-    def _offset(self, node: int) -> Array:
-        turns, places = self.rig.rest
-        parent = self.rig.parents[node]
-        return np.asarray(turns[parent].T @ (places[node] - places[parent]))
+        if start.at is None or start.rest is None or end.at is None or end.rest is None:
+            return cls(node)
+        ends = (start.at, end.at), (start.rest, end.rest)
+        return cls(node, *((1.0 - share) * first + share * last for first, last in ends))
 
 
 def retargeted(rig: Rig, up: Array) -> Retargeted:
@@ -132,7 +133,7 @@ def retargeted(rig: Rig, up: Array) -> Retargeted:
     average = average_skeleton()
     turns, places = up @ rig.moving[0], rig.moving[1] @ up.T
     rig = replace(rig, moving=(turns, places))
-    legs = [_length(rig, side) for side in ("left", "right")]
+    legs = [rig.length(side) for side in ("left", "right")]
     mine = average.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum()
     scale = float(np.mean(legs)) / float(mine)
     if not scale > 0.0:
@@ -235,78 +236,62 @@ def _beyond(joint: int, poses: Array, average: Skeleton) -> bool:
     return bool((np.abs(poses[:, angles][:, ~average.free[angles]]) > UNUSED).any())
 
 
-def _length(rig: Rig, side: str) -> float:
-    """Return how long a leg is."""
-    places = rig.moving[1]
-    thigh, shin, foot = (places[rig.joints.limbs[side, joint]] for joint in ("thigh", "shin", "foot"))
-    return float((np.linalg.norm(shin - thigh, axis=1) + np.linalg.norm(foot - shin, axis=1)).mean())
-
-
 def _bones(rig: Rig, scale: float) -> list[_Bone]:
     """Return for each of posefit's bones (26) the node that carries its end."""
-    joints, limbs, places = rig.joints, rig.joints.limbs, _Places(rig)
+    joints, limbs = rig.joints, rig.joints.limbs
     average = dict(zip(BONES, scale * average_skeleton().lengths, strict=True))
     bones: dict[str, _Bone] = {}
     if joints.neck:
-        chest = places.of(joints.neck[0])
+        chest = rig.of(joints.neck[0])
     else:  # the middle between the shoulders
         starts = ("clavicle" if (side, "clavicle") in limbs else "arm" for side in ("left", "right"))
-        shoulders = [places.of(limbs[side, start]) for side, start in zip(("left", "right"), starts, strict=True)]
-        chest = places.between(joints.chest, shoulders[0], shoulders[1], 0.5)
+        shoulders = [rig.of(limbs[side, start]) for side, start in zip(("left", "right"), starts, strict=True)]
+        chest = _Bone.between(joints.chest, shoulders[0], shoulders[1], 0.5)
     bones.update(_spine(rig, chest))
-    necks = [places.of(node) for node in (*joints.neck[1:], joints.head) if node is not None]
+    necks = [rig.of(node) for node in (*joints.neck[1:], joints.head) if node is not None]
     last = (joints.chest, *joints.neck)[-1] if joints.head is None else joints.head
-    tip = places.tip(last, 0.3 * (average["upperneck"] + average["head"])) if joints.neck or necks else None
-    crown = _Bone(last) if tip is None else places.carried(last, tip)
-    bones["head"] = crown
+    tip = rig.tip(last, 0.3 * (average["upperneck"] + average["head"])) if joints.neck or necks else None
+    bones["head"] = crown = rig.ending(last, tip)
     if len(necks) > 1:
         bones |= {"lowerneck": necks[0], "upperneck": necks[-1]}
     elif necks:  # the skull is two of posefit's bones, and turns as the head does
-        half = _Bone(last) if tip is None else places.between(last, necks[0], crown, 0.5)
-        bones |= {"lowerneck": necks[0], "upperneck": half}
+        bones |= {"lowerneck": necks[0], "upperneck": _Bone.between(last, necks[0], crown, 0.5)}
     else:
-        ends = [_Bone(last) if tip is None else places.between(last, chest, crown, share) for share in (1 / 3, 2 / 3)]
-        bones |= {"lowerneck": ends[0], "upperneck": ends[1]}
+        bones |= {"lowerneck": _Bone.between(last, chest, crown, 1 / 3)}
+        bones |= {"upperneck": _Bone.between(last, chest, crown, 2 / 3)}
     for side in ("left", "right"):
         letter = side[0]
         foot, hand = limbs[side, "foot"], limbs[side, "hand"]
-        bones |= {f"{letter}{bone}": places.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
+        bones |= {f"{letter}{bone}": rig.of(limbs[side, end]) for bone, end in _ENDS_OF.items()}
         foot_length, toe_length = average["lfoot"], average["ltoes"]
         toe = limbs.get((side, "toe"))
         if toe is not None:
-            tip = places.tip(toe, 0.2 * toe_length)
-            bones[f"{letter}foot"] = places.of(toe)
-            bones[f"{letter}toes"] = _Bone(toe) if tip is None else places.carried(toe, tip)
+            bones |= {f"{letter}foot": rig.of(toe), f"{letter}toes": rig.ending(toe, rig.tip(toe, 0.2 * toe_length))}
         else:
-            tip = places.tip(foot, 0.5 * foot_length)
-            share = foot_length / (foot_length + toe_length)
-            bones[f"{letter}foot"] = _Bone(foot) if tip is None else places.carried(foot, share * tip)
-            bones[f"{letter}toes"] = _Bone(foot) if tip is None else places.carried(foot, tip)
+            tip, share = rig.tip(foot, 0.5 * foot_length), foot_length / (foot_length + toe_length)
+            bones |= {f"{letter}foot": rig.ending(foot, tip, share), f"{letter}toes": rig.ending(foot, tip)}
         palm = limbs.get((side, "palm"))
         if palm is not None and hand == rig.parents[palm]:
-            tip = places.tip(palm, 0.0)
-            bones[f"{letter}wrist"] = places.of(palm)
-            bones[f"{letter}hand"] = _Bone(palm) if tip is None else places.carried(palm, tip)
+            bones |= {f"{letter}wrist": rig.of(palm), f"{letter}hand": rig.ending(palm, rig.tip(palm, 0.0))}
         else:
-            tip = places.tip(hand, 0.3 * average["lwrist"])
+            tip = rig.tip(hand, 0.3 * average["lwrist"])
             share = average["lwrist"] / (average["lwrist"] + average["lhand"])
-            bones[f"{letter}wrist"] = _Bone(hand) if tip is None else places.carried(hand, share * tip)
-            bones[f"{letter}hand"] = _Bone(hand) if tip is None else places.carried(hand, tip)
+            bones |= {f"{letter}wrist": rig.ending(hand, tip, share), f"{letter}hand": rig.ending(hand, tip)}
     return [bones[name] for name in BONES]
 
 
 def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
     """Return the three bones of the spine, whatever joints it has; of more of them, those of the steadiest lengths."""
-    joints, places, turns = rig.joints, _Places(rig), rig.moving[1]
-    root = _Bone(joints.hips, turns[joints.hips], rig.rest[1][joints.hips])
-    near = SAME_PLACE * _length(rig, "left")
-    chain = [places.of(node) for node in joints.spine]
+    joints = rig.joints
+    root = _Bone(joints.hips, rig.moving[1][joints.hips], rig.rest[1][joints.hips])
+    near = SAME_PLACE * rig.length("left")
+    chain = [rig.of(node) for node in joints.spine]
     if chain and root.rest is not None and np.linalg.norm(chain[0].rest - root.rest) <= near:  # type: ignore[operator]
         chain = chain[1:]
     if not chain:
-        chain = [places.between(chest.node, root, chest, share) for share in (1 / 3, 2 / 3)]
+        chain = [_Bone.between(chest.node, root, chest, share) for share in (1 / 3, 2 / 3)]
     elif len(chain) == 1:
-        chain.append(places.between(chest.node, chain[0], chest, 0.5))
+        chain.append(_Bone.between(chest.node, chain[0], chest, 0.5))
     elif len(chain) > 2:
 
         def unsteadiness(pair: Iterable[_Bone]) -> tuple[float, float]:

@@ -77,15 +77,15 @@ class OutputFolder(Recorder):
 
     def _same(self) -> Unfinished:
         """Return the folder of the track that goes on: the latest with the same arguments."""
-        left = Unfinished.interrupted(self.path)
-        if not left:
+        interrupted = Unfinished.interrupted(self.path)
+        if not interrupted:
             raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
         try:
-            others = [difference(folder.info, self._spec) for folder in left]
+            others = [difference(folder.info, self._spec) for folder in interrupted]
         except (AttributeError, TypeError):
-            raise InputError(f"{left[0].path / MARK}: expected the arguments of a track, got others") from None
-        place = left[others.index(None)] if None in others else None
-        for folder in left:
+            raise InputError(f"{interrupted[0].path / MARK}: expected the arguments of a track, got others") from None
+        place = interrupted[others.index(None)] if None in others else None
+        for folder in interrupted:
             if folder is not place:
                 folder.close()
         if place is None:
@@ -108,31 +108,32 @@ class OutputFolder(Recorder):
         if kind is None:
             try:
                 self._place.finish(_MINE, self._force)
-            except OSError as taken:
+            except OSError as failure:
                 self._place.close()
-                where = f"{taken.strerror}; the results are in {self.building}"
+                where = f"{failure.strerror}; the results are in {self.building}"
                 raise InputError(f"{self.path}: expected its name to be free, got {where}") from None
             (self.path / _RECORD).unlink(missing_ok=True)
             return
-        kept = ""
+        notice = ""
         if self._recorded:
             for name in FILES:
                 (self.building / name).unlink(missing_ok=True)
-            kept = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
+            notice = f"; {self._recorded} finished frames are kept: the same command with --resume goes on from there"
             self._place.close()
         else:
             self._place.remove(_MINE)
         if isinstance(error, OSError):
-            raise InputError(f"{self.path}: expected room to write to, got {error.strerror or error}{kept}") from error
-        if kept and isinstance(error, InputError):
-            raise InputError(f"{error}{kept}") from error
-        if kept:
-            self._say(kept[2:])
+            came = f"{error.strerror or error}{notice}"
+            raise InputError(f"{self.path}: expected room to write to, got {came}") from error
+        if notice and isinstance(error, InputError):
+            raise InputError(f"{error}{notice}") from error
+        if notice:
+            self._say(notice[2:])
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
         frames: list[Frame] = []
-        kept: list[bytes] = []
+        whole_lines: list[bytes] = []
         state: dict[str, Any] | None = None
         path = self.building / _RECORD
         recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
@@ -147,9 +148,9 @@ class OutputFolder(Recorder):
                     )
                 break
             frames.append(frame)
-            kept.append(line)
+            whole_lines.append(line)
         if frames:
-            path.write_bytes(b"".join(kept))
+            path.write_bytes(b"".join(whole_lines))
         self._recorded = len(frames)
         return frames, state
 

@@ -64,9 +64,9 @@ def table(summary: Mapping[str, Any]) -> str:
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
     if tracks := summary["hypotheses"]:
-        kept = next(k for k, track in enumerate(tracks) if track["kept"])
+        best = next(k for k, track in enumerate(tracks) if track["kept"])
         costs = [f"{track['guess']} {track['cost'] + track['motion']:.2f}" for track in tracks]
-        chosen = f"kept track {kept + 1} of {len(tracks)}"
+        chosen = f"kept track {best + 1} of {len(tracks)}"
         lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
     speed = MEASURES["evaluations_per_second"].number(summary["evaluations_per_second"])
     lines.append(f"{_effort(summary)}, {speed} poses a second")

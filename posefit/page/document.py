@@ -75,5 +75,5 @@ def _five_digits(values: Array) -> Any:
 
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:
     """Return named colours as variables of a page's style, for light and for dark screens."""
-    bright, dim = ("".join(f" --{name}: {colour};" for name, colour in one.items()) for one in (light, dark))
+    bright, dim = ("".join(f" --{name}: {colour};" for name, colour in scheme.items()) for scheme in (light, dark))
     return f":root {{{bright} }}\n@media (prefers-color-scheme: dark) {{ :root {{{dim} }} }}\n"

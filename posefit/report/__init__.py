@@ -12,7 +12,8 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | looking for | file |
 |---|---|
 | what the command does, in order, and what it refuses | write.py |
-| the rows of a ledger as one table | runs.py |
+| a table of runs, those that methods share, and what both kinds of runs have in common | kind.py |
+| the rows of a ledger as that table | runs.py |
 | what differs between tracks and single searches | tracks.py, searches.py |
 | figures and the score: digits, averages, texts | columns.py |
 | the methods compared on the runs that they share; the leaderboard | contest.py |

@@ -8,7 +8,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.page.bodies import camera_from_origin, in_16_bits
-from posefit.report.runs import Runs
+from posefit.report.kind import Runs
 from posefit.sweep.cell import TrackCell, cell_scene, digest_of
 from posefit.sweep.ledger import Ledger
 from posefit.uncertainty.modes import nearer_mirrored

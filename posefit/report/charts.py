@@ -2,23 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import mean
+from posefit.report.kind import Contest
 from posefit.report.tracks import LEVEL_NAMES
 from posefit.statistics.intervals import Intervals, iqm_intervals
-from posefit.statistics.profiles import Trace, attained, hits, performance_profile, targets
+from posefit.statistics.profiles import Trace, performance_profile
 from posefit.uncertainty.calibration import LEVELS
-
-Contest: TypeAlias = Any  # whose module imports this one
 
 POINTS = 41  # of a curve
 PROFILE = 200  # points of a performance profile
-CURVES, CERTAINTY = "curves", "certainty"  # sections of the page
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +27,6 @@ class Line:
     y: Array
     low: Array | None = None
     high: Array | None = None
-    dots: Sequence[str] = ()  # what each point is, where points are dots
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,11 +38,9 @@ class Chart:
     x_label: str
     y_label: str
     lines: Sequence[Line | None]
-    section: str = CURVES
     log: bool = False  # the scale of x
     stepped: bool = False
     most: float | None = None  # the end of y
-    guides: Sequence[tuple[float, float, float, float]] = ()  # dashed lines from one point to another
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the page draws."""
@@ -55,20 +50,14 @@ class Chart:
 def track_charts(contest: Contest, drawn: Contest) -> list[Chart]:
     """Return the charts of tracks; curves over evaluations use the runs of `drawn`, which are fewer."""
     evaluations, charts = grid(drawn), []
-    over = {"x_label": "evaluations of a frame", "log": True}
     if len(evaluations):
-        title, lines = "Convergence: best cost of a frame", convergence(drawn, evaluations)
-        charts.append(Chart(name="convergence", title=title, y_label="best cost", lines=lines, **over))  # type: ignore[arg-type]
-        shares = [Line(evaluations, share) for share in reached(drawn, evaluations)]
-        title, y = "Targets reached, of all runs and 51 costs an instance", "share of targets reached"
-        charts.append(Chart(name="attainment", title=title, y_label=y, lines=shares, most=1.0, stepped=True, **over))  # type: ignore[arg-type]
+        title, x, lines = "Convergence: best cost of a frame", "evaluations of a frame", convergence(drawn, evaluations)
+        charts.append(Chart(name="convergence", title=title, x_label=x, y_label="best cost", lines=lines, log=True))
     errors = contest.of("error")
     levels = np.linspace(0.0, float(errors.max()), PROFILE)
     profiles = [Line(levels, share) for share in performance_profile(errors, levels)]
-    about = {"title": "Runs within an error", "x_label": "error, degrees", "y_label": "share of runs"}
-    charts.append(Chart(name="profile", lines=profiles, most=1.0, stepped=True, **about))  # type: ignore[arg-type]
-    if sure := certainty(contest):
-        charts += [_reliability_chart(sure["methods"]), _coverage_chart(sure["methods"])]
+    title, x, y = "Runs within an error", "error, degrees", "share of runs"
+    charts.append(Chart(name="profile", title=title, x_label=x, y_label=y, lines=profiles, most=1.0, stepped=True))
     return [chart for chart in charts if any(chart.lines)]
 
 
@@ -102,22 +91,6 @@ def convergence(contest: Contest, evaluations: Array) -> list[Line | None]:
     return [line(rows) for rows in contest.rows]
 
 
-def reached(contest: Contest, evaluations: Array) -> Array:
-    """Return the shares (methods, p) of a method's runs and targets reached after each number of evaluations.
-
-    The targets of an instance lie between the worst first and the best last cost of any run there.
-    """
-    methods, instances, seeds = contest.rows.shape
-    shares = np.zeros((methods, len(evaluations)))
-    for i in range(instances):
-        traces = _traces(contest, contest.rows[:, i])
-        if usable := [trace for trace in traces if len(trace[0])]:
-            costs = targets(usable)
-            times = np.reshape([hits(trace, costs) for trace in traces], (methods, seeds, -1))
-            shares += np.array([attained(times_of_method, evaluations) for times_of_method in times]) / instances
-    return shares
-
-
 def joint_errors(contest: Contest) -> list[Intervals]:
     """Return each method's interquartile mean of every joint's error (27,) in mm, with its interval."""
     count = contest.resamples(contest.rows.size * len(JOINTS))
@@ -130,9 +103,8 @@ def certainty(contest: Contest) -> dict[str, Any] | None:
     """Return the methods' uncertainty compared with the truth; None if no run has any.
 
     `levels` are those of intervals. `methods` has an entry for each method that takes part, None if its runs have no
-    uncertainty: at each level the `coverage` and the `width` in mm, plain means over its runs; and the `reliability` of
-    its likeliest modes, [frames, mean probability, share that is right] for each bin that has frames, with their
-    expected calibration error `ece`, None if no run has modes.
+    uncertainty: at each level the `coverage` and the `width` in mm, plain means over its runs; and the expected
+    calibration error `ece` of its likeliest modes, by bins of their probability, None if no run has modes.
     """
     methods = [_certainty_of(contest, rows.ravel()) for rows in contest.rows]
     return {"levels": list(LEVELS), "methods": methods} if any(methods) else None
@@ -151,44 +123,8 @@ def _certainty_of(contest: Contest, rows: Array) -> dict[str, Any] | None:
     return {
         "coverage": coverage,
         "width": width,
-        "reliability": [[int(count), *sums] for count, *sums in np.c_[frames, bins[:, 1:] / frames[:, None]].tolist()],
         "ece": float(np.abs(probability - right).sum() / frames.sum()) if len(bins) else None,
     }
-
-
-def _reliability_chart(methods: Sequence[dict[str, Any] | None]) -> Chart:
-    lines: list[Line | None] = []
-    for method in methods:
-        count, probability, right = np.array(method["reliability"] if method else []).reshape(-1, 3).T
-        bins = zip(count, probability, right, strict=True)
-        dots = [f"{p:.0%} predicted, {r:.0%} right, of {n:,.0f} frames" for n, p, r in bins]
-        lines.append(Line(probability, right, dots=dots) if dots else None)
-    return Chart(
-        name="reliability",
-        title="Reliability: how often the likeliest mode is right",
-        x_label="probability of the likeliest mode",
-        y_label="share of frames where it is right",
-        section=CERTAINTY,
-        most=1.0,
-        guides=[(0.0, 0.0, 1.0, 1.0)],
-        lines=lines,
-    )
-
-
-def _coverage_chart(methods: Sequence[dict[str, Any] | None]) -> Chart:
-    known = [method if method and None not in method["coverage"] else None for method in methods]
-    end = max((method["width"][-1] for method in known if method), default=1.0)
-    dots = [f"{level:.0%} nominal" for level in LEVELS]
-    return Chart(
-        name="coverage",
-        title="Coverage: share of joints within their intervals, and how wide these are",
-        x_label="radius of intervals, mm",
-        y_label="share of joints within",
-        section=CERTAINTY,
-        most=1.0,
-        guides=[(0.0, level, end, level) for level in LEVELS],
-        lines=[Line(np.array(m["width"]), np.array(m["coverage"]), dots=dots) if m else None for m in known],
-    )
 
 
 def _traces(contest: Contest, rows: Array) -> list[Trace]:

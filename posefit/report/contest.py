@@ -2,77 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
-from functools import cached_property
-from typing import Any, Self
+from dataclasses import astuple
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from posefit.arrays import Array
-from posefit.report.runs import Runs
-from posefit.statistics.improvement import improvement_interval, probability_of_improvement
-from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
-from posefit.statistics.pairing import Shared, most_shared
-from posefit.statistics.ranks import LEVEL, Comparison, compact_letters, wilcoxon
-
-BOOTSTRAP_SEED = 2013
-WORK = 1e8  # numbers that the resamples of one study may come to
-MIN_SEEDS = 3  # for the interval of a probability of improvement
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Contest(Shared):
-    """The runs that some methods share, paired by instance and seed: `rows` and `blocks` are indices of `runs`."""
-
-    runs: Runs
-
-    def of(self, figure: str) -> Array:
-        """Return a figure of all runs (methods, instances, seeds)."""
-        return np.asarray(self.runs.figures[figure][self.rows])
-
-    def rows_of(self, method: int) -> NDArray[np.int64]:
-        """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
-        if method in self.methods:
-            return np.asarray(self.rows[self.methods.index(method)].ravel())
-        return np.flatnonzero(self.runs.method == method).astype(np.int64)
-
-    def places(self) -> list[dict[str, Any]]:
-        """Return the fields of a plan that make each instance."""
-        return [self.runs.places[i] for i in self.instances]
-
-    def tested_errors(self) -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare."""
-        return self.runs.kind.tested_errors(self)
-
-    @property
-    def testable(self) -> bool:
-        """Whether there are methods and blocks enough for a paired test."""
-        return bool(min(self.tested_errors().shape[:2]) > 1)
-
-    @cached_property
-    def comparisons(self) -> list[Comparison]:
-        """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
-        return wilcoxon(self.tested_errors()) if self.testable else []
-
-    def rng(self) -> np.random.Generator:
-        """Return what resamples are drawn by."""
-        return np.random.default_rng(BOOTSTRAP_SEED)
-
-    def resamples(self, numbers: int) -> int:
-        """Return how many bootstrap resamples so many numbers may have."""
-        return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
-
-    def fewer(self, points: int) -> Self:
-        """Return the contest on so few seeds and instances that intervals at so many points are little work.
-
-        These are the first seeds, and every second, third, ... instance.
-        """
-        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
-        _, instances, seeds = self.rows.shape
-        seeds = min(seeds, max(2, most // instances))
-        step = -(-instances * seeds // most)
-        return replace(self, instances=self.instances[::step], rows=self.rows[:, ::step, :seeds])
+from posefit.report.kind import Contest, Runs
+from posefit.statistics.pairing import most_shared
+from posefit.statistics.ranks import LEVEL, compact_letters
 
 
 def contest_of(runs: Runs) -> Contest | None:
@@ -139,21 +74,10 @@ def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
 def paired_tests(contest: Contest) -> dict[str, Any] | None:
     """Return the paired tests of a contest; None where there are not two methods and two blocks.
 
-    `pairs` lists first, second, median difference of errors and its interval, p, p after Holm, and the probability that
-    the first is better than the second with its interval, nan where that is not cheap: a difference below 0 is in
-    favour of the first. Tests use all `blocks`, the probabilities equally many seeds of every instance.
+    `pairs` lists first, second, median difference of errors and its interval, p, and p after Holm: a difference below 0
+    is in favour of the first.
     """
     if not contest.testable:
         return None
-    errors, rng = contest.of("error"), contest.rng()
-    pairs = [list(astuple(comparison)) for comparison in contest.comparisons]
-    better = probability_of_improvement(errors)
-    count = int(min(WORK / (errors[0].size * errors.shape[2] * len(pairs)), RESAMPLES))
-    bounded = errors.shape[2] >= MIN_SEEDS and count >= MIN_RESAMPLES
-    for pair in pairs:
-        first, second = pair[:2]
-        ends: Sequence[float] = (np.nan, np.nan)
-        if bounded:
-            ends = improvement_interval(errors[first], errors[second], rng, resamples=count)[1:]
-        pair += [better[first, second], *ends]
+    pairs = [astuple(comparison) for comparison in contest.comparisons]
     return {"methods": contest.methods, "blocks": contest.tested_errors()[0].size, "pairs": pairs}

@@ -1,37 +1,29 @@
-"""Runs for other tools: IOHprofiler's and COCO's folders, rows as CSV, and tables as LaTeX that needs no package.
+"""Runs for other tools: IOHprofiler's folders, rows as CSV, and tables as LaTeX that needs no package.
 
 IOHprofiler: Doerr et al., IOHprofiler, 2018; the layout is that of IOHexperimenter's Analyzer logger. Readers: the
-library iohinspector, the web page IOHanalyzer. COCO: Hansen et al., 2021; reader: the library cocopp.
+library iohinspector, the web page IOHanalyzer.
 """
 
 import csv
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from posefit.errors import InputError
 from posefit.files import new_file, new_folder
-from posefit.geometry.skeleton import ANGLES
-from posefit.report.tracks import damage, views
 from posefit.statistics.profiles import Trace
 from posefit.suites.functions import suite_function
-from posefit.suites.running import SuiteRun, budgets_differ, method_name
+from posefit.suites.running import SuiteRun, budgets_differ
 from posefit.version import __version__
-
-if TYPE_CHECKING:
-    from posefit.sweep.ledger import Ledger
 
 FORMAT = "0.3.18"  # the IOHexperimenter that the layout is of
 SUITE = "posefit"
-MAX_NUMBER = 2**16 - 1  # of an instance or a dimension, as iohinspector holds it
 _HEADER = "evaluations raw_y"
 _SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -46,91 +38,53 @@ _SPECIAL = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class LoggedRun:
-    """One run of a method on an instance of a problem."""
-
-    method: str
-    settings: Mapping[str, Any]
-    problem: str
-    dimension: int
-    instance: int
-    seed: int
-    evaluations: ArrayLike = field(repr=False)  # (k,), rising
-    costs: ArrayLike = field(repr=False)  # (k,), the best so far
-
-
-def logged_runs(ledger: "Ledger") -> Iterator[LoggedRun]:
-    """Yield the runs of a ledger of tracks that have a trace."""
-    for row in ledger.rows():
-        spec, trace = row["spec"], row["trace"]
-        if not trace["evaluations"]:
-            continue
-        footage = spec["motion"], "view", *views(spec), *damage(spec)
-        conditions = *footage, "frames", spec["frames"], spec["translation"]
-        more = {name: spec[name] for name in ("evaluations", "hypotheses", "version")}
-        yield LoggedRun(
-            spec["method"],
-            {**spec["settings"], **more},
-            " ".join(map(str, conditions)),
-            row.get("dimensions") or ANGLES,  # a tracker without a search space has the pose's dimension
-            spec["instance"],
-            spec["seed"],
-            trace["evaluations"],
-            trace["cost"],
-        )
-
-
-def suite_runs(runs: Sequence[SuiteRun]) -> Iterator[LoggedRun]:
-    """Yield runs on a suite, whose settings include their way with infeasible proposals.
-
-    Where a dimension has several budgets, they include that, too. Both have names of several words, which no
-    optimiser's setting has.
-    """
-    several = budgets_differ(runs)
-    for run in runs:
-        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
-        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
-        name = f"f{run.function} {suite_function(run.function).name}"
-        yield LoggedRun(run.method, settings, name, run.dimension, run.instance, run.seed, run.evaluations, run.costs)
-
-
-def write_iohprofiler(runs: Iterable[LoggedRun], path: str | Path) -> None:
-    """Write a new folder `path` with a folder a method and, in it, a .json and a data folder a problem.
+def write_iohprofiler(runs: Sequence[SuiteRun], path: str | Path) -> None:
+    """Write a new folder `path` with a folder a method and, in it, a .json and a data folder a function.
 
     A method with other settings is another algorithm: its settings are in its `info`, and numbered in its name if there
-    are several. Problems are numbered in the order of their names. A row is written wherever the cost falls, and at a
-    run's end. Readers separate runs by evaluation 1: a trace that starts later, such as after a whole population, has
-    `inf` in that row. Raises ValueError where a run is invalid or comes twice, and where the folder exists or cannot be
-    written.
+    are several. They include the way with infeasible proposals and, where a dimension has several, the budget. A row is
+    written wherever the cost falls, and at a run's end. Readers separate runs by evaluation 1: a trace that starts
+    later, such as after a whole population, has `inf` in that row. Raises ValueError where a run comes twice, and where
+    the folder exists or cannot be written.
     """
-    algorithms = _grouped(runs)
+    algorithms: dict[tuple[str, str], dict[Any, SuiteRun]] = {}
+    several = budgets_differ(runs)
+    for run in runs:
+        # names of several words, which no optimiser's setting has
+        budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
+        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
+        of_one = algorithms.setdefault((run.method, json.dumps(settings, sort_keys=True, default=str)), {})
+        place = run.function, run.dimension, run.instance, run.seed
+        if place in of_one:
+            raise InputError(f"runs must differ, got two of {run.method} on {run.suite}, {place}: f, d, instance, seed")
+        of_one[place] = run
+    algorithms = dict(sorted(algorithms.items()))
     methods = [method for method, _ in algorithms]
     numbers = [methods[: k + 1].count(method) for k, method in enumerate(methods)]
     names = [
         f"{method} #{number}" if methods.count(method) > 1 else method
         for method, number in zip(methods, numbers, strict=True)
     ]
-    problems = sorted({run.problem for runs in algorithms.values() for run in runs})
     with new_folder(path) as folder:
-        for (_, info), name, place, own in zip(algorithms, names, _file_names(names), algorithms.values(), strict=True):
-            for number, (problem, file_name) in enumerate(zip(problems, _file_names(problems), strict=True), 1):
-                if here := [run for run in own if run.problem == problem]:
-                    _write_problem(folder / place, f"f{number}_{file_name}", number, {"name": name, "info": info}, here)
+        for (_, info), name, file_name, own in zip(
+            algorithms, names, _file_names(names), algorithms.values(), strict=True
+        ):
+            for _, here in groupby([own[key] for key in sorted(own)], key=lambda run: run.function):
+                _write_function(folder / file_name, {"name": name, "info": info}, list(here))
 
 
-def _write_problem(folder: Path, name: str, number: int, algorithm: Mapping[str, str], runs: list[LoggedRun]) -> None:
+def _write_function(folder: Path, algorithm: Mapping[str, str], runs: list[SuiteRun]) -> None:
+    """Write the runs on one function, which are sorted."""
+    function = suite_function(runs[0].function)
+    name = f"f{function.number}_{function.name.replace(' ', '-')}"
     data = folder / f"data_{name}"
     data.mkdir(parents=True)
     scenarios = []
-    for dimension in sorted({run.dimension for run in runs}):
-        path = data / f"IOHprofiler_f{number}_DIM{dimension}.dat"
-        entries = []
+    for dimension, here in groupby(runs, key=lambda run: run.dimension):
+        path, entries = data / f"IOHprofiler_f{function.number}_DIM{dimension}.dat", []
         with path.open("w", encoding="ascii", newline="\n") as file:
-            for run in sorted(runs, key=lambda run: (run.instance, run.seed)):
-                if run.dimension != dimension:
-                    continue
-                used, best = _rows((np.asarray(run.evaluations, float), np.asarray(run.costs, float)))
+            for run in here:
+                used, best = _rows((run.evaluations, run.costs))
                 file.write(_HEADER + "\n")
                 file.writelines(f"{e} {y!r}\n" for e, y in zip(used, best, strict=True))
                 least = {"evals": used[best.index(best[-1])], "y": best[-1], "x": []}
@@ -139,8 +93,8 @@ def _write_problem(folder: Path, name: str, number: int, algorithm: Mapping[str,
     summary = {
         "version": FORMAT,
         "suite": SUITE,
-        "function_id": number,
-        "function_name": runs[0].problem,
+        "function_id": function.number,
+        "function_name": function.name,
         "maximization": False,
         "algorithm": algorithm,
         # iohinspector evaluates what stands here as Python: nothing that a user or a plugin wrote
@@ -152,36 +106,6 @@ def _write_problem(folder: Path, name: str, number: int, algorithm: Mapping[str,
     (folder / f"IOHprofiler_{name}.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
 
-def write_coco(runs: Iterable[SuiteRun], path: str | Path) -> None:
-    """Write a new folder `path` with a folder a method, as COCO's logger of bbob has them; its reader is cocopp.
-
-    Costs are above the true pose's, and at least 0. A run's way with infeasible proposals and its budget are not
-    distinguished. Raises ValueError where the folder exists or cannot be written.
-    """
-    groups: dict[str, list[SuiteRun]] = {}
-    for run in sorted(runs, key=lambda run: (run.function, run.dimension, run.instance, run.seed)):
-        groups.setdefault(method_name(run), []).append(run)
-    with new_folder(path) as folder:
-        for (name, own), place in zip(groups.items(), _file_names(list(groups)), strict=True):
-            for (number, dimension), here in groupby(own, key=lambda run: (run.function, run.dimension)):
-                data = folder / place / f"data_f{number}"
-                data.mkdir(parents=True, exist_ok=True)
-                stem, text, ends = data / f"bbobexp_f{number}_DIM{dimension}", "", ""
-                for run in here:
-                    text += f"% f evaluations | g evaluations | best cost above the true pose's, {run.truth_cost!r}\n"
-                    used, best = _rows((run.evaluations, run.costs - run.truth_cost))
-                    text += "".join(f"{e} 0 {max(y, 0.0):+.9e}\n" for e, y in zip(used, best, strict=True))
-                    ends += f", {run.instance}:{used[-1]}|{max(best[-1], 0.0):.1e}"
-                for ending in (".dat", ".tdat"):  # by costs and by evaluations: here the same rows
-                    stem.with_suffix(ending).write_text(text, encoding="ascii")
-                with (folder / place / f"bbobexp_f{number}.info").open("a", encoding="utf-8") as info:
-                    info.write(
-                        f"suite = 'bbob', funcId = {number}, DIM = {dimension}, Precision = 1.000e-08, "
-                        f"algId = '{name}', coco_version = '2.8', logger = 'bbob', data_format = 'bbob-new2'\n"
-                        f"% {run.suite}\ndata_f{number}/{stem.name}.dat{ends}\n"
-                    )
-
-
 def _rows(run: Trace) -> tuple[list[int], list[float]]:
     """Return evaluations and costs from evaluation 1 on, wherever the cost falls, and at the end."""
     used, best = run
@@ -190,26 +114,6 @@ def _rows(run: Trace) -> tuple[list[int], list[float]]:
     written = np.append(True, np.diff(best) < 0.0)
     written[-1] = True
     return used[written].astype(int).tolist(), best[written].tolist()
-
-
-def _grouped(runs: Iterable[LoggedRun]) -> dict[tuple[str, str], list[LoggedRun]]:
-    """Return the checked runs of each (method, settings as JSON), in the order of both."""
-    groups: dict[tuple[str, str], list[LoggedRun]] = {}
-    identities = set()
-    for run in runs:
-        name = f"{run.method} on {run.problem}, instance {run.instance}, seed {run.seed}"
-        for kind, value, least in (("dimension", run.dimension, 1), ("instance", run.instance, 0)):
-            if not least <= value <= MAX_NUMBER:
-                raise InputError(f"{name}: {kind} must lie in {least} to {MAX_NUMBER}, got {value}")
-        key = run.method, json.dumps(dict(run.settings), sort_keys=True, default=str)
-        identity = (*key, run.problem, run.dimension, run.instance, run.seed)
-        if identity in identities:
-            raise InputError(f"runs must differ in method, settings, problem, instance or seed, got two of {name}")
-        identities.add(identity)
-        groups.setdefault(key, []).append(run)
-    if not groups:
-        raise InputError("runs must be at least one, got none")
-    return dict(sorted(groups.items()))
 
 
 def _file_names(names: list[str]) -> list[str]:

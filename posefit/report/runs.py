@@ -5,7 +5,6 @@ import marshal
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.errors import InputError, printable
+from posefit.report.kind import Kind, Runs
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
 from posefit.report.searches import Searches
 from posefit.report.tracks import Tracks
@@ -22,55 +22,9 @@ from posefit.sweep.cell import cell_from
 if TYPE_CHECKING:
     from posefit.sweep.ledger import Ledger
 
-Kind = Tracks | Searches  # whose methods and fields have the same names
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (Tracks(), Searches())}
 # what a method chooses; all else but the seed makes an instance
 _METHOD_FIELDS = ("method", "name", "settings", "evaluations", "hypotheses", "infeasible", "version")
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Runs:
-    """All rows of a ledger, sorted by instance, method and seed. Names are distinct, and printable on one line.
-
-    Methods differ in name, settings, budget and version, and in what else a method chooses; instances differ in all
-    other fields but the seed.
-    """
-
-    kind: Kind
-    version: str
-    methods: tuple[str, ...]  # the lowest mean error first
-    variants: tuple[dict[str, Any], ...]  # the fields that make each method
-    instances: tuple[str, ...]
-    places: tuple[dict[str, Any], ...]  # the fields that make each instance
-    method: Array  # (n,) index of each row, as the next two
-    instance: Array  # (n,)
-    seed: Array  # (n,)
-    seeds: tuple[int, ...]  # rising
-    keys: tuple[str, ...]
-    figures: dict[str, Array]  # name -> (n,), nan where a row has none; a lower `error` is better
-    data: dict[str, Any]  # what else each row has, by the names of `kind.data`: an array, or a tuple
-    warnings: Mapping[int, tuple[str, ...]]  # row -> its warnings, if any
-    failures: tuple[dict[str, Any], ...]  # quarantined cells: name, method, reasons, command
-    failed: tuple[int, ...]  # quarantined cells of each method
-    unfinished: tuple[str, ...]  # names of methods whose every cell is in quarantine
-    heads: tuple[str, ...]  # the beginnings of the commands that run rows again
-    head: Array  # (n,)
-
-    def __len__(self) -> int:
-        return len(self.keys)
-
-    @property
-    def table_figures(self) -> list[str]:
-        """The figures that tables show: optional ones only if a row has them."""
-        return [
-            name
-            for name, column in self.kind.columns.items()
-            if column.in_tables and not (column.optional and np.isnan(self.figures[name]).all())
-        ]
-
-    def values(self, field: str) -> list[Any]:
-        """Return the values of a field of methods or instances, rising."""
-        return sorted({fields[field] for fields in (*self.variants, *self.places) if field in fields})
 
 
 class _Row(NamedTuple):

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
+from posefit.report.kind import Contest, Kind, Place, Runs
 from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function
@@ -18,14 +19,9 @@ from posefit.suites.problem import TARGETS
 from posefit.suites.running import ALL, SHOWN, suite_scores
 from posefit.sweep.table import search_run
 
-# a Contest and its Runs, whose modules import this one
-Contest: TypeAlias = Any
-Runs: TypeAlias = Any
-
 RANDOM = "random"  # the method that is the baseline
 POINTS = 61  # of a curve
 
-Place = Mapping[str, Any]
 _COLUMNS = (
     Column("reached", Measure("reached", "targets", "%", 1, "Share of all runs and targets that were reached"),
            higher_is_better=True, average=mean),
@@ -34,16 +30,16 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-class Searches:
-    """The kind of runs that are single searches; see `posefit.report.runs.Kind`."""
+class Searches(Kind):
+    """The kind of runs that are single searches."""
 
     name = "search"
     noun = "searches"
     title = "Report of single searches"
-    columns: Mapping[str, Column] = {column.name: column for column in _COLUMNS}
+    columns: ClassVar = {column.name: column for column in _COLUMNS}
     named = ("function", "dimension", "instance")
     data = ("runs", "hits")  # `SuiteRun`; evaluations (targets,), inf for never
-    baselines: Mapping[str, str] = {RANDOM: "random search"}
+    baselines: ClassVar = {RANDOM: "random search"}
     score = Score(
         name="reached",
         axis="share of targets reached",

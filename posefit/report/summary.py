@@ -8,7 +8,7 @@ import numpy as np
 from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed
-from posefit.report.contest import Contest
+from posefit.report.kind import Contest
 from posefit.statistics.ranks import LEVEL
 
 Row = Mapping[str, Any]
@@ -17,8 +17,8 @@ Row = Mapping[str, Any]
 def leader_sentences(contest: Contest, board: Sequence[Row], baselines: Sequence[Row]) -> list[str]:
     """Return the sentences of a report, given the leaderboard and the baselines' rows.
 
-    The first says what leads and by how much, the next ones how certain that is: Wilcoxon's signed ranks over paired
-    runs show a difference if p is below 0.05 after Holm.
+    The first says what leads, the next ones by how much and how certain that is: the median of paired differences, and
+    p of Wilcoxon's signed ranks after Holm, which below 0.05 shows a difference.
     """
     first, *others = (row for row in board if row["taking_part"])
     kind = contest.runs.kind
@@ -26,9 +26,6 @@ def leader_sentences(contest: Contest, board: Sequence[Row], baselines: Sequence
     value = score.sentence.format(score.text(first[score.name]))
     if first["low"] is not None and np.isfinite(first["low"]):
         value += f" (95 % interval {score.text(first['low'])} to {score.text(first['high'])})"
-    if others:
-        lead = abs(round(others[0][score.name], score.digits) - round(first[score.name], score.digits))
-        value += f", {lead:.{score.digits}f}{score.points} ahead of {others[0]['name']},"
     where = f"{kind.place_words(contest)} with {'one seed' if seeds == 1 else f'{seeds} seeds each'}"
     sentences = [
         f"{first['name']} {'leads with' if others else 'has'} {value} on {where}.",
@@ -51,7 +48,7 @@ def _certainty(contest: Contest, others: Sequence[Row]) -> list[str]:
         """Return by how much a method is behind, and the p."""
         p = "p < 0.001" if row["p"] < 0.001 else f"p = {row['p']:.2g}"
         behind = f"{row['behind']:+z.{score.digits}f}".replace("-", "−")
-        return f"{row['name']} ({behind}{score.points}, {p})"
+        return f"{row['name']} (median difference {behind}{score.points}, {p})"
 
     # the least p, after Holm, that so few blocks can give the first of so many pairs: m 2 / 2^n
     least_p = min(1.0, float(count * 2.0 ** (1 - blocks)))

@@ -5,7 +5,7 @@ Label, unit, digits and meaning of figures come from `posefit.evaluation.measure
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,19 +14,14 @@ from posefit.evaluation.measures import BASELINES, MEASURES, Measure
 from posefit.fitting.metrics import skill
 from posefit.reading import counted
 from posefit.report.columns import NAMED, Column, Score, interquartile_mean, listed, mean
+from posefit.report.kind import Contest, Kind, Place, Runs
 from posefit.statistics.intervals import iqm_intervals
 from posefit.uncertainty.calibration import BINS, LEVELS
-
-# a Contest and its Runs, whose modules import this one
-Contest: TypeAlias = Any
-Runs: TypeAlias = Any
 
 LEVEL_NAMES = tuple(f"{100 * level:.0f}" for level in LEVELS)  # of intervals, as rows have them
 TABLE_LEVEL = "80"  # the interval that tables show
 MAX_SEEDS = 50  # that the facts list
 NO_MODES: Array = np.zeros((BINS, 3), dtype=np.float32)
-
-Place = Mapping[str, Any]  # the fields of a plan that make an instance
 
 
 def _share(name: str) -> Measure:
@@ -80,16 +75,16 @@ COLUMNS = (
 )
 
 
-class Tracks:
-    """The kind of runs that are tracks; see `posefit.report.runs.Kind`."""
+class Tracks(Kind):
+    """The kind of runs that are tracks."""
 
     name = "track"
     noun = "tracks"
     title = "Report of a sweep"
-    columns: Mapping[str, Column] = {column.name: column for column in COLUMNS}
+    columns: ClassVar = {column.name: column for column in COLUMNS}
     named = ("motion", "view_degrees", "corruption", "instance")
     data = ("joint_errors", "modes", "traces")  # (27,) mm; (bins, 3), see `_binned`; evaluations and best costs
-    baselines: Mapping[str, str] = BASELINES
+    baselines = BASELINES
     score = Score(
         name="error",
         axis="error in degrees",

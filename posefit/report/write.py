@@ -10,7 +10,7 @@ from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.content import data_of
-from posefit.report.export import logged_runs, write_csv, write_iohprofiler
+from posefit.report.export import write_csv
 from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
@@ -26,7 +26,6 @@ def write_report(
     out: str | None,
     *,
     figures: str | None = None,
-    iohprofiler: str | None = None,
     csv: str | None = None,
     warn: Callable[[str], None],
 ) -> dict[str, Any]:
@@ -34,22 +33,20 @@ def write_report(
 
     That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
     `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
-    figures (PNG, PDF) and tables (LaTeX, CSV), `iohprofiler` one for IOHprofiler's files, `csv` a new file of all rows.
+    figures (PNG, PDF) and tables (LaTeX, CSV), `csv` a new file of all rows.
     Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
     need matplotlib: before anything is written, if possible.
     """
     paths = [path] if isinstance(path, str | Path) else path
-    _check_places(Path(paths[0]), out, [figures, iohprofiler, csv])
+    _check_places(Path(paths[0]), out, [figures, csv])
     if figures is not None:
         from posefit.report.figures import library, write_figures
 
         library("figure")
     ledger = Ledger(*paths)
     runs = runs_of(ledger)
-    if runs.kind.name == "search" and (figures is not None or iohprofiler is not None):
-        name = "iohprofiler" if figures is None else "figures"
-        table = f": posefit suite table {ledger.path} --iohprofiler" if name == "iohprofiler" else ""
-        raise InputError(f"--{name} must be given with a sweep of tracks, got one of single searches{table}")
+    if runs.kind.name == "search" and figures is not None:
+        raise InputError("--figures must be given with a sweep of tracks, got one of single searches")
     data = data_of(ledger, runs, warn)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
@@ -58,8 +55,6 @@ def write_report(
                 file.writelines(page[start : start + WRITTEN] for start in range(0, len(page), WRITTEN))
     if figures is not None:
         write_figures(runs, figures)
-    if iohprofiler is not None:
-        write_iohprofiler(logged_runs(ledger), iohprofiler)
     if csv is not None:
         write_csv(map(flat, ledger.all_rows()), csv)
     return {

@@ -3,8 +3,6 @@
 An anytime trace is evaluations (k,), rising, and the best cost so far (k,) at each, never rising.
 """
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,24 +11,7 @@ from posefit.errors import InputError
 from posefit.statistics.intervals import LEVEL, RESAMPLES
 from posefit.statistics.pairing import finite
 
-TARGETS = 51
-LEAST_TARGET = 0.01  # a cost; what is below is a pixel or none
-
 Trace = tuple[Array, Array]
-
-
-def targets(traces: Iterable[Trace], count: int = TARGETS) -> Array:
-    """Return costs (count,) to be reached, falling evenly on a log scale; traces are of one instance.
-
-    They go from the highest first cost to the lowest last one of any run, but not below 0.01.
-    """
-    ends = np.array([(best[0], best[-1]) for _, best in traces])
-    if not len(ends) or count < 1:
-        raise InputError(f"traces and targets must be at least one, got {len(ends)} and {count}")
-    high, low = max(ends[:, 0].max(), LEAST_TARGET), max(ends[:, 1].min(), LEAST_TARGET)
-    costs = np.geomspace(high, low, count)
-    costs[-1] = low if count > 1 else high  # to the last bit, so that the best run reaches the last target
-    return costs
 
 
 def hits(run: Trace, targets: ArrayLike) -> Array:

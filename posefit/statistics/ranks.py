@@ -25,17 +25,6 @@ LETTERS = ascii_letters  # of as many groups at most
 _SHAPE = ("methods", "instances", "seeds")
 
 
-@dataclass(frozen=True, eq=False)
-class Ranking:
-    """Mean ranks and what a critical-difference plot needs."""
-
-    mean_ranks: Array  # (methods,), 1 is best
-    statistic: float  # Friedman's, chi-squared with methods - 1 degrees of freedom
-    p_value: float  # of the hypothesis that all methods are equal
-    critical_difference: float  # of mean ranks; Nemenyi
-    cliques: tuple[tuple[int, ...], ...]  # methods, best first, that do not differ; each as large as it can be
-
-
 @dataclass(frozen=True)
 class Comparison:
     """Two methods by Wilcoxon's signed ranks."""
@@ -47,45 +36,6 @@ class Comparison:
     high: float
     p_value: float
     adjusted: float  # Holm's, for all comparisons made together
-
-
-def friedman(errors: ArrayLike) -> Ranking:
-    """Return the ranking of errors (methods, instances, seeds), ties sharing their mean rank.
-
-    Friedman's test with its correction for ties, and Nemenyi's critical difference: Demšar, Statistical comparisons
-    of classifiers over multiple data sets, 2006. Cliques mean little where `p_value` is above 0.05.
-    Raises ValueError for fewer than 2 methods or 2 blocks.
-    """
-    array = finite("errors", errors, _SHAPE, (2, 1, 1))
-    blocks = array.reshape(len(array), -1).T
-    n, k = blocks.shape
-    if n < 2:
-        raise InputError(f"blocks, instances times seeds, must be at least 2, got {n}")
-    ranks = stats.rankdata(blocks, axis=1)
-    mean = np.asarray(ranks.mean(axis=0), dtype=np.float64)
-    # Conover's form, in which ties lessen the spread of the ranks that the statistic is measured by.
-    spread = float(((ranks - (k + 1) / 2.0) ** 2).sum())
-    statistic = (k - 1) * n * n * float(((mean - (k + 1) / 2.0) ** 2).sum()) / spread if spread > 0.0 else 0.0
-    difference = nemenyi_difference(k, n)
-    return Ranking(mean, statistic, float(stats.chi2.sf(statistic, k - 1)), difference, _cliques(mean, difference))
-
-
-def nemenyi_difference(methods: int, blocks: int) -> float:
-    """Return the difference of mean ranks from which on two methods differ at 5 %. Nemenyi; Demšar, 2006."""
-    quantile = float(stats.studentized_range.ppf(1.0 - LEVEL, methods, np.inf))
-    return quantile / math.sqrt(2.0) * math.sqrt(methods * (methods + 1) / (6.0 * blocks))
-
-
-def _cliques(mean: Array, difference: float) -> tuple[tuple[int, ...], ...]:
-    order = np.argsort(mean, kind="stable")
-    cliques: list[tuple[int, ...]] = []
-    last = 0
-    for start in range(len(order)):
-        end = int(np.searchsorted(mean[order], mean[order[start]] + difference, side="left"))
-        if end > last and end - start > 1:  # else it is part of the clique before
-            cliques.append(tuple(int(m) for m in order[start:end]))
-        last = max(last, end)
-    return tuple(cliques)
 
 
 def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) -> list[Comparison]:

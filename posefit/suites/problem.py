@@ -6,7 +6,6 @@ loops written for those run on it as they are.
 Problems may be added to a suite; nothing else of one ever changes.
 """
 
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from pickle import PicklingError
@@ -17,7 +16,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population
-from posefit.fitting.check import one_of, positive, whole
+from posefit.fitting.check import one_of, whole
 from posefit.fitting.exchange import exchanged
 from posefit.reading import quoted
 from posefit.suites.functions import (
@@ -41,7 +40,7 @@ EVALUATIONS = 100  # of the usual budget, for each dimension
 
 
 class BudgetSpentError(Exception):
-    """A call goes beyond the evaluations or the seconds of a problem's budget."""
+    """A call goes beyond the evaluations of a problem's budget."""
 
 
 @final
@@ -59,8 +58,8 @@ class Problem:
     Where the function is noisy, calls return costs with noise: the same at the k-th evaluation of every run. As in COCO
     the best cost, the trace and the targets reached are without it.
 
-    `budget` is the largest number of evaluations, and `seconds` the time after the first in which a call may begin:
-    what goes beyond raises BudgetSpentError and is not evaluated. Without them there is no end.
+    `budget` is the largest number of evaluations, without one infinite: what goes beyond raises BudgetSpentError and is
+    not evaluated.
     """
 
     number_of_objectives = 1
@@ -76,15 +75,12 @@ class Problem:
         *,
         infeasible: Infeasible = "repair",
         budget: int | None = None,
-        seconds: float | None = None,
     ) -> None:
         one_of("infeasible", infeasible, INFEASIBLE)
         if budget is not None:
             whole("budget", budget, 1)
-        if seconds is not None:
-            positive("seconds", seconds)
         self.suite, self.function, self.made = suite, function, made
-        self.infeasible, self.budget, self._limit = infeasible, budget, seconds
+        self.infeasible, self.budget = infeasible, budget
         self.index = 0  # in a `Suite`
         self.id_function = function.number
         self.instance = self.id_instance = made.number
@@ -100,11 +96,10 @@ class Problem:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all evaluations: the count, the best, the trace, and when the first began."""
+        """Forget all evaluations: the count, the best and the trace."""
         self.evaluations = 0
         self.best_observed_fvalue1 = np.inf
         self._steps: list[tuple[int, float, Array]] = []  # evaluations, cost and point of each improvement
-        self._began: float | None = None
 
     def __call__(self, proposals: object) -> Any:
         """Return the cost of a proposal (d,), or the costs (n,) of proposals (n, d).
@@ -168,11 +163,6 @@ class Problem:
         return np.inf if self.budget is None else self.budget - self.evaluations
 
     @property
-    def elapsed(self) -> float:
-        """Seconds since the first evaluation began."""
-        return 0.0 if self._began is None else time.perf_counter() - self._began
-
-    @property
     def best(self) -> Array:
         """The best proposal (d,) so far, repaired where it was not feasible. Raises ValueError before there is one."""
         if not self._steps:
@@ -229,14 +219,10 @@ class Problem:
 
     def _counted(self, checked: Array) -> Array:
         """Return the costs (n,) of checked proposals (n, d), and count them."""
-        if self._began is None:
-            self._began = time.perf_counter()
         if len(checked) > self.left:
             raise BudgetSpentError(
                 f"{self.id}: {self.left:g} of {self.budget} evaluations are left, got {len(checked)}"
             )
-        if self._limit is not None and self.elapsed > self._limit:
-            raise BudgetSpentError(f"{self.id}: its {self._limit:g} seconds are over")
         costs, repaired, penalties = self._noise_free(checked)
         measured = self.made.evaluate_noisy(repaired, self.evaluations) + penalties if self.function.noisy else costs
         points = checked if self.infeasible == "penalise" else repaired
@@ -267,7 +253,6 @@ def suite(
     *,
     infeasible: Infeasible = "repair",
     budget: int | None = None,
-    seconds: float | None = None,
 ) -> Problem:
     """Return a problem of a suite: the same for the same numbers on every machine, with nothing evaluated yet.
 
@@ -276,7 +261,7 @@ def suite(
     """
     number, instance, dimension = checked_address(name, function, instance, dimension)
     made = suite_instance(number, instance, dimension)
-    return Problem(name, suite_function(number), made, infeasible=infeasible, budget=budget, seconds=seconds)
+    return Problem(name, suite_function(number), made, infeasible=infeasible, budget=budget)
 
 
 @final
@@ -297,7 +282,6 @@ class Suite:
         instances: Sequence[int] = HELD_OUT[:15],
         infeasible: Infeasible = "repair",
         budget: int | None = None,
-        seconds: float | None = None,
     ) -> None:
         one_of("suite", name, SUITES)
         for what, numbers in (("functions", functions), ("dimensions", dimensions), ("instances", instances)):
@@ -308,7 +292,7 @@ class Suite:
             one_of("dimension", dimension, DIMENSIONS)
         self.passed_over = tuple(one for one in chosen if not set(dimensions) & set(one.dimensions))
         self.name = name
-        self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget, "seconds": seconds}
+        self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget}
         self._addresses = [
             checked_address(name, one.number, instance, dimension)
             for dimension, one, instance in product(dimensions, chosen, instances)

@@ -18,7 +18,7 @@ from posefit.errors import InputError
 from posefit.fitting.optimiser import BudgetError, minimise
 from posefit.fitting.validation import CheckedOptimiser, plugin_errors
 from posefit.registry import registry
-from posefit.statistics.profiles import attained, expected_running_time, hits, running_time_interval
+from posefit.statistics.profiles import expected_running_time, hits, running_time_interval
 from posefit.suites.functions import suite_function
 from posefit.suites.problem import EVALUATIONS, TARGETS, Problem
 
@@ -111,7 +111,6 @@ def run_of(
 
 ALL = 0  # the number that stands for all functions together
 SHOWN = (16.0, 4.0, 1.0, 0.25)  # of the targets above the true pose's cost, those with an expected running time
-POINTS = (1, 3, 10, 30, 100, 300, 1000)  # evaluations for each dimension at which shares are reported
 
 
 @dataclass(frozen=True)
@@ -126,8 +125,7 @@ class SuiteScore:
     infeasible: str  # the way with infeasible proposals: see `posefit.suites.problem.Problem`
     runs: int
     above: float  # median of the best costs above the true poses'; below 0 where searches find lower ones
-    reached: float  # share of runs and targets, at the end
-    shares: dict[int, float]  # the same after so many evaluations for each dimension, as far as budgets go
+    reached: float  # share of runs and targets
     # expected evaluations to so much above the true pose's cost; None for never. Of all functions there are none: a
     # mean over them would be that of the hardest
     running_times: dict[float, float | None]
@@ -183,8 +181,6 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     places = [int(np.flatnonzero(above == TARGETS)[0]) for above in shown]
     rng, instances = np.random.default_rng(RNG_STREAM), [run.instance for run in runs]
     low, high = running_time_interval(reached[:, places], used, instances, rng)
-    points = [point for point in POINTS if point * dimension <= budget]
-    shares = attained(reached, [*(point * dimension for point in points), float(used.max())])
     return SuiteScore(
         method,
         function,
@@ -194,8 +190,7 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         runs[0].infeasible,
         len(runs),
         float(np.median([run.cost - run.truth_cost for run in runs])),
-        float(shares[-1]),
-        dict(zip(points, shares[:-1].tolist(), strict=True)),
+        float(np.isfinite(reached).mean()),
         {above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
         {above: (_finite(low[k]), _finite(high[k])) for k, above in enumerate(shown)},
     )
@@ -206,23 +201,19 @@ def _finite(value: Array | float) -> float | None:
 
 
 def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
-    """Return the lines of two tables of scores, for a terminal: where runs end, and how soon they reach targets."""
+    """Return the lines of a table of scores, for a terminal: where runs end, and how soon they reach targets."""
     budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
     labels = [
         one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
     ]
-    wide, points = max(24, *map(len, labels)), sorted({point for one in scores for point in one.shares})
-    heads = [f"ERT +{above:g}" for above in SHOWN]
-    ends = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
-    courses = ["", f"share of targets reached after d x{'':{wide - 1}}" + _cells([str(point) for point in points])]
+    wide, heads = max(24, *map(len, labels)), [f"ERT +{above:g}" for above in SHOWN]
+    lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
     for one, label in zip(scores, labels, strict=True):
         function = one.name if one.function == ALL else f"{one.function} {one.name}"
-        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
         times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
-        ends.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}".rstrip())
-        shares = [f"{one.shares[point]:.1%}" if point in one.shares else "" for point in points]
-        courses.append(f"{start}{_cells(shares)}".rstrip())
-    return ends + courses
+        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
+        lines.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}".rstrip())
+    return lines
 
 
 def _cells(texts: Sequence[str]) -> str:

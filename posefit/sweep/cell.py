@@ -124,6 +124,7 @@ class TrackCell(Cell):
         from posefit.evaluation.measures import MEASURES
         from posefit.geometry.skeleton import joint_distances
         from posefit.motion.clips import training_clips, training_motions
+        from posefit.tracking.defaults import completed
         from posefit.tracking.options import VIEW, TrackOptions
         from posefit.tracking.pipeline import track_scene
 
@@ -135,7 +136,7 @@ class TrackCell(Cell):
         shared = {one.name for one in fields(TrackOptions)} & {one.name for one in fields(self)} - {*VIEW, "train"}
         values = {name: getattr(self, name) for name in shared}
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
-        result = track_scene(scene, training, options)
+        result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None
         truth, estimate = result.truth.joints, result.motion.joints
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`

@@ -16,14 +16,12 @@ from posefit.progress import bars_shown
 from posefit.reading import counted, cut
 from posefit.sweep.cell import Cell, json_of, other_version, run_cell
 from posefit.sweep.drive import Tally, drive
-from posefit.sweep.engine import POLL_SECONDS, Engine, Limits, Run
+from posefit.sweep.engine import Engine, Limits, Run
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import MAX_CELLS, Plan
 from posefit.sweep.pool import Pool, cores
 
 VALUES = 12  # of a field, that a preview lists
-WARNINGS = 5  # of a preview
-TRIAL_SECONDS = 120.0  # that a trial of a preview may take at most, whatever a cell may
 
 
 def swept(
@@ -95,89 +93,54 @@ def _unversioned(spec: Mapping[str, Any]) -> str:
     return json_of({**spec, "version": "", "name": ""})
 
 
-def preview(plan: str, out: str | None, shard: str | None, start: Callable[[], Engine], as_json: bool) -> Iterator[str]:
-    """Yield the lines of a preview: how many cells of a plan have which values, and about how long all take.
+def preview(plan: str, out: str | None, shard: str | None, as_json: bool) -> Iterator[str]:
+    """Yield the lines of a preview: how many cells of a plan have which values, and how many are to run.
 
     Or those of one JSON object with each cell, and whether it is done. A million cells are never in memory together.
     """
     path = None if out is None else Path(out) / file_of(shard)
     ledger = Ledger(path) if path is not None and path.exists() else None
-    first: dict[str, Cell] = {}  # of each method, of those that are to run
-    totals = Counter[str]()  # evaluations of each method's
     counts: dict[str, Counter[str]] = {}
-    number = to_run = 0
-    for cell in cells_of(Plan.read(plan), shard):
+    number = to_run = evaluations = 0
+    for number, cell in enumerate(cells_of(Plan.read(plan), shard), 1):
         done = ledger is not None and cell.key in ledger
-        number += 1
-        if not done:
-            to_run += 1
-            method = f"{cell.method} {json_of(cell.settings)}"
-            first.setdefault(method, cell)
-            totals[method] += cell.total_evaluations
+        to_run, evaluations = to_run + (not done), evaluations + (not done) * cell.total_evaluations
         if as_json:
             yield ("," if number > 1 else '{"cells": [') + json.dumps({"key": cell.key, "done": done, **cell.spec})
         else:
             for name, value in cell.spec.items():
                 counts.setdefault(name, Counter())[value if isinstance(value, str) else json_of(value)] += 1
-    seconds, workers, untried = 0.0, 0, {}
-    if first:
-        with closing(start()) as engine:
-            workers = engine.window()
-            for method, cell in first.items():
-                for _ in range(2):  # the first compiles what is not compiled yet
-                    engine.submit(cell)
-                    while not (outcomes := engine.wait(POLL_SECONDS)):
-                        pass
-                    if outcomes[0].result is None:
-                        untried[str(cell)] = outcomes[0].reason or "what ran it was lost"
-                        break
-                else:
-                    seconds += outcomes[0].result.row["seconds"] * totals[method] / cell.total_evaluations / workers
     if as_json:
-        rest = {"seconds": seconds, "workers": workers, "untried": untried}
-        yield f"], {json.dumps(rest)[1:]}"
+        yield "]}"
         return
     for name, values in counts.items():
         if name in ("method", "motion") or (len(values) > 1 and name not in ("version", "files")):
             shown = [f"{count:,} x {cut(value)}" for value, count in islice(values.items(), VALUES)]
             more = [f"and {len(values) - VALUES:,} other values"] * (len(values) > VALUES)
             yield f"{name:16}  {', '.join(shown + more)}"
-    for text, reason in islice(untried.items(), WARNINGS):
-        yield f"warning: {text}: {reason}; cells of its method count for no time here, and may be quarantined"
-    if len(untried) > WARNINGS:
-        yield f"warning: the same holds of {counted(len(untried) - WARNINGS, 'other method')}; --json has each"
-    takes = f", {totals.total():,} evaluations: about {duration_text(seconds)} on {counted(workers, 'worker')}"
-    yield f"{number:,} cells, {to_run:,} of them to run{takes if first else ''}"
+    yield f"{number:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"
 
 
 def engine(
-    limits: Limits,
-    run: Run = run_cell,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    dask_local: int | None = None,
+    limits: Limits, run: Run = run_cell, *, workers: int | None = None, scheduler: str | None = None
 ) -> Callable[[], Engine]:
-    """Return a function that starts the engine asked for: processes of this machine, or Dask workers.
+    """Return a function that starts the engine asked for: processes of this machine, or the workers of a scheduler.
 
-    Raises ValueError where more than one is asked for.
+    Raises ValueError where both are asked for.
     """
-    places = {"workers": workers, "scheduler": scheduler, "dask-local": dask_local}
-    chosen = [name for name, value in places.items() if value]
-    if len(chosen) > 1:
-        raise InputError(f"--{chosen[0]} must not be given with --{chosen[1]}: cells run in one place")
-    for name, value in (("workers", workers), ("dask-local", dask_local)):
-        if value is not None and value < 1:
-            raise InputError(f"--{name} must be at least 1, got {value}")
+    if workers is not None and scheduler is not None:
+        raise InputError("--workers must not be given with --scheduler: cells run in one place")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers must be at least 1, got {workers}")
 
     def start() -> Engine:
         from posefit.silhouette.cost import compile_kernels
 
         compile_kernels()
-        if scheduler is not None or dask_local is not None:
+        if scheduler is not None:
             from posefit.sweep.cluster import Cluster
 
-            return Cluster(scheduler, dask_local, limits, run)
+            return Cluster(scheduler, limits, run)
         return Pool(workers or cores(), limits, run)
 
     return start
@@ -192,12 +155,3 @@ def tally_lines(tally: Tally, out: str) -> list[str]:
         return [f"{line}; stopped: the same command goes on from there"]
     page = shlex.quote(f"{out.rstrip(os.sep)}.html")
     return [line, f"results: posefit report {shlex.quote(out)} --out {page}"] if tally.done else [line]
-
-
-def duration_text(seconds: float) -> str:
-    """Return a time in words, such as `2.5 minutes`."""
-    for name, size in (("hours", 3600.0), ("minutes", 60.0)):
-        if seconds >= 1.5 * size:
-            return f"{seconds / size:.1f} {name}"
-    whole = round(seconds)
-    return f"{whole} second{'' if whole == 1 else 's'}"

@@ -4,7 +4,7 @@
         engine.submit(cell)
         outcomes = engine.wait(1.0)                                      # what ended within a second
 
-A Dask cluster, here or elsewhere, is one too: cluster.py.
+The workers of a Dask scheduler are one too: cluster.py.
 """
 
 import os

@@ -299,10 +299,6 @@ def _files(path: Path) -> list[Path]:
     """Return a ledger's files: itself, or those of a folder."""
     if path.is_file():
         return [path]
-    if (path / "ledger.json").is_file():
-        raise InputError(
-            f"{path}: expected a ledger in SQLite, got one of an older posefit: run its plan in a new folder"
-        )
     if not (found := sorted(path.glob(f"*{SUFFIX}"))):
         came = "a folder without one" if path.is_dir() else "none"
         raise InputError(f"{path}: expected a ledger, a folder or .sqlite file that posefit sweep wrote, got {came}")
@@ -345,8 +341,6 @@ def _check_place(path: Path) -> None:
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")
     names = [name for name in sorted(os.listdir(folder)) if not name.startswith(".")] if folder.is_dir() else []
     if names and not any(name.endswith((SUFFIX, DRIVER)) for name in names):
-        if "ledger.json" in names:
-            _files(folder)
         raise InputError(f"{folder}: expected a new folder or a ledger, got one with {names[0]}")
 
 

@@ -1,9 +1,7 @@
 """Is a prior right: shapes, ranges, the same bits for a row whatever stands beside it, and does it learn anything?"""
 
-import tempfile
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,7 @@ from posefit.motion import built_in
 from posefit.testing import common
 from posefit.testing.common import PluginCase, check_speed, duplicates, global_random_state, left_alone
 from posefit.testing.problem import walking_angles
-from posefit.testing.results import BrokenError, SkippedError, expect
+from posefit.testing.results import BrokenError, expect
 
 ROWS = 100
 MAX_SECONDS = 5e-3  # to recover a pose
@@ -167,18 +165,6 @@ def copies(case: Case) -> None:
         expect(_same(twin, case.fitted, case.latents), f"{what} must be the same space, got another")
 
 
-def file(case: Case) -> None:
-    """The saved file is loaded again as the same space."""
-    load = getattr(type(case.fitted), "load", None)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "prior.npz"
-        case.fitted.save(path)
-        expect(path.is_file(), "save must write the file it is given, got none")
-        if load is None:
-            raise SkippedError("it has no load; save wrote its file")
-        expect(_same(load(path), case.fitted, case.latents), "load must give the same space, got another")
-
-
 def learns(case: Case) -> str:
     """Training poses come back nearer than their mean is."""
     prior, angles = case.fitted, walking_angles()
@@ -234,7 +220,6 @@ RULES = [
     inputs,
     global_randomness,
     copies,
-    file,
     learns,
     bad_input,
     common.silence,

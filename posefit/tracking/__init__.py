@@ -7,7 +7,7 @@
 | looking for | file |
 |---|---|
 | `posefit.track` and `posefit.fit`, every option a keyword | front.py |
-| every option with its check and help | options.py |
+| every option with its check and help; the defaults of what is left open | options.py, defaults.py |
 | the steps of tracking, in their order | pipeline.py, and the files that it names |
 | names become an optimiser, a prior or a tracker, with settings checked and a budget | method.py |
 | what a trajectory costs, and which of two is kept | trajectory.py |

@@ -22,7 +22,7 @@ from posefit.output.folder import OutputFolder, Recorder
 from posefit.output.identity import Digest, digest_of
 from posefit.progress import Progress, interactive
 from posefit.reading import quoted, suggestion
-from posefit.tracking.method import resolved
+from posefit.tracking.defaults import completed
 from posefit.tracking.options import VIEW, TrackOptions, declared
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Fit, Track
@@ -45,7 +45,7 @@ def track(
     `source` is masks, an array (T, H, W), a list of image files, a folder of them, or an .npz or .npy file; a video; a
     list of any of these, that several cameras took at the same time; a built-in motion's name, a recorded one's, a
     `Motion`, an .amc or .bvh file; or a `Scene` of a known motion, as it is. All other options are listed below, with
-    the defaults that depend on the source in `posefit.tracking.method.resolved`.
+    the defaults that depend on the source in `posefit.tracking.defaults.completed`.
 
     With `out`, a new folder gets poses, .amc, .bvh, .trc, .c3d, tables, a video and a picture; it appears whole or
     not at all. The frames of a track that ended too early are kept, and `resume` goes on from there. Messages and bars
@@ -57,15 +57,14 @@ def track(
     chosen = TrackOptions(**options)
     scene = source if isinstance(source, Scene) else None
     sources = _sources(source)
-    if scene is not None and (given := [name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)]):
-        raise InputError(f"a scene must be tracked as it is, got {', '.join(given)}")
+    changed = [name for name in VIEW if getattr(chosen, name) != getattr(TrackOptions, name)]
+    if scene is not None and changed:
+        raise InputError(f"a scene must be tracked as it is, got {', '.join(changed)}")
     kind = kind_of(sources[0])
     check_used(kind, chosen.view)
     _check_truth(chosen, kind == "motion", [*sources, *chosen.train])
-    if chosen.asf is not None and chosen.body_frames is None:
-        chosen = chosen.changed(body_frames=0)
-    chosen = resolved(sources[0], chosen)
     followed = sources[0] if isinstance(sources[0], str | Path | Motion) else None
+    chosen = completed(chosen, followed if kind == "motion" else None)
     clips = training_clips(chosen.train, chosen.of_files, followed=followed)  # before the work, as a name may be wrong
     for name, value in (("resume", resume), ("force", force)):
         if value and out is None:
@@ -148,11 +147,11 @@ def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence
 
 def _documented(function: Callable[..., Any]) -> None:
     """Show the options of a track in a function's signature and docstring, as if it declared them itself."""
-    own = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
+    parameters = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
     listed = [option for option in fields(TrackOptions) if function is track or option.name != "frames"]
     kind = inspect.Parameter.KEYWORD_ONLY
     more = [inspect.Parameter(option.name, kind, default=option.default, annotation=option.type) for option in listed]
-    function.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
+    function.__signature__ = inspect.Signature([*parameters, *more])  # type: ignore[attr-defined]
     lines = "\n".join(f"    {option.name}: {declared(option).help}" for option in listed)
     function.__doc__ = f"{(function.__doc__ or '').rstrip()}\n\n    Options:\n{lines}\n"
 

@@ -16,31 +16,25 @@ from posefit.motion.motion import Motion
 from posefit.progress import Progress
 from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
-from posefit.tracking.options import EVALUATIONS, TrackOptions
-from posefit.tracking.restarts import (
-    RESTARTS,
-    TRIAL_STRIDE,
-    Follow,
-    best_restart,
-    first_shown_whole,
-    usable_observations,
-)
+from posefit.tracking.options import TrackOptions
+from posefit.tracking.restarts import TRIAL_STRIDE, Follow, best_restart, first_shown_whole, usable_observations
 
-BODY_FRAMES = 12  # to which a build is fitted
 MIN_BODY_FRAMES = 5
 WARM_UP_POPULATIONS = 8
 
 
 def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
     """Return the task of tracking a scene, as far as it is known before anything is searched."""
+    assert options.evaluations is not None
+    assert options.translation is not None
     first_pose = None if scene.truth is None or options.first_pose == "searched" else scene.truth.poses[0, 3:]
     return Task(
         scene.body,
         scene.cameras,
-        options.evaluations or EVALUATIONS,
+        options.evaluations,
         scene.yaw,
         scene.anchor,
-        translation=options.translation or ("aligned" if scene.truth is None else "known"),
+        translation=options.translation,
         fps=scene.fps,
         training=training,
         first_pose=first_pose,
@@ -58,13 +52,10 @@ def initialise(
     if task.yaw is None:
         task = replace(task, start=method.start)
     _warm_up(method, task, scene)
-    start, footage = clocks(), scene.truth is None
-    restarts = (RESTARTS if footage and not method.looks_ahead else 0) if options.restarts is None else options.restarts
-    body_frames = (BODY_FRAMES if footage else 0) if options.body_frames is None else options.body_frames
-    if restarts:
+    start, shape, body_frames = clocks(), None, options.body_frames
+    if options.restarts:
         progress.log("looking for the first pose")
-        task, _ = best_restart(task, scene.observations, method.follow, restarts, options.seed)
-    shape = None
+        task, _ = best_restart(task, scene.observations, method.follow, options.restarts, options.seed)
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"

@@ -5,7 +5,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,15 +20,17 @@ from posefit.footage.cameras import CameraView, calibrated, combined
 from posefit.footage.live import LiveMask, Stream, live_masks
 from posefit.footage.masks import PackedMasks, Views, undistorted
 from posefit.footage.scene import Scene
-from posefit.footage.source import body_of
+from posefit.footage.source import body_of, check_used, logged
 from posefit.geometry.calibration import Calibration
-from posefit.motion import built_in
 from posefit.motion.clips import training_clips, training_motions
 from posefit.progress import QUIET, Progress
-from posefit.tracking.initialise import task_of
-from posefit.tracking.method import prepare
+from posefit.tracking.defaults import completed
+from posefit.tracking.initialise import initialise, task_of
+from posefit.tracking.method import method_names, prepare
 from posefit.tracking.options import TrackOptions, declared
-from posefit.tracking.restarts import GAP, RESTARTS, TRIAL_FRAMES, TRIAL_STRIDE, best_restart, relocalised
+from posefit.tracking.pipeline import follow, with_notes
+from posefit.tracking.restarts import SEARCHED, TRIAL_FRAMES, TRIAL_STRIDE
+from posefit.tracking.trajectory import Hypothesis
 
 METHOD = "sapso@pca"  # by default: `exemplars` takes longer than a frame lasts, and looks ahead
 LINES, ARRAYS = "frames.jsonl", "poses.npz"
@@ -70,13 +72,18 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
     for each in fields(chosen):
         if not declared(each).live and getattr(chosen, each.name) != each.default:
             raise InputError(f"{each.name} must be left out with live, got {getattr(chosen, each.name)}")
-    chosen = chosen.changed(method=chosen.method or METHOD, train=chosen.train or built_in.other_styles("walk"))
+    if chosen.method is None or isinstance(chosen.method, str):
+        chosen = chosen.changed(method=str(method_names(chosen.method or METHOD)))
+    chosen = completed(chosen.changed(body_frames=0, smooth=False), None)
     clips = training_clips(chosen.train, chosen.of_files)
     stream = Stream(source)
-    fps = chosen.fps or stream.fps
     masks = live_masks(stream, chosen.extraction, progress.log)
     first = list(islice(masks, TRIAL_FRAMES * TRIAL_STRIDE))
-    scene, observed = _scene_of(first, source, fps, chosen)
+    scene, observed = _scene_of(first, source, chosen.fps or stream.rate, chosen)
+    training = training_motions(clips, scene.fps)
+    scene = with_notes(logged(scene, progress), training)
+    for warning in scene.warnings:
+        progress.warn(warning)
     waiting: deque[LiveMask] = deque()
 
     def coming() -> Iterator[Observation]:
@@ -88,39 +95,39 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
             yield observed(live)
 
     with threadpool_limits(1):
-        task = task_of(scene, chosen, training_motions(clips, fps))
+        task = task_of(scene, chosen, training)
         method = prepare(chosen, task)
-        if restarts := RESTARTS if chosen.restarts is None else chosen.restarts:
-            progress.log(f"looking for the first pose, {restarts} times")
-            task, _ = best_restart(task, scene.observations, method.follow, restarts, chosen.seed)
-        gap = GAP if method.relocalise_gap is None else method.relocalise_gap
-        for frame in relocalised(task, method.follow, coming(), np.random.default_rng(chosen.seed), gap):
+        task, _, _ = initialise(scene, method, task, chosen, progress)
+        rng = np.random.default_rng(chosen.seed)
+        for frame in follow(Hypothesis(SEARCHED, task, rng, rng), method, coming(), method.relocalise_gap):
             live = waiting.popleft()
-            came, began = live.source.arrived, first[0].source.arrived
-            yield LiveFrame(live.source.number, came - began, time.perf_counter() - came, live.usable, frame)
+            arrived, start = live.source.arrived, first[0].source.arrived
+            yield LiveFrame(live.source.number, arrived - start, time.perf_counter() - arrived, live.usable, frame)
 
 
 def _scene_of(
-    first: Sequence[LiveMask], name: str, fps: float, options: TrackOptions
+    first: Sequence[LiveMask], name: str, fps: float | None, options: TrackOptions
 ) -> tuple[Scene, Callable[[LiveMask], Observation]]:
     """Return the scene of the first frames, and the function that makes an observation of a later one."""
+    check_used("masks" if first and first[0].source.image.ndim == 2 else "pictures", options.view)
     if not any(live.usable for live in first):
         raise InputError(f"{name}: expected a person in the first {len(first)} frames, got none")
     size = (first[0].mask.shape[1], first[0].mask.shape[0])
 
-    def packed(seen: Sequence[LiveMask]) -> PackedMasks:
-        names = [f"{name}, frame {live.source.number}" for live in seen]
-        masks = np.packbits([live.mask.ravel() for live in seen], axis=1)
-        valid = np.packbits([live.valid.ravel() for live in seen], axis=1)
-        usable, landmarks = np.array([live.usable for live in seen]), np.array([live.landmarks for live in seen])
+    def packed(frames: Sequence[LiveMask]) -> PackedMasks:
+        names = [f"{name}, frame {live.source.number}" for live in frames]
+        masks = np.packbits([live.mask.ravel() for live in frames], axis=1)
+        valid = np.packbits([live.valid.ravel() for live in frames], axis=1)
+        usable, landmarks = np.array([live.usable for live in frames]), np.array([live.landmarks for live in frames])
         known = landmarks if landmarks[..., 2].any() else None
         return PackedMasks(names, size, masks, valid, usable, landmarks=known)
 
     facing = next(iter(options.view["view_degrees"]), None)
     known = calibrated(options.camera, [None])  # type: ignore[arg-type]
-    body, notes = body_of(options.asf, options.height, options.unit)
+    body, notes, of_height = body_of(options.asf, options.height, None if known else options.unit)
     view = CameraView(packed(first), notes, name)
-    scene = combined([view], name, body, known, facing, options.up, fps)
+    scene = combined([view], name, body, known, facing, options.up, fps, options.unit)
+    scene = replace(scene, guesses=[*scene.guesses, *of_height])
     bent = next(((each, each.maps(size)) for each in known if isinstance(each, Calibration) and each.distorted), None)
 
     def observed(live: LiveMask) -> Observation:

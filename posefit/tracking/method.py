@@ -1,7 +1,4 @@
-"""A method by its one string: `sapso@pca`, `cma`, `@loose`, or a tracker's name; its settings checked, plugins watched.
-
-`resolved` fills in the method of a source, and what it learns from, where the options leave them open.
-"""
+"""A method by its one string, `sapso@pca`, `cma`, `@loose` or a tracker's name: settings checked, plugins watched."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -11,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from posefit import settings
-from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Space
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import (
+    RELOCALISE_GAP,
     Frame,
     InitialiserFactory,
     Observation,
@@ -26,20 +23,15 @@ from posefit.fitting.tracker import (
     Task,
     Tracker,
 )
-from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser, CheckedPrior, plugin_errors
-from posefit.footage.source import Footage, kind_of
-from posefit.motion import built_in, recorded
+from posefit.fitting.validation import CheckedOptimiser, CheckedPrior, check_prior, plugin_errors
 from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
 from posefit.silhouette.cost import BETA
 from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "annealed"
+DEFAULT_PRIOR = "pca"
 DEFAULT_START, BLIND = "lookup", "blind"  # where it is installed; for none
-DEFAULT_PRIOR, DEFAULT_FOOTAGE_PRIOR = "pca", "loose"
-DEFAULT_TRACKER = "exemplars"  # where it is installed
-DEFAULT_TRACKER_EVALUATIONS = 9760  # of a frame
-FEASIBILITY_SAMPLES = 1000  # poses of which one at least has to be feasible in a prior
 
 
 class MethodNames(NamedTuple):
@@ -53,9 +45,9 @@ class MethodNames(NamedTuple):
         return self.tracker or f"{self.optimiser}@{self.prior}"
 
 
-def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> MethodNames:
+def method_names(method: str, default_prior: str = DEFAULT_PRIOR) -> MethodNames:
     """Return the plugins that a method such as `sapso@pca` names. Raises InputError listing those that are known."""
-    optimiser, at, prior = (method or "@").partition("@")
+    optimiser, at, prior = method.partition("@")
     if at:
         return MethodNames(optimiser or DEFAULT_OPTIMISER, prior or default_prior)
     offers, family = registry().offers, optimiser.partition(":")[0]
@@ -68,30 +60,19 @@ def method_names(method: str | None, default_prior: str = DEFAULT_PRIOR) -> Meth
     raise InputError(f"method must be OPTIMISER@PRIOR, or one of {', '.join(known)}, got {quoted(method)}{hint}")
 
 
-def resolved(source: Footage, options: TrackOptions) -> TrackOptions:
-    """Return options whose method and training motions are known, by default those of the source.
+def offers_of(method: Any) -> tuple[Offer, str | Prior | None]:
+    """Return what a method of `TrackOptions` names: an optimiser and its prior, or a tracker and None.
 
-    That is `exemplars`, which learns from the library of recorded motions and has a budget of its own. A built-in
-    motion, and all else for which an optimiser, a prior or settings of theirs are given, is tracked by `annealed@pca`,
-    or the optimiser that settings name; footage with the prior `loose`. These and other trackers learn from the other
-    styles of a built-in motion, or else from the built-in walks.
+    Raises InputError where a name is wrong, and ImportError where a library is not installed.
     """
-    known = isinstance(source, str) and source in built_in.names()
-    prior, method = DEFAULT_FOOTAGE_PRIOR if kind_of(source) != "motion" else DEFAULT_PRIOR, options.method
-    offers, set_names = registry().offers, {name.partition(".")[0] for name in options.settings}
-    searched = known or set_names - {DEFAULT_TRACKER}
-    if method is None and not searched and DEFAULT_TRACKER in offers["tracker"]:
-        method = DEFAULT_TRACKER
-    elif method is None or isinstance(method, str):
-        method = str(method_names(method or next(iter(set_names & {*offers["optimiser"]}), None), prior))
-    train = options.train
-    if not train and method == DEFAULT_TRACKER:
-        train = [recorded.LIBRARY]
-    train = train or built_in.other_styles(str(source) if known else "walk")
-    evaluations = options.evaluations
-    if method == DEFAULT_TRACKER and evaluations is None:
-        evaluations = DEFAULT_TRACKER_EVALUATIONS
-    return options.changed(method=method, train=train, evaluations=evaluations)
+    if isinstance(method, tuple):
+        return _offered("optimiser", method[0]), method[1]
+    if callable(method):
+        return _offered("tracker", method), None
+    names = method_names(method)
+    if names.tracker is not None:
+        return _offered("tracker", names.tracker), None
+    return _offered("optimiser", names.optimiser), names.prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +83,7 @@ class Method:
     prior: Prior | None  # of a tracker of its own, None
     settings: dict[str, dict[str, Any]]
     looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
-    relocalise_gap: int | None  # frames of a gap after which it relocalises, 0 for never; None for the default
+    relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never
     audit: Audit  # of what its trackers report
     build: Callable[[Task], Tracker] = field(repr=False)
     start: InitialiserFactory | None = field(default=None, repr=False)  # guesses first poses; None for blind searches
@@ -124,15 +105,10 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     Raises InputError where a name, a setting or the budget is wrong, ImportError where a library is not installed, and
     BrokenRuleError where a plugin does not do what its kind has to.
     """
-    chosen = options.method
-    if isinstance(chosen, tuple):
-        optimiser, given_prior = _offered("optimiser", chosen[0]), chosen[1]
-    else:
-        names = None if callable(chosen) else method_names(chosen)
-        if names is None or names.tracker is not None:
-            return _tracker_method(_offered("tracker", chosen), options.settings)
-        optimiser, given_prior = _offered("optimiser", names.optimiser), names.prior
-    prior = registry().offer("prior", given_prior) if isinstance(given_prior, str) else None
+    optimiser, prior_choice = offers_of(options.method)
+    if prior_choice is None:
+        return _tracker_method(optimiser, options.settings)
+    prior = registry().offer("prior", prior_choice) if isinstance(prior_choice, str) else None
     plugin_settings = parsed_settings([optimiser] if prior is None else [optimiser, prior], options.settings)
     plugin_settings.setdefault("prior", {})
     planned = settings.planned(optimiser.factory, plugin_settings["optimiser"], task.evaluations)
@@ -140,10 +116,10 @@ def prepare(options: TrackOptions, task: Task) -> Method:
     if prior is not None:
         with _rules(prior):
             learned = prior.factory(**plugin_settings["prior"]).fit(task.angles, task.body.skeleton)
-            _check_prior(learned, task.angles, prior)
+            check_prior(learned, task.angles, prior.label)
         learned, name = CheckedPrior(learned, prior.label), prior.name
     else:
-        learned, name = given_prior, type(given_prior).__name__
+        learned, name = prior_choice, type(prior_choice).__name__
     # what a prior that came learned has learned from is unknown: its tilt is not that of other motions
     prediction = Prediction(**{**({} if prior is not None else {"tilt": "box"}), **plugin_settings["tracker"]})
     tilt = prediction.tilted(learned, task.training)
@@ -178,7 +154,7 @@ def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any
     return places if offers[0].kind == "tracker" else places | {"tracker": ("tracker", Prediction)}
 
 
-def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
+def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return settings by the kind of plugin that they are of.
 
     They are given by names such as `sapso.cooling`, or as texts such as `sapso.cooling=0.9`; the plugin's name may be
@@ -187,33 +163,34 @@ def parsed_settings(offers: Sequence[Offer], given: Mapping[str, Any] | Sequence
     """
     places = places_of(offers)
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
-    for item in given:
-        left, equals, value = (item, "=", given[item]) if isinstance(given, Mapping) else item.partition("=")
-        name, dot, setting = left.partition(".")
+    for item in values:
+        key, equals, value = (item, "=", values[item]) if isinstance(values, Mapping) else item.partition("=")
+        name, dot, setting = key.partition(".")
         if not dot:  # the name may be left out where one plugin alone has the setting
-            offered = [f"{name}.{each}" for name, (_, factory) in places.items() for each in settings.names(factory)]
-            having = [each.partition(".")[0] for each in offered if each.partition(".")[2] == left]
-            if equals and len(having) != 1:
-                raise InputError(f"a setting must be one of {', '.join(offered)}, got {quoted(left)}")
-            name, setting = (having or [""])[0], left
+            names = {name: settings.names(factory) for name, (_, factory) in places.items()}
+            owners = [name for name in names if key in names[name]]
+            if equals and len(owners) != 1:
+                known = ", ".join(f"{name}.{each}" for name in names for each in names[name])
+                raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
+            name, setting = (owners or [""])[0], key
         if not (equals and setting):
             raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
         if name not in places:
             known = ", ".join(places)
             raise InputError(f"a setting must name one of {known}, which are in use here, got {quoted(item)}")
         if setting in each[name]:
-            raise InputError(f"a setting must be given once, got {quoted(left)} twice")
+            raise InputError(f"a setting must be given once, got {quoted(key)} twice")
         each[name][setting] = value
     for name, (_, factory) in places.items():
-        if isinstance(given, Mapping):
+        if isinstance(values, Mapping):
             each[name] = settings.check(name, factory, each[name])
         else:
             each[name] = settings.parse(name, factory, each[name])
     return {kind: each[name] for name, (kind, _) in places.items()}
 
 
-def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> Method:
-    plugin_settings = parsed_settings([offer], given)["tracker"]
+def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> Method:
+    plugin_settings = parsed_settings([offer], values)["tracker"]
     defaults = {setting.name: setting.default for setting in offer.settings}
     beta = {"beta": BETA, **defaults, **plugin_settings}["beta"]  # of the costs that it gives
     beta = float(beta) if isinstance(beta, float | int) else BETA
@@ -223,39 +200,9 @@ def _tracker_method(offer: Offer, given: Mapping[str, Any] | Sequence[str]) -> M
             tracker: Tracker = offer.factory(task, **plugin_settings)
         return tracker
 
-    gap = 0 if offer.looks_ahead else None
+    gap = 0 if offer.looks_ahead else RELOCALISE_GAP
     audit = Audit(offer.label, beta)
     return Method(offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, audit, build, start_of())
-
-
-def _check_prior(prior: Prior, training: Array, offer: Offer) -> None:
-    """Return nothing. Raises BrokenRuleError where a prior's range, shapes or numbers are wrong."""
-
-    def broken(rule: str) -> BrokenRuleError:
-        return BrokenRuleError(f"{offer.label}: {rule}")
-
-    low, high = np.asarray(prior.low), np.asarray(prior.high)
-    if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low).all() and np.isfinite(high).all()):
-        raise broken(f"low and high must be finite and of shape (m,), got {low.shape}, {high.shape}")
-    for k in np.flatnonzero(low > high):
-        raise broken(f"low must not be above high, got {low[k]:g} and {high[k]:g} of latent {k}")
-    angles = training[:3]
-    latents = np.asarray(prior.transform(angles))
-    back, feasible = prior.inverse_transform(latents), prior.feasible(latents)
-    for name, value, shape in (
-        ("transform", latents, (len(angles), len(low))),
-        ("inverse_transform", back, angles.shape),
-        ("feasible", feasible, (len(angles),)),
-    ):
-        if np.shape(value) != shape:
-            raise broken(f"{name} must return shape {shape}, got {np.shape(value)}")
-        if not np.isfinite(value).all():
-            raise broken(f"{name} must return finite numbers, got some that are not")
-    sample = training[np.unique(np.linspace(0, len(training) - 1, FEASIBILITY_SAMPLES).astype(np.int64))]
-    drawn = np.random.default_rng(0).uniform(low, high, (FEASIBILITY_SAMPLES, len(low)))
-    if not (np.any(feasible) or any(np.any(prior.feasible(some)) for some in (prior.transform(sample), drawn))):
-        came = f"none of {len(sample)} training poses and {FEASIBILITY_SAMPLES} of the range"
-        raise broken(f"feasible must allow some poses, got {came}")
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:
@@ -263,8 +210,7 @@ def _rules(offer: Offer) -> AbstractContextManager[None]:
     return plugin_errors(offer.label, "it", passed=(ValueError, ImportError))
 
 
-def _offered(kind: Kind, chosen: "str | Callable[..., Any] | None") -> Offer:
-    assert chosen is not None
+def _offered(kind: Kind, chosen: str | Callable[..., Any]) -> Offer:
     if isinstance(chosen, str):
         return registry().offer(kind, chosen)
     frames: NextFrame = "carry" if hasattr(chosen, "advance") else "start"

@@ -37,7 +37,6 @@ TRIAL_STRIDE = 3  # frames between these, so that they show which way the person
 TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
 WALKED = 0.3  # metres; a person who goes so far in the trial goes where they face
 BACKWARDS_PENALTY = 1.1  # on the cost of a restart that walks backwards
-GAP = 5  # frames without the person after which a track relocalises: about a sixth of a second
 COST_RISE = 1.5  # times the typical cost of the track: costs above it are high
 TYPICAL_COST_SECONDS = 1.0  # of frames that show the typical cost
 HIGH_COST_SECONDS = 0.5  # for which costs are high before a track relocalises
@@ -46,7 +45,7 @@ SPIN_TOLERANCE = 1.5  # a track without spins that costs more is wrong: the pers
 MAX_TURN_RATE = np.radians(450.0)  # a second: the fastest that a person turns on the spot
 SPIN_SECONDS = 0.1
 SPIN_ANGLE = np.radians(60.0)  # within that time: more is no turn of a person, even in a smoothed track
-SURE_SECONDS = 0.5  # from the ends of what is without spins, where it goes on from
+END_SECONDS = 0.5  # from the ends of what is without spins, where it goes on from
 VOTES_PER_SECOND = 30.0
 EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
 SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
@@ -160,7 +159,7 @@ def after(task: Task, frame: Frame) -> Task:
 
 
 def relocalised(
-    task: Task, follow: Follow, observations: Iterable[Observation], rng: np.random.Generator, gap: int = GAP
+    task: Task, follow: Follow, observations: Iterable[Observation], rng: np.random.Generator, gap: int
 ) -> Iterator[Frame]:
     """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
 
@@ -224,11 +223,11 @@ def initial_guess(number: int, task: Task, yaw: float | None, pose_known: bool, 
     It starts around a pose whose silhouette is like that of the frame, or searches as the first one did. Poses that
     face elsewhere than the known `yaw` are left out; where the first pose is known, only seeds differ.
     """
-    towards = facing(task.cameras[0], first.translation)
+    camera_yaw = facing(task.cameras[0], first.translation)
     skeleton, pose = task.body.skeleton, first.pose[None]
     poses = {
         "mirrored": mirrored_poses(skeleton, pose)[0],
-        "reflected": reflected_poses(skeleton, pose, towards)[0],
+        "reflected": reflected_poses(skeleton, pose, camera_yaw)[0],
         "legs exchanged": exchanged_limbs(skeleton, pose, "legs")[0],
         "turned": turned_poses(pose)[0],
         "arms exchanged": exchanged_limbs(skeleton, pose, "arms")[0],
@@ -252,7 +251,7 @@ def retrack_spins(
 ) -> Tracked:
     """Return a track without spins, whose `stay` is the first and last frame of those that stay; None where all do.
 
-    Those are of the longest run that faces as most frames do, see `facing_consensus`, between its surest ends. The
+    Those are of the longest run that faces as most frames do, see `facing_consensus`, between its best ends. The
     person is followed onward from the last, and backwards from the first by training motions in reverse. The old track
     is kept where the new one spins as often, or costs half as much again. Frames that are tracked again have the effort
     of both tracks.
@@ -266,15 +265,15 @@ def retrack_spins(
     every = runs(facing_consensus(frames, task.cameras, usable, task.fps)) if before else []
     if not every:
         return tracked
-    first, last = stay = surest_ends(frames, *max(every, key=lambda run: run[1] - run[0]), task.fps)
+    first, last = stay = best_ends(frames, *max(every, key=lambda run: run[1] - run[0]), task.fps)
     steady = replace(task, fastest_turn=MAX_TURN_RATE)
 
     def again(number: int, steady: Task, rows: range) -> list[Frame]:
         """Return the frames after the first of some rows, followed from there."""
         if len(rows) == 1:
             return []
-        begun = replace(after(steady, frames[rows[0]]), before=())
-        followed = list(follow(begun, (observations[k] for k in rows), stream(seed, "spin", number)))
+        start = replace(after(steady, frames[rows[0]]), before=())
+        followed = list(follow(start, (observations[k] for k in rows), stream(seed, "spin", number)))
         return joined(task.body.skeleton, followed, frames[rows[0]])[1:]
 
     ahead = again(0, steady, range(last, len(frames)))
@@ -337,10 +336,10 @@ def facing_consensus(
         return agrees
     voters = [frames[k] for k in rows.tolist()]
     views = np.array([frame.areas.any(axis=1) for frame in voters])
-    towards = [
+    camera_yaws = [
         facing(cameras[int(seeing.argmax())], frame.translation) for frame, seeing in zip(voters, views, strict=True)
     ]
-    both = np.column_stack([yaws[rows], 2.0 * np.array(towards) + np.pi - yaws[rows]])
+    both = np.column_stack([yaws[rows], 2.0 * np.array(camera_yaws) + np.pi - yaws[rows]])
     against = np.column_stack([np.zeros(len(rows)), views.sum(axis=1) * VOTES_PER_SECOND / fps])
     totals, parents = against[0], np.zeros((len(rows), 2), dtype=np.int64)
     for k in range(1, len(rows)):
@@ -356,15 +355,15 @@ def facing_consensus(
     return agrees
 
 
-def surest_ends(frames: Sequence[Frame], start: int, stop: int, fps: float) -> tuple[int, int]:
+def best_ends(frames: Sequence[Frame], start: int, stop: int, fps: float) -> tuple[int, int]:
     """Return a frame near the beginning of a run, and one near its end: the best that most cameras see.
 
-    The first and the last of all frames need not be sure, as nothing goes on from there.
+    The first and the last of all frames need not be good, as nothing goes on from there.
     """
-    near = min(max(round(SURE_SECONDS * fps), 1), (stop - start + 1) // 2)
+    near = min(max(round(END_SECONDS * fps), 1), (stop - start + 1) // 2)
 
-    def surest(rows: range) -> int:
+    def best(rows: range) -> int:
         return min(rows, key=lambda k: (-int(frames[k].areas.any(axis=1).sum()), frames[k].cost))
 
-    first = surest(range(start, start + near)) if start else 0
-    return first, surest(range(stop - 1, stop - 1 - near, -1)) if stop < len(frames) else stop - 1
+    first = best(range(start, start + near)) if start else 0
+    return first, best(range(stop - 1, stop - 1 - near, -1)) if stop < len(frames) else stop - 1

@@ -21,7 +21,6 @@ from posefit.evaluation.measures import Measures
 from posefit.evaluation.trust import Trust
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
-from posefit.geometry.body import Body
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
@@ -250,19 +249,9 @@ class Fit:
         return float(self.track.table["iou"][self.k])
 
     @property
-    def trace(self) -> Array:
-        """The evaluations so far and the best cost (populations, 2), after each population of the search."""
-        return self.frame.trace
-
-    @property
     def summary(self) -> dict[str, Any]:
         """The summary of its track."""
         return self.track.summary
-
-    @property
-    def body(self) -> Body:
-        """The body that was fitted."""
-        return self.track.scene.body
 
     @property
     def joints(self) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.driving import with_evaluations
-from posefit.fitting.tracker import Frame
+from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton, root_centred
 from posefit.motion.motion import Motion
@@ -25,7 +25,15 @@ TURN_AROUND_SPEED = 2.0  # typical speeds, which a joint's velocity changes by w
 JUMP_SPEED = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
 
 
-Hypothesis = tuple[str, list[Frame]]  # a track from one initial guess, and what that is called
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A track from one initial guess: what that is called, what is known at the start, and the frames so far."""
+
+    guess: str
+    task: Task
+    rng: np.random.Generator
+    back_rng: np.random.Generator  # of what is followed back in time
+    frames: Sequence[Frame] = ()
 
 
 class Tracked(NamedTuple):
@@ -56,38 +64,34 @@ def mean_cost(frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float:
     return float(costs[usable].mean() if usable.any() else costs.mean())
 
 
-def effort_of(frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return the evaluations and the time of several frames together."""
-    return {name: sum(getattr(frame, name) for frame in frames) for name in ("evaluations", "seconds", "cpu_seconds")}
-
-
 def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
     """Return a frame with the evaluations and the time of several together.
 
     The course of its search is given as if all went on abreast: its evaluations are stretched to those of all.
     """
-    effort = effort_of(together)
-    return replace(with_evaluations(frame, effort.pop("evaluations")), **effort)
+    seconds, cpu_seconds = (sum(getattr(each, name) for each in together) for name in ("seconds", "cpu_seconds"))
+    frame = with_evaluations(frame, sum(each.evaluations for each in together))
+    return replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
 
 
-def with_total_effort(tracks: Sequence[Sequence[Frame]], kept: int) -> list[Frame]:
+def with_total_effort(tracks: Sequence[Sequence[Frame]], best: int) -> list[Frame]:
     """Return the frames of the track that is kept, with the evaluations and the time of all tracks."""
-    return [with_effort_of(together[kept], together) for together in zip(*tracks, strict=True)]
+    return [with_effort_of(together[best], together) for together in zip(*tracks, strict=True)]
 
 
 def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]) -> Tracked:
     """Return the hypothesis whose trajectory costs least."""
     if len(hypotheses) == 1:
-        return Tracked(hypotheses[0][1], [])
+        return Tracked(list(hypotheses[0].frames), [])
     usable, speed = [observation.usable for observation in scene.observations], typical_speed(training)
-    tracks = [frames for _, frames in hypotheses]
+    tracks = [hypothesis.frames for hypothesis in hypotheses]
     costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
-    kept = min(range(len(costs)), key=lambda k: costs[k].total)
+    best = min(range(len(costs)), key=lambda k: costs[k].total)
     table = [
-        {"guess": guess, "cost": cost.cost, "motion": cost.motion, "kept": k == kept}
-        for k, ((guess, _), cost) in enumerate(zip(hypotheses, costs, strict=True))
+        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == best}
+        for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
     ]
-    return Tracked(with_total_effort(tracks, kept), table)
+    return Tracked(with_total_effort(tracks, best), table)
 
 
 def typical_speed(training: Sequence[Motion]) -> float:

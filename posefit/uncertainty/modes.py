@@ -146,12 +146,12 @@ def clusters_of(distances: Array, weights: Array, apart: float) -> list[tuple[fl
     joins its nearest centre.
     """
     near = distances <= apart
-    left = weights > 0.0
+    remaining = weights > 0.0
     centres: list[int] = []
-    while left.any():
-        about = np.where(left, near @ np.where(left, weights, 0.0), -1.0)
+    while remaining.any():
+        about = np.where(remaining, near @ np.where(remaining, weights, 0.0), -1.0)
         centres.append(int(about.argmax()))
-        left &= ~near[centres[-1]]
+        remaining &= ~near[centres[-1]]
     owners = distances[:, centres].argmin(axis=1)
     clusters = []
     for k in range(len(centres)):

@@ -122,7 +122,7 @@ def test_fit_finds_the_pose_of_one_frame(tmp_path: Path) -> None:
     assert summary["frames"] == 1
     fit = posefit.fit("walk", frame=7, evaluations=50, size=(120, 90))
     np.testing.assert_allclose(np.degrees(fit.pose), summary["pose_degrees"], atol=1e-5)
-    assert fit.trace.shape[1] == 2
+    assert fit.frame.trace.shape[1] == 2
 
 
 def test_a_folder_does_not_hide_a_built_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -207,7 +207,9 @@ def test_an_existing_folder_is_kept_unless_forced(tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(out)
     force = ["track", "walk", "--frames", "0:2", "--force", *QUICK, "--out"]
-    assert "link: expected a folder to write to, got a link" in error_of(*force, link)
+    (tmp_path / "nowhere").symlink_to(tmp_path / "nothing")
+    for path in (link, tmp_path / "nowhere"):
+        assert f"{path.name}: expected a folder to write to, got a link" in error_of(*force, path)
     before = sorted(path.name for path in out.iterdir())
     (out / "precious.txt").write_text("mine")
     assert "got one with precious.txt, which is none of posefit's" in error_of(*force, out)
@@ -365,6 +367,8 @@ def test_an_unknown_command_names_the_nearest_wherever_it_is() -> None:
         (["plugins", "check"], "check", "posefit check"),
         (["plugins", "docter"], "docter", "posefit plugins doctor"),
         (["suite", "rn"], "rn", "posefit suite run"),
+        (["optimizers"], "optimizers", "posefit plugins"),
+        (["segmenter"], "segmenter", "posefit plugins"),
     ):
         assert error_of(*words) == f"posefit: No such command {name!r}; did you mean {path!r}?"
     assert error_of("zebra") == "posefit: No such command 'zebra'"

@@ -91,7 +91,7 @@ def test_hypotheses_are_as_many_as_the_budget_allows(walker: Walk) -> None:
     few, many = (ExemplarTracker(replace(walker.task, evaluations=evaluations)) for evaluations in (2440, BUDGET))
     assert few.hypotheses is not None
     assert many.hypotheses is not None
-    assert few.hypotheses.diverse_count(1) < many.hypotheses.diverse_count(1)
-    assert many.hypotheses.diverse_count(4) < many.hypotheses.diverse_count(1)  # several cameras leave less open
+    assert few.hypotheses.counts(1).diverse < many.hypotheses.counts(1).diverse
+    assert many.hypotheses.counts(4).diverse < many.hypotheses.counts(1).diverse  # several cameras leave less open
     assert ExemplarTracker(replace(walker.task, evaluations=600)).hypotheses is None  # too few: the path alone
     assert ExemplarTracker(walker.task, fitted=False).hypotheses is None

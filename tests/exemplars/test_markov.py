@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit_exemplars.lost_model import reported
 from posefit_exemplars.markov import FrameStates, SampledPaths, frame_states, mean_near, state_weights
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
 from posefit_exemplars.tracker import SIMILAR_DISTANCE, state_distances
@@ -94,9 +95,9 @@ def test_a_steady_movement_stays_in_its_order(ahead: int) -> None:
     assert len(frames) == 15
     for k, frame in enumerate(frames):
         np.testing.assert_allclose(frame.pose, 0.05 * k, atol=1e-12)
-        np.testing.assert_allclose(frame.translation, [0.1 * k, 1.0, -k], atol=1e-12)
-        assert frame.evaluations == 12  # 10.4 rounded up, and the reported one
-        assert frame.cost == pytest.approx(0.1 * k)  # of the smoothed pose
+        np.testing.assert_allclose(frame.place, [0.1 * k, 1.0, -k], atol=1e-12)
+        assert reported(frame).evaluations == 12  # 10.4 rounded up, and the reported one
+        assert reported(frame).cost == pytest.approx(0.1 * k)  # of the smoothed pose
 
 
 def test_a_turn_past_the_half_circle_stays_steady() -> None:
@@ -124,6 +125,6 @@ def test_estimates_are_unchanged_where_nothing_is_smoothed_and_a_known_root_alwa
     rough = [estimate(rng.normal(size=66), rng.normal(size=3), Costs(np.zeros(3))) for _ in range(6)]
     for spread, ahead in ((2.0, 0), (0.0, 3), (2.0, 2)):
         for before, frame in zip(rough, smoothed(rough, spread, ahead), strict=True):
-            np.testing.assert_array_equal(frame.translation, before.place)
+            np.testing.assert_array_equal(frame.place, before.place)
             if spread * ahead == 0.0:
                 np.testing.assert_array_equal(frame.pose, before.pose)

@@ -127,6 +127,38 @@ def test_aligning_recovers_the_true_translation(problem: PoseProblem) -> None:
         assert abs(camera.rotation[2] @ off) < 0.15  # depth
 
 
+def slowly_aligned(cameras: list[Camera], silhouettes: list[Silhouette], joints: Array, place: Array) -> Array:
+    """Return what `align` does for one pose: joints (27, 3), the root at the origin."""
+    radii = BODY.joint_radii()
+    for _ in range(3):
+        rows, values = [*1e-6 * np.eye(3)], [*1e-6 * place]
+        for camera, silhouette in zip(cameras, silhouettes, strict=True):
+            turn, scale = camera.rotation, np.sqrt(camera.focal.prod())
+            points, still = ((joints + at) @ turn.T + camera.translation for at in (place, np.zeros(3)))
+            pixels = camera.focal * points[:, :2] / points[:, 2:]
+            for side, border in enumerate(silhouette.extent):  # left, top, right, bottom
+                axis, sign, b = side % 2, np.sign(side - 1.5), border - camera.centre[side % 2]
+                if np.isnan(b):
+                    continue
+                f, j = camera.focal[axis], int((sign * pixels[:, axis] + scale * radii / points[:, 2]).argmax())
+                rows.append((f * turn[axis] - b * turn[2]) / scale)
+                values.append((b * still[j, 2] - f * still[j, axis]) / scale - sign * radii[j])
+        place = np.linalg.lstsq(np.array(rows), np.array(values))[0]
+    return place
+
+
+@each("azimuths", [(0.8,), (0.3, 1.9)])
+def test_aligning_near_a_camera_is_that_of_a_slow_twin(azimuths: tuple[float, ...]) -> None:
+    # so near that a joint's depth decides which one is outermost
+    cameras = [Camera.around(WALK.translations[0], angle, 1.5, (160, 120), field_of_view=1.9) for angle in azimuths]
+    poses, places = WALK.poses[::3], WALK.translations[::3]
+    silhouettes = [Silhouette.of(project(BODY, camera, poses[0], places[0])) for camera in cameras]
+    aligned = align(BODY, cameras, silhouettes, poses, places + [0.15, -0.1, 0.2])
+    for place, pose, start in zip(aligned, poses, places + [0.15, -0.1, 0.2], strict=True):
+        expected = slowly_aligned(cameras, silhouettes, WALK.skeleton.joints(pose), start)
+        np.testing.assert_allclose(place, expected, atol=1e-5)
+
+
 def test_a_problem_can_be_pickled(problem: PoseProblem) -> None:
     copied, proposals = pickle.loads(pickle.dumps(problem)), drawn(problem, 5)
     np.testing.assert_array_equal(copied.evaluate(proposals), problem.evaluate(proposals))

@@ -18,6 +18,7 @@ from posefit.silhouette.cost import project
 
 SIZE = (160, 120)
 NOBODY = np.zeros((SIZE[1], SIZE[0]), dtype=bool)
+ALL = (None, None)  # frames
 EMPTY, FRAMES = 12, 48  # frames without a person, then frames of a walk across
 
 
@@ -59,6 +60,12 @@ def film(path: Path, masks: list[Any]) -> Path:
         writer.write(np.clip(image, 0, 255).astype(np.uint8))
     writer.release()
     return path
+
+
+@pytest.fixture(scope="session", name="walk")
+def six_masks() -> list[Any]:
+    """Six masks of a person who walks."""
+    return truth()[10:16]
 
 
 @pytest.fixture(scope="session")

@@ -130,6 +130,7 @@ def test_the_command_prints_a_summary(filmed: tuple[Path, list[Any]], tmp_path: 
     summary = json.loads(result.stdout)
     assert summary["frames"] == 20
     assert summary["size"] == [160, 120]
+    assert summary["guesses"] == []
     smaller = run(
         "extract", filmed[0], "--out", tmp_path / "two", "--frames", "20:40", "--width", "80", "--roi", "0,0,160,120"
     )
@@ -251,6 +252,27 @@ def test_even_times_leave_a_video_as_it_was(tmp_path: Path) -> None:
 def test_a_very_short_frame_does_not_make_thousands(tmp_path: Path) -> None:
     video = grey(tmp_path / "a.mkv", [0, 1, 2, 3, 400, 800, 1200])
     assert video.count() <= 4 * 7
+
+
+def test_a_rate_that_a_video_does_not_state_is_guessed_aloud(
+    filmed: tuple[Path, list[Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = cv2.VideoCapture
+
+    class Timeless:
+        def __init__(self, name: str) -> None:
+            self.file = opened(name)
+
+        def get(self, key: int) -> float:
+            return 0.0 if key in (cv2.CAP_PROP_FPS, cv2.CAP_PROP_POS_MSEC) else float(self.file.get(key))
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.file, name)
+
+    monkeypatch.setattr(cv2, "VideoCapture", Timeless)
+    result = run("extract", filmed[0], "--frames", "20:40", "--out", tmp_path / "out")
+    assert f"guessed: {filmed[0]}: 30 frames a second, which the file does not state" in result.stderr
+    assert arrays(tmp_path / "out" / "masks.npz")["fps"] == 30.0
 
 
 def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:

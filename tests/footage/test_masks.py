@@ -23,16 +23,9 @@ from posefit.footage.source import body_of, scene_of
 from posefit.tracking.front import track
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.footage.conftest import SIZE, camera, truth
+from tests.footage.conftest import ALL, SIZE, camera
 
-ALL = (None, None)
 QUICK = ["--method", "@loose", "--evaluations", "200", "--restarts", "1", "--body-frames", "0", "--view-degrees", "90"]
-
-
-@pytest.fixture(scope="module")
-def walk() -> list[Any]:
-    """Six masks of a person who walks."""
-    return truth()[10:16]
 
 
 def folder(path: Path, images: Sequence[Any], suffix: str = ".png") -> Path:
@@ -377,7 +370,7 @@ def test_a_picture_of_too_many_pixels_is_refused_before_it_is_unpacked(
     for side, came in ((8_000, "8000x8000"), (12_000, "12000x12000"), (30_000, "far more")):
         bomb(tmp_path / "a.png", side)
         with pytest.raises(ValueError, match=f"a.png: expected at most 50 million pixels, got {came}"):
-            read_masks(tmp_path, (None, None))
+            read_masks(tmp_path, ALL)
 
 
 def test_a_chunk_that_says_it_has_more_than_the_file_is_refused(tmp_path: Path) -> None:
@@ -424,7 +417,7 @@ def test_a_palette_is_the_files_own(tmp_path: Path) -> None:
     note = PngInfo()
     note.add_text("a", "PLTE")  # which stands before the palette
     image.save(tmp_path / "a.png", pnginfo=note)
-    np.testing.assert_array_equal(read_masks(tmp_path, (None, None)).silhouette(0).mask, np.eye(9, dtype=bool))
+    np.testing.assert_array_equal(read_masks(tmp_path, ALL).silhouette(0).mask, np.eye(9, dtype=bool))
 
 
 def test_masks_that_unpack_to_too_much_are_refused_by_their_shape(
@@ -441,14 +434,14 @@ def test_masks_that_unpack_to_too_much_are_refused_by_their_shape(
     for path in (folder, tmp_path / "a.npz", tmp_path / "a.npy"):
         monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{stack.nbytes / 1e9 - 1e-9:.9f}")
         with pytest.raises(ValueError, match=f"{path.name}: expected masks that unpack to at most .* GB, got "):
-            read_masks(path, (None, None))
+            read_masks(path, ALL)
         monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", f"{stack.nbytes / 1e9:.9f}")
-        assert len(read_masks(path, (None, None))) == 4
+        assert len(read_masks(path, ALL)) == 4
     monkeypatch.setenv("POSEFIT_DECODED_GIGABYTES", "lots")
     with pytest.raises(ValueError, match="POSEFIT_DECODED_GIGABYTES must be a number, got 'lots'"):
-        read_masks(folder, (None, None))
+        read_masks(folder, ALL)
     with pytest.raises(ValueError, match="masks: expected at most 50 million pixels a frame, got 10000x6000"):
-        read_masks(np.broadcast_to(np.False_, (1, 6_000, 10_000)), (None, None))
+        read_masks(np.broadcast_to(np.False_, (1, 6_000, 10_000)), ALL)
 
 
 def test_masks_are_kept_as_bits_and_chosen_frames_alone(tmp_path: Path) -> None:

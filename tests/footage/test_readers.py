@@ -13,15 +13,7 @@ from posefit.footage.readers import numbered, read_masks
 from posefit.footage.source import kind_of, scene_of
 from posefit.progress import Progress
 from tests.cases import each
-from tests.footage.conftest import truth
-
-ALL = (None, None)
-
-
-@pytest.fixture(scope="module")
-def walk() -> list[Any]:
-    """Six masks of a person who walks."""
-    return truth()[10:16]
+from tests.footage.conftest import ALL
 
 
 def drawn(walk: list[Any], value: int = 255) -> list[Any]:

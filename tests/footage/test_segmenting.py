@@ -75,12 +75,7 @@ def test_a_person_who_is_always_there_is_refused_before_any_tracking(
     ],
 )
 def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_the_person_out(
-    films: dict[str, Any],
-    kind: Kind,
-    cameras: int,
-    network: str,
-    used: str | None,
-    monkeypatch: pytest.MonkeyPatch,
+    films: dict[str, Any], kind: Kind, cameras: int, network: str, used: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, true = films[kind]
 

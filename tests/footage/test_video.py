@@ -145,11 +145,6 @@ def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(
     assert b"expected a name in UTF-8" in done.stderr.splitlines()[-1]
 
 
-def test_a_link_that_leads_nowhere_is_no_place_to_write_to(tmp_path: Path) -> None:
-    (tmp_path / "out").symlink_to(tmp_path / "nothing")
-    assert "out: expected a folder to write to, got a link" in error_of("track", "walk", "--out", tmp_path / "out")
-
-
 def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
     """Write the frames of a film as pictures with these numbers, and return their folder."""
     folder.mkdir()

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import select
 import subprocess
 import sys
@@ -10,8 +11,10 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 
-SECONDS = 10.0  # for an input
+SECONDS = 10.0  # of CPU time for an input, as a busy machine gives a process little of it
+WAIT = 300.0  # seconds of the clock, for what does not run at all
 STARTING = 120.0  # seconds for a child to import everything and read the valid files
 MEGABYTES = 1_000  # of a child's memory, with everything that it has imported
 
@@ -50,15 +53,15 @@ def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
         command = [sys.executable, "-m", "tests.fuzz.worker", str(seed), str(start), str(numbers.stop), kinds]
         with subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0) as child:
             assert child.stdout is not None
-            number, since, patience = start, time.monotonic(), STARTING
-            while ready := select.select([child.stdout], [], [], patience)[0]:
+            number, since, patience = start, 0.0, STARTING
+            while ready := _is_heard(child, since + patience):
                 line = child.stdout.readline().decode()
                 if not line:
                     break
                 if line.endswith("begun\n"):
-                    number, since, patience = int(line.split()[0]), time.monotonic(), SECONDS
+                    number, since, patience = int(line.split()[0]), cpu_seconds(child.pid), SECONDS
                 else:
-                    tally.add(number, json.loads(line.partition(" ")[2]), time.monotonic() - since)
+                    tally.add(number, json.loads(line.partition(" ")[2]), cpu_seconds(child.pid) - since)
             if not ready:
                 child.kill()
                 tally.find(f"{number} hang: more than {SECONDS:g} s")
@@ -69,6 +72,21 @@ def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
             else:
                 return
             start = number + 1
+
+
+def cpu_seconds(process: int) -> float:
+    """Return how much CPU time a process has taken."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _is_heard(child: "subprocess.Popen[bytes]", most: float) -> bool:
+    """Return whether a child says something before it has taken so much CPU time, or not run for `WAIT`."""
+    end = time.monotonic() + WAIT
+    while not select.select([child.stdout], [], [], 1.0)[0]:
+        if cpu_seconds(child.pid) > most or time.monotonic() > end:
+            return False
+    return True
 
 
 def main() -> int:

@@ -17,10 +17,6 @@ from posefit.motion.amc import write_amc
 from posefit.motion.asf import write_asf
 from posefit.motion.bvh import write_bvh
 from posefit.silhouette.cost import project
-from posefit_priors.full import Full
-from posefit_priors.loose import Loose
-from posefit_priors.pca import PCA
-from posefit_priors.sklearn import Transformed
 from tests.footage.matroska import write_matroska
 from tests.fuzz.written import written
 from tests.geometry.calibrations import EXTRI, KINDS, QUALISYS, TOML, opencv
@@ -71,14 +67,6 @@ def corpus(folder: Path) -> list[Seed]:
             seeds.append(_npz("masks", save, masks=stack, valid=~masks, usable=usable, fps=np.array(30.0)))
     seeds += [Seed("images", suffix, _image(masks[0], suffix)) for suffix in (".png", ".jpg", ".bmp", ".tif", ".pgm")]
     seeds += [Seed("images", suffix, _pages(masks, suffix)) for suffix in (".gif", ".webp", ".tif")]
-    angles = np.concatenate([built_in.motion(name).poses[:, 3:] for name in built_in.other_styles("walk")])
-    for prior in (PCA, Full, Loose):
-        path = folder / "prior.npz"
-        prior().fit(angles, motion.skeleton).save(path)
-        seeds.append(Seed(prior.__name__, ".npz", path.read_bytes()))
-    for variant in ("PCA", "KernelPCA", "FactorAnalysis"):
-        Transformed(variant=variant).fit(angles[:40]).save(path)
-        seeds.append(Seed("Transformed", ".npz", path.read_bytes()))
     pictures = [np.where(mask, 255, 0).astype(np.uint8)[..., None].repeat(3, axis=2) for mask in masks]
     for suffix in (".mp4", ".avi"):
         with VideoWriter(folder / f"video{suffix}", 30.0, (64, 48)) as writer:

@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 from tests.fuzz import written
 from tests.fuzz.corpus import Seed, corpus
@@ -37,10 +36,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
     from posefit.motion.asf import read_asf
     from posefit.motion.bvh import read_bvh
     from posefit.sweep import plan
-    from posefit_priors.full import Full
-    from posefit_priors.loose import Loose
-    from posefit_priors.pca import PCA
-    from posefit_priors.sklearn import Transformed
 
     skeleton = read_asf(folder / "a.asf")
     plan.MAX_CELLS = CELLS
@@ -65,13 +60,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         filmed = Video.of(path)
         return filmed.warnings, [image.mean() for image in islice(filmed.frames(0, None, (64, 48)), 20)]
 
-    def prior(kind: Any) -> Callable[[Path], object]:
-        def load(path: Path) -> object:
-            learned = kind.load(path)
-            return learned.inverse_transform(learned.low[None]), learned.feasible(learned.low[None])
-
-        return load
-
     return {
         "asf": read_asf,
         "amc": lambda path: read_amc(path, skeleton).resampled(30.0),
@@ -82,7 +70,6 @@ def readers(folder: Path) -> dict[str, Callable[[Path], object]]:
         "video": video,
         "plan": plan.Plan.read,
         **written.readers(),
-        **{kind.__name__: prior(kind) for kind in (PCA, Full, Loose, Transformed)},
     }
 
 

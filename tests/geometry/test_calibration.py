@@ -24,6 +24,7 @@ from tests.geometry.calibrations import (
     matrix_text,
     opencv,
 )
+from tests.geometry.turns import about
 
 
 def written(tmp_path: Path, name: str) -> Path:
@@ -297,6 +298,11 @@ def test_up_that_is_named_holds_for_our_own_cameras_and_a_guess_is_reported(tmp_
         == "+y is up in the cameras' world, as posefit's own files have it, though z is in their images"
     )
     np.testing.assert_allclose(one.camera((320, 240), upright([one], "z")).rotation, level.rotation, atol=1e-9)
+    for degrees, doubted in ((55.0, False), (65.0, True)):  # of which the cosines are 0.57 and 0.42
+        down = replace(level, rotation=about(0, np.radians(degrees)) @ level.rotation)
+        (tmp_path / "a.json").write_text(down.to_json())
+        for count in (1, 3):
+            assert bool(guessed_up(count * read_calibrations(tmp_path / "a.json"))) == doubted
     (tmp_path / "a.json").write_text(level.to_json())
     assert guessed_up(read_calibrations(tmp_path / "a.json")) == ""
     assert guessed_up(read_calibrations(written(tmp_path, "a.toml"))) == "+z is up in the cameras' world"

@@ -18,39 +18,22 @@ from posefit.measuring.segments import bone_rotations
 from posefit.motion.motion import Motion
 from tests.geometry.turns import about
 
-AT = {  # where each bone of a rig starts: after which of posefit's joints
-    "hips": "root",
-    "thigh": "{}hipjoint",
-    "shin": "{}femur",
-    "foot": "{}tibia",
-    "toe": "{}foot",
-    "spine": "root",
-    "spine1": "lowerback",
-    "chest": "upperback",
-    "neck": "thorax",
-    "neck1": "lowerneck",
-    "head": "upperneck",
-    "clavicle": "thorax",
-    "arm": "{}clavicle",
-    "forearm": "{}humerus",
-    "hand": "{}radius",
-}
-TURNS = {  # which of posefit's bones a rig's joint turns as
-    "hips": "root",
-    "thigh": "{}femur",
-    "shin": "{}tibia",
-    "foot": "{}foot",
-    "toe": "{}toes",
-    "spine": "lowerback",
-    "spine1": "upperback",
-    "chest": "thorax",
-    "neck": "lowerneck",
-    "neck1": "upperneck",
-    "head": "upperneck",
-    "clavicle": "{}clavicle",
-    "arm": "{}humerus",
-    "forearm": "{}radius",
-    "hand": "{}wrist",
+BONES = {  # of each joint of a rig: after which of posefit's joints its bone starts, and which bone it turns as
+    "hips": ("root", "root"),
+    "thigh": ("{}hipjoint", "{}femur"),
+    "shin": ("{}femur", "{}tibia"),
+    "foot": ("{}tibia", "{}foot"),
+    "toe": ("{}foot", "{}toes"),
+    "spine": ("root", "lowerback"),
+    "spine1": ("lowerback", "upperback"),
+    "chest": ("upperback", "thorax"),
+    "neck": ("thorax", "lowerneck"),
+    "neck1": ("lowerneck", "upperneck"),
+    "head": ("upperneck", "upperneck"),
+    "clavicle": ("thorax", "{}clavicle"),
+    "arm": ("{}clavicle", "{}humerus"),
+    "forearm": ("{}humerus", "{}radius"),
+    "hand": ("{}radius", "{}wrist"),
 }
 LEG = ("thigh", "shin", "foot", "toe")
 ARM = ("clavicle", "arm", "forearm", "hand")
@@ -167,7 +150,7 @@ def joint_after(role: str, style: Style) -> str:
     """Return after which of posefit's joints a role's joint is where a rig has fewer of neck and spine than posefit."""
     if role == "head" and "neck1" not in style.names:
         return "lowerneck"
-    return "lowerback" if role == "chest" and "spine1" not in style.names else AT[role]
+    return "lowerback" if role == "chest" and "spine1" not in style.names else BONES[role][0]
 
 
 @dataclass
@@ -195,7 +178,7 @@ def write_rig(
 
     def add(role: str, side: str, parent: int) -> int:
         letter = side[:1].lower()
-        starts, turning = (JOINTS.index(name.format(letter)) for name in (joint_after(role, style), TURNS[role]))
+        starts, turning = (JOINTS.index(name.format(letter)) for name in (joint_after(role, style), BONES[role][1]))
         axes = _axes(rest, role, skeleton.offsets[turning - 1])
         joints.append(
             _Joint(side + role, style.names[role].format(side), parent, turns[:, turning], at_rest[starts], axes)
@@ -273,7 +256,7 @@ def write_rig(
 
 
 def places_of(path: Path) -> dict[str, Array]:
-    """Return where the joints of a file are (T, 3) in its own unit and world, by name."""
+    """Return where the joints of a file are (T, 3) in its own unit and world, by name; an End Site is its `NAME end`."""
     head, table = path.read_text().split("MOTION\n")
     rows = np.array([line.split() for line in table.splitlines()[2:]], dtype=np.float64)
     places: dict[str, Array] = {}
@@ -281,13 +264,14 @@ def places_of(path: Path) -> dict[str, Array]:
     name, offset, column = "", np.zeros(3), 0
     for words in map(str.split, head.splitlines()):
         if words[0] in ("ROOT", "JOINT", "End"):
-            name = "" if words[0] == "End" else " ".join(words[1:])
+            name = f"{name} end" if words[0] == "End" else " ".join(words[1:])
         elif words[0] == "OFFSET":
             offset = np.array(words[1:], dtype=np.float64)
-            if not name:
+            if name.endswith(" end"):
+                places[name] = stack[-1][0] + stack[-1][1] @ offset
                 stack.append(stack[-1])
         elif words[0] == "CHANNELS":
-            above, turn = stack[-1]
+            start, turn = stack[-1]
             moved = np.tile(offset, (len(rows), 1))
             for channel in words[2:]:
                 axis, values = "XYZ".index(channel[0]), rows[:, column]
@@ -296,7 +280,7 @@ def places_of(path: Path) -> dict[str, Array]:
                     moved[:, axis] = values
                 else:
                     turn = turn @ np.array([about(axis, angle) for angle in np.radians(values)])
-            places[name] = above + np.einsum("tij,tj->ti", stack[-1][1], moved)
+            places[name] = start + np.einsum("tij,tj->ti", stack[-1][1], moved)
             stack.append((places[name], turn))
         elif words[0] == "}":
             stack.pop()

@@ -26,14 +26,15 @@ LIBRARIES = {
 
 
 def test_an_absent_library_is_named_with_the_extra_to_install() -> None:
-    for name, library in LIBRARIES.items():
-        (plugin,) = load([EntryPoint(name, f"posefit_{name}", "posefit")])
-        assert [offer.needs for offer in plugin.offers] == [(library, f"posefit[{name}]")]
-        absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{name}]")) for offer in plugin.offers)
-        kind = plugin.offers[0].kind
-        message = rf"{kind} {name} needs the library .* 'posefit\[{name}\]'"
-        with pytest.raises(ImportError, match=message):
-            Registry((plugin._replace(offers=absent),)).offer(kind, name)
+    plugins = load([EntryPoint(name, f"posefit_{name}", "posefit") for name in ("bridges", "mediapipe")])
+    needs = {offer.name: offer.needs for plugin in plugins for offer in plugin.offers if offer.needs}
+    assert needs == {name: (library, f"posefit[{name}]") for name, library in LIBRARIES.items()}
+    for plugin in plugins:
+        absent = tuple(replace(offer, needs=("no_such_library", f"posefit[{offer.name}]")) for offer in plugin.offers)
+        for offer in absent:
+            message = rf"{offer.kind} {offer.name} needs the library .* 'posefit\[{offer.name}\]'"
+            with pytest.raises(ImportError, match=message):
+                Registry((plugin._replace(offers=absent),)).offer(offer.kind, offer.name)
 
 
 def test_listing_plugins_imports_none_of_their_libraries() -> None:

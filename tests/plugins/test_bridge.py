@@ -12,8 +12,8 @@ import pytest
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
-from posefit_nevergrad.adapter import GlobalRandom
-from posefit_scipy.adapter import Bridged
+from posefit_bridges.nevergrad import GlobalRandom
+from posefit_bridges.scipy import Bridged
 from tests.cases import each
 
 
@@ -34,7 +34,7 @@ def fails(space: Toy, rng: np.random.Generator, objective: Any) -> None:
 
 def bridges() -> set[threading.Thread]:
     gc.collect()
-    return {thread for thread in threading.enumerate() if thread.name == "posefit_scipy bridge"}
+    return {thread for thread in threading.enumerate() if thread.name == "posefit_bridges.scipy"}
 
 
 def test_a_library_is_asked_and_told_until_it_ends() -> None:

@@ -1,9 +1,6 @@
 """Problems in other tools: each tool's own loop and checker runs on them, with the costs and the trace of a plain loop."""
 
-import importlib.util
 import os
-import subprocess
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -34,7 +31,7 @@ def check(searched: Problem, proposals: Iterable[object], costs: Iterable[float]
 def test_a_study_of_optuna_has_the_trace_of_a_plain_loop() -> None:
     optuna = pytest.importorskip("optuna")
     pytest.importorskip("optunahub")
-    from posefit_bridges import optunahub_problem
+    from posefit_bridges.problems import optunahub_problem
 
     posed = optunahub_problem(problem())
     study = optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=0), directions=posed.directions)
@@ -58,7 +55,7 @@ def test_pymoo_minimises_with_the_trace_of_a_plain_loop() -> None:
     from pymoo.algorithms.soo.nonconvex.pso import PSO
     from pymoo.optimize import minimize
 
-    from posefit_bridges import pymoo_problem
+    from posefit_bridges.problems import pymoo_problem
 
     seen: list[tuple[np.ndarray, np.ndarray]] = []
     posed = pymoo_problem(problem())
@@ -72,7 +69,7 @@ def test_pymoo_minimises_with_the_trace_of_a_plain_loop() -> None:
 
 def test_an_optimiser_of_nevergrad_has_the_trace_of_a_plain_loop() -> None:
     nevergrad = pytest.importorskip("nevergrad")
-    from posefit_bridges import nevergrad_function
+    from posefit_bridges.problems import nevergrad_function
 
     posed = nevergrad_function(1, 10_000, 9).copy()
     posed.parametrization.random_state = np.random.RandomState(0)
@@ -82,19 +79,3 @@ def test_an_optimiser_of_nevergrad_has_the_trace_of_a_plain_loop() -> None:
     check(posed.problem, [x for x, _ in seen], [cost for _, cost in seen])
     assert posed.copy().problem.evaluations == 0  # an experiment's copy counts for itself
     assert posed.descriptors["function"] == 1
-
-
-@pytest.mark.slow
-def test_nevergrads_benchmark_command_runs_the_plan_of_the_page(tmp_path: Path) -> None:
-    page = (ROOT / "docs" / "howto" / "bridges.md").read_text("utf-8")
-    for library in ("torchvision", "pyproj", "gym"):
-        if importlib.util.find_spec(library) is None:
-            pytest.skip(f"no {library}, which nevergrad.benchmark imports")
-    plan = tmp_path / "plan.py"
-    plan.write_text(next(block for block in page.split("```python\n") if "registry" in block).split("```")[0], "utf-8")
-    command = ["-m", "nevergrad.benchmark", "posefit_suite", "--seed=1", "--cap_index=2", f"--imports={plan}"]
-    paths = os.pathsep.join((PATHS, os.environ.get("PYTHONPATH", "")))
-    subprocess.run([sys.executable, *command], cwd=tmp_path, env={**os.environ, "PYTHONPATH": paths}, check=True)
-    head, *rows = [line.split(",") for line in (tmp_path / "posefit_suite.csv").read_text("utf-8").splitlines()]
-    assert [row[head.index("error")] for row in rows] == ["", ""]
-    assert all(0.0 <= float(row[head.index("loss")]) < 40.0 for row in rows)

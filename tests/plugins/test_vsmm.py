@@ -113,7 +113,6 @@ def test_landmarks_bring_the_pose_nearer_though_a_detector_exchanges_legs(exchan
         poses = np.array([frame.pose for frame in follow(task, observations)])
         return float(joint_distances(motion.skeleton.joints(motion.poses), motion.skeleton.joints(poses)).mean())
 
-    print(error(given), error(observations))
     assert error(given) < 0.9 * error(observations)
 
 

@@ -11,21 +11,31 @@ import numpy as np
 import pytest
 
 from posefit.report import export
-from posefit.report.export import LoggedRun, latex, latex_table, write_csv, write_iohprofiler
+from posefit.report.export import latex, latex_table, write_csv, write_iohprofiler
+from posefit.suites.problem import TARGETS
+from posefit.suites.running import SuiteRun
 
 
-def run(method="sapso@pca", settings=None, problem="walk", dimension=9, instance=0, seed=0, evaluations=(1, 40, 80), costs=(90.0, 5.0, 2.5)):  # fmt: skip
-    return LoggedRun(method, settings or {}, problem, dimension, instance, seed, evaluations, costs)
+def run(method="sapso", settings=None, function=1, dimension=9, instance=0, seed=0, evaluations=(1, 40, 80), costs=(90.0, 5.0, 2.5)):  # fmt: skip
+    trace = np.array(evaluations, float), np.array(costs, float)
+    return SuiteRun("posefit-2026.3", method, settings or {}, function, dimension, instance, seed, 900, "repair", 0.0, TARGETS, *trace)  # fmt: skip
 
 
 def sweep():
-    """Return runs of three algorithms on two problems, three instances and two seeds, from random costs."""
+    """Return runs of three algorithms on two functions, three instances and two seeds, from random costs."""
     rng = np.random.default_rng(0)
-    algorithms = (("sapso@pca", {}), ("nevergrad:NGOpt@full", {}), ("sapso@pca", {"cooling": 0.9}))
-    problems = (("walk, view 45", 9), ("jacks/holes", 12))
-    for algorithm, problem, instance, seed in product(algorithms, problems, (2, 0, 1), (1, 0)):
+    algorithms = (("sapso", {}), ("nevergrad:NGOpt", {}), ("sapso", {"cooling": 0.9}))
+    for algorithm, function, instance, seed in product(algorithms, (1, 7), (2, 0, 1), (1, 0)):
         used = np.cumsum(rng.integers(1, 50, 20))
-        yield LoggedRun(*algorithm, *problem, instance, seed, used, np.sort(rng.uniform(0, 99, 20))[::-1])
+        yield run(
+            *algorithm,
+            function,
+            9 if function == 1 else 20,
+            instance,
+            seed,
+            used,
+            np.sort(rng.uniform(0, 99, 20))[::-1],
+        )
 
 
 def opened(folder):
@@ -35,14 +45,15 @@ def opened(folder):
 
 
 def test_iohinspector_opens_every_run(tmp_path):
-    write_iohprofiler(sweep(), tmp_path / "ioh")
+    write_iohprofiler(list(sweep()), tmp_path / "ioh")
     overview = opened(tmp_path / "ioh").overview
     assert len(overview) == 3 * 2 * 3 * 2
-    assert set(overview["algorithm_name"]) == {"sapso@pca #1", "sapso@pca #2", "nevergrad:NGOpt@full"}
-    assert set(overview["algorithm_info"]) == {"{}", '{"cooling": 0.9}'}
+    assert set(overview["algorithm_name"]) == {"sapso #1", "sapso #2", "nevergrad:NGOpt"}
+    infos = ({"infeasible proposals": "repair"}, {"cooling": 0.9, "infeasible proposals": "repair"})
+    assert set(overview["algorithm_info"]) == set(map(json.dumps, infos))
     assert set(zip(overview["function_name"], overview["function_id"], overview["dimension"], strict=True)) == {
-        ("jacks/holes", 1, 12),
-        ("walk, view 45", 2, 9),
+        ("single image", 1, 9),
+        ("high-dimensional", 7, 20),
     }
     assert sorted(set(overview["instance"])) == [0, 1, 2]
     expected = sorted((float(logged.costs[-1]), int(logged.evaluations[-1])) for logged in sweep())
@@ -50,7 +61,7 @@ def test_iohinspector_opens_every_run(tmp_path):
 
 
 def test_iohinspector_reads_every_cost_to_the_last_bit(tmp_path):
-    write_iohprofiler(sweep(), tmp_path / "ioh")
+    write_iohprofiler(list(sweep()), tmp_path / "ioh")
     manager = opened(tmp_path / "ioh")
     data = manager.load(monotonic=False)
     last = manager.overview["data_id", "best_y"].to_dict(as_series=False)
@@ -82,24 +93,24 @@ def test_iohinspectors_expected_running_time_is_ours(tmp_path):
 def test_the_files_are_where_iohprofiler_has_them(tmp_path):
     write_iohprofiler([run(seed=3)], tmp_path / "ioh")
     assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()) == [
-        "ioh/sapso@pca/IOHprofiler_f1_walk.json",
-        "ioh/sapso@pca/data_f1_walk/IOHprofiler_f1_DIM9.dat",
+        "ioh/sapso/IOHprofiler_f1_single-image.json",
+        "ioh/sapso/data_f1_single-image/IOHprofiler_f1_DIM9.dat",
     ]
-    summary = json.loads((tmp_path / "ioh/sapso@pca/IOHprofiler_f1_walk.json").read_text())
+    summary = json.loads((tmp_path / "ioh/sapso/IOHprofiler_f1_single-image.json").read_text())
     version = summary.pop("version"), summary.pop("experiment_attributes")
     assert version == (export.FORMAT, [{"posefit": export.__version__}])
     assert summary == {
         "suite": "posefit",
         "function_id": 1,
-        "function_name": "walk",
+        "function_name": "single image",
         "maximization": False,
-        "algorithm": {"name": "sapso@pca", "info": "{}"},
+        "algorithm": {"name": "sapso", "info": '{"infeasible proposals": "repair"}'},
         "attributes": ["evaluations", "raw_y"],
         "run_attributes": ["seed"],
         "scenarios": [
             {
                 "dimension": 9,
-                "path": "data_f1_walk/IOHprofiler_f1_DIM9.dat",
+                "path": "data_f1_single-image/IOHprofiler_f1_DIM9.dat",
                 "runs": [{"instance": 0, "evals": 80, "best": {"evals": 80, "y": 2.5, "x": []}, "seed": 3}],
             }
         ],
@@ -131,26 +142,19 @@ def test_hostile_names_stay_in_their_folder_and_are_not_run_by_a_reader(tmp_path
     trap = tmp_path / "trap"
     wicked = f"__import__('pathlib').Path({str(trap)!r}).touch()"
     names = ["../../out", "/etc", "..", "", "CON:", 'a"b\nc', "Ä ß", "a/b", "a?b", "A?B", "x" * 300, wicked]
-    write_iohprofiler([run(method=name, problem=name, settings={wicked: wicked}) for name in names], tmp_path / "ioh")
+    write_iohprofiler([run(method=name, settings={wicked: wicked}) for name in names], tmp_path / "ioh")
     assert [path.name for path in tmp_path.iterdir()] == ["ioh"]
     overview = opened(tmp_path / "ioh").overview
-    assert sorted(overview["algorithm_name"]) == sorted(overview["function_name"]) == sorted(names)
+    assert sorted(overview["algorithm_name"]) == sorted(names)
     folders = [path.name for path in (tmp_path / "ioh").iterdir()]
     assert len({name.lower() for name in folders}) == len(names)
     assert not trap.exists()
 
 
-def test_invalid_runs_and_folders_that_exist_are_refused_and_nothing_is_written(tmp_path):
-    name = "sapso@pca on walk, instance 0, seed 0"
-    for runs, message in (
-        ([], "runs must be at least one, got none"),
-        ([run(), run()], f"runs must differ in method, settings, .* got two of {name}"),
-        ([run(dimension=0)], f"{name}: dimension must lie in 1 to 65535, got 0"),
-        ([run(instance=70000)], "seed 0: instance must lie in 0 to 65535, got 70000"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            write_iohprofiler(runs, tmp_path / "ioh")
-        assert list(tmp_path.iterdir()) == []
+def test_a_run_twice_and_a_folder_that_exists_are_refused_and_nothing_is_written(tmp_path):
+    with pytest.raises(ValueError, match="runs must differ, got two of sapso on posefit-2026.3"):
+        write_iohprofiler([run(), run()], tmp_path / "ioh")
+    assert list(tmp_path.iterdir()) == []
     with pytest.raises(ValueError, match="expected a new name to write to, got one that exists"):
         write_iohprofiler([run()], tmp_path)
 

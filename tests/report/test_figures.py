@@ -9,7 +9,6 @@ import pytest
 from posefit.report import figures
 from posefit.report.charts import Chart, Line
 from posefit.statistics.intervals import Intervals
-from posefit.statistics.ranks import Ranking, friedman
 
 pytest.importorskip("matplotlib")
 
@@ -22,25 +21,17 @@ def bands(*rows):
     return [Intervals(values, values - 0.5, values + 1.0) for values in np.array(rows, dtype=float)]
 
 
-def ranking(means, cliques):
-    return Ranking(np.array(means), 5.0, 0.04, 0.8, cliques)
-
-
 def chart(lines, **more):
     return figures.chart_figure(METHODS, Chart(name="a", title="A", x_label="x", y_label="y", lines=lines, **more))
 
 
 def every():
     """Return one figure of each kind."""
-    joints = ["head", "l_foot"]
     return {
         "curves": chart(
             [Line(GRID, b.values, b.low, b.high) for b in bands([9, 5, 3], [9, 8, 7], [9, 9, 9])], log=True
         ),
         "shares": chart([Line(GRID, share) for share in SHARES], stepped=True, most=1.0),
-        "joint_errors": figures.joint_errors_figure(METHODS, joints, bands([30, 60], [40, 50], [9, 9])),
-        "dots": chart([Line(GRID, share, dots=["few", "more", "most"]) for share in SHARES], guides=[(0, 0.5, 9, 0.8)]),
-        "critical_difference": figures.critical_difference_figure(METHODS, ranking([1.2, 1.8, 3.0], ((0, 1),))),
     }
 
 
@@ -48,7 +39,7 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
     starts = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
     once, again = every(), every()
     for name, figure in once.items():
-        for suffix in starts if name in ("dots", "critical_difference") else (".png",):
+        for suffix in starts if name == "shares" else (".png",):
             paths = [tmp_path / f"{name}{k}{suffix}" for k in range(2)]
             for path, drawn in zip(paths, (figure, again[name]), strict=True):
                 figures.save(drawn, path)
@@ -61,41 +52,19 @@ def test_every_figure_is_written_with_the_same_bytes_and_the_colours_of_its_meth
             assert (np.abs(image - pixel).max(axis=1) < 3).sum() > 50, (name, colour)
 
 
-def test_lines_bands_dots_and_bars_have_their_values():
+def test_lines_and_bands_have_their_values():
     axes = {name: figure.axes[0] for name, figure in every().items()}
     assert axes["curves"].lines[0].get_ydata().tolist() == [9, 5, 3]
     band = axes["curves"].collections[0].get_paths()[0].vertices
     assert (band[:, 1].min(), band[:, 1].max()) == (2.5, 10.0)
     assert axes["curves"].get_xscale() == "log"
-    guide, line, *_ = axes["dots"].lines
-    assert (guide.get_xdata().tolist(), guide.get_ydata().tolist()) == ([0, 9], [0.5, 0.8])
+    line = axes["shares"].lines[0]
     assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (GRID.tolist(), [0.1, 0.5, 1.0])
-    assert line.get_marker() == "o"
     assert axes["shares"].lines[0].get_drawstyle() == "steps-post"
-    without = Intervals(np.array([3.0]), np.array([np.nan]), np.array([np.nan]))  # one seed
-    bars = figures.joint_errors_figure(("a", "b"), ["head"], [*bands([30]), without]).axes[0]
-    assert [bar.get_width() for bar in bars.patches] == [30, 3]
-    whiskers = [whisker.get_segments()[0][:, 0].tolist() for whisker in bars.collections]
-    assert whiskers == [[29.5, 31.0], [3.0, 3.0]]
 
 
-def test_a_critical_difference_plot_names_methods_best_first_and_joins_those_that_do_not_differ():
-    texts = [text.get_text() for text in every()["critical_difference"].axes[0].texts]
-    names = ["sapso@pca  1.20", r"cma_\$x\$@full  1.80", "3.00  vsmm"]
-    assert texts == ["1", "2", "3", *names, "critical difference 0.80"]
-    drawn = figures.critical_difference_figure(tuple("abcd"), ranking([1.0, 2.0, 3.2, 3.8], ((0, 1), (2, 3))))
-    first, second = (line.get_xdata() for line in drawn.axes[0].lines if line.get_linewidth() == 3.5)
-    assert min(first) <= 1 < 2 <= max(first) < 3.2
-    assert min(second) <= 3.2 < 3.8 <= max(second)
-    # sqrt(2 * 3 / (6 * 2)) * 1.960 = 1.39, and the line is 1 long
-    short = figures.critical_difference_figure(("a", "b"), friedman([[[1.0, 2.0]], [[2.0, 1.0]]]))
-    assert short.axes[0].texts[-1].get_text() == "critical difference 1.39, longer than the line"
-
-
-def test_28_methods_are_drawn_and_no_two_lines_are_equal(tmp_path):
+def test_28_methods_are_drawn_and_no_two_lines_are_equal():
     names = [f"method-{k}-with-a-rather-long-name-for-a-figure" for k in range(28)]
-    ranks = friedman(np.random.default_rng(0).gamma(2.0, size=(28, 5, 5)))
-    figures.save(figures.critical_difference_figure(names, ranks), tmp_path / "cd.png")
     line = Line(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
     shown = Chart(name="a", title="A", x_label="x", y_label="y", lines=[line] * 28)
     drawn = figures.chart_figure(names, shown)

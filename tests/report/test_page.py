@@ -91,7 +91,7 @@ def test_it_opens_without_errors_and_is_accessible_in_every_width_and_scheme(
 ) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install posefit[browser]")
     figures = {
-        tracks: ("standing", "convergence", "attainment", "profile", "joint-errors", "coverage"),
+        tracks: ("standing", "convergence", "profile", "joint-errors"),
         searches: ("standing", "chart-0"),
     }
     for path, names in figures.items():
@@ -148,13 +148,13 @@ def test_tables_sort_and_compare_and_mark_warnings(chromium: Any, tracks: Path) 
         assert warned.count() == 2
         assert warned.first.get_attribute("aria-label") == "warning: the search met the border of its box"
         page.locator("#against").select_option(label="method-3@pca")
-        assert texts(page, "#pairs", 8).count("better") == METHODS - 4
+        assert texts(page, "#pairs", 6).count("better") == METHODS - 4
         page.locator("#against").select_option(label="method-8@pca")
         assert all(re.fullmatch(r"[1-9] of [89]", text) for text in texts(page, "#duels", 3))
 
 
 def test_buttons_show_and_hide_methods_and_their_intervals_in_every_chart(chromium: Any, tracks: Path) -> None:
-    charts = ("convergence", "attainment", "joint-errors", "reliability", "coverage")
+    charts = ("convergence", "profile", "joint-errors")
     with shown(chromium, tracks) as page:
 
         def counts() -> list[int]:
@@ -162,23 +162,21 @@ def test_buttons_show_and_hide_methods_and_their_intervals_in_every_chart(chromi
 
         button = page.locator("#toggles button[data-method='0']")
         assert page.locator("#toggles button[aria-pressed=true]").count() == 4
-        assert counts() == [1, 1, 27, 1, 1]
+        assert counts() == [1, 1, 27]
         marks = page.locator("#toggles .mark")
         shape = "one => one.getAttribute('style') + one.getAttribute('d')"
         assert len({marks.nth(k).evaluate(shape) for k in range(METHODS)}) == METHODS
-        title = page.locator("#reliability .mark title").first.text_content()
-        assert title == "method-0@pca: 55% predicted, 50% right, of 128 frames"
         assert page.locator("#sure tbody tr").count() == 2
         band = page.locator("#convergence [data-method='0'] .band")
         opacity = "one => Number(getComputedStyle(one).opacity)"
         assert 0.0 < band.evaluate(opacity) < 0.2
         button.click()
         assert button.get_attribute("aria-pressed") == "false"
-        assert counts() == [0, 0, 0, 0, 0]
+        assert counts() == [0, 0, 0]
         page.locator("#none").click()
-        assert page.locator("#attainment path").count() == 0
+        assert page.locator("#profile path").count() == 0
         page.locator("#all").click()
-        assert page.locator("#attainment .curve").count() == METHODS
+        assert page.locator("#profile .curve").count() == METHODS
 
 
 @pytest.mark.slow

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from posefit.report.runs import Runs, distinct, runs_of
+from posefit.report.kind import Runs
+from posefit.report.runs import distinct, runs_of
 from posefit.report.tracks import Tracks
 from posefit.sweep.cell import CellResult, TrackCell
 from posefit.sweep.ledger import Ledger

@@ -32,9 +32,9 @@ def test_the_leader_and_its_certainty_are_one_sentence(tmp_path: Path) -> None:
     assert [row["reached"] for row in board] == pytest.approx([1100.0 / 29.0, 300.0 / 29.0])
     assert sentences(contest) == [
         f"cma leads with 37.9 % of all targets reached (95 % interval {board[0]['low']:.1f} % to "
-        f"{board[0]['high']:.1f} %), 27.6 points ahead of random, on functions 1 and 5 in 9 and 24 dimensions, 6 "
+        f"{board[0]['high']:.1f} %) on functions 1 and 5 in 9 and 24 dimensions, 6 "
         "instances in all with one seed.",
-        "Over 6 paired instances every other method is worse, the next one is random (+27.6 points, p = 0.031).",
+        "Over 6 paired instances every other method is worse, the next one is random (median difference +27.6 points, p = 0.031).",
         "Random search reached 10.3 %.",
     ]
 
@@ -122,10 +122,8 @@ def test_the_command_prints_the_leader_failures_and_leaderboard_and_writes_a_pag
     assert [row["name"] for row in printed["leaderboard"]] == ["cma", "random"]
     assert printed["times"][0]["times"][0] == 50.0
     assert printed["answer"][0].startswith("cma leads")
-    for name, message in (("figures", "got one of single searches"), ("iohprofiler", "posefit suite table ")):
-        mistake = error_of("report", results, f"--{name}", tmp_path / "new")
-        assert f"--{name} must be given with a sweep of tracks" in mistake
-        assert message in mistake
+    mistake = error_of("report", results, "--figures", tmp_path / "new")
+    assert "--figures must be given with a sweep of tracks, got one of single searches" in mistake
     assert not (tmp_path / "new").exists()
 
 

@@ -6,22 +6,17 @@ from posefit.report.columns import listed
 from posefit.report.content import three_tracks
 from posefit.report.contest import leaderboard
 from posefit.report.summary import unpaired_sentence
-from tests.report.contests import (
-    contest_of_errors,
-    full,
-    sentences,
-    three_methods,
-)
+from tests.report.contests import contest_of_errors, full, sentences, three_methods
 
 
 def test_what_leads_by_how_much_and_how_certain_that_is(tmp_path: Path) -> None:
     contest = contest_of_errors(tmp_path, three_methods())
     first = leaderboard(contest)[0]
     assert sentences(contest) == [
-        f"a leads with an error of 1.26° (95 % interval {first['low']:.2f}° to {first['high']:.2f}°), 0.00° ahead of "
-        "c, on 6 instances of walk with 2 seeds each.",
+        f"a leads with an error of 1.26° (95 % interval {first['low']:.2f}° to {first['high']:.2f}°) "
+        "on 6 instances of walk with 2 seeds each.",
         "Over 12 paired runs it is better than b.",
-        "12 paired runs are too few to tell it from c (+0.00°, p = 1).",
+        "12 paired runs are too few to tell it from c (median difference +0.00°, p = 1).",
         "The best baseline, the mean training pose, has 4.00°.",
     ]
 
@@ -29,7 +24,7 @@ def test_what_leads_by_how_much_and_how_certain_that_is(tmp_path: Path) -> None:
 def test_a_method_with_a_large_error_that_no_test_tells_apart_has_its_effect(tmp_path: Path) -> None:
     errors = full({"a": 1.0, "b": 3.0}, instances=5, seeds=1)  # of five blocks, the least p is 0.0625
     assert sentences(contest_of_errors(tmp_path, errors))[1:3] == [
-        "5 paired runs are too few to tell it from b (+2.00°, p = 0.062).",
+        "5 paired runs are too few to tell it from b (median difference +2.00°, p = 0.062).",
         "So few cannot show any difference: of 1 pair no p can be below 0.062.",
     ]
 
@@ -40,7 +35,7 @@ def test_a_leader_by_the_mean_may_be_worse_on_most_runs(tmp_path: Path) -> None:
     errors |= {("b", i, 0): 7.5 if i == 3 else 0.9 + 0.999 * i for i in range(12)}
     text = sentences(contest_of_errors(tmp_path, errors))
     assert text[0].startswith("a leads")
-    assert text[1] == "On most runs it is worse than b (−0.11°, p = 0.034)."
+    assert text[1] == "On most runs it is worse than b (median difference −0.11°, p = 0.034)."
 
 
 def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(tmp_path: Path) -> None:
@@ -49,7 +44,7 @@ def test_one_method_alone_one_run_alone_and_a_leader_behind_the_baselines(tmp_pa
         [
             (
                 full(two, instances=6),
-                "Over 12 paired runs every other method is worse, the next one is b (+1.00°, p < 0.001).",
+                "Over 12 paired runs every other method is worse, the next one is b (median difference +1.00°, p < 0.001).",
             ),
             (full({"a": 1.0}), "a has an error of 1.06° on 2 instances of walk with 2 seeds each."),
             (full({"a": 1.0}), "No other method shares its runs."),
@@ -72,7 +67,7 @@ def test_too_few_runs_for_any_difference_are_reported(tmp_path: Path) -> None:
     )
     text = sentences(contest_of_errors(tmp_path / "eleven", errors | full(methods, instances=3, seeds=3)))
     assert text[1] == "Over 11 paired runs it is better than e."
-    assert text[2].startswith("11 paired runs are too few to tell it from b (+0.00°, p = 1); c (")
+    assert text[2].startswith("11 paired runs are too few to tell it from b (median difference +0.00°, p = 1); c (")
 
 
 def test_names_with_commas_stand_between_semicolons() -> None:

@@ -31,17 +31,30 @@ def test_the_interval_is_students_within_views() -> None:
     ],
 )
 def test_a_claim_is_judged_by_its_interval(bound: float, above: bool, verdict: str) -> None:
-    assert Claim("", "", VALUES, bound=bound, above=above).verdict(0.95)[0] == verdict
+    assert Claim("", "", "", VALUES, bound=bound, above=above).verdict(0.95)[0] == verdict
 
 
 def test_a_single_seed_decides_nothing_and_a_fact_needs_none() -> None:
-    assert Claim("", "", VALUES[:, :1], bound=100.0).verdict(0.95)[0] == "not decided"
-    assert Claim("", "", np.asarray(97.0), bound=95.0, above=True).verdict(0.95)[0] == "holds"
+    assert Claim("", "", "", VALUES[:, :1], bound=100.0).verdict(0.95)[0] == "not decided"
+    assert Claim("", "", "", np.asarray(97.0), bound=95.0, above=True).verdict(0.95)[0] == "holds"
 
 
 def test_the_more_claims_a_table_has_the_wider_are_their_intervals() -> None:
-    close = Claim("near its bound", "here", VALUES, bound=1.0 + 1.1 * HALF)
-    alone, many = (claims_table("claims", [close] * count) for count in (1, 10))
-    assert alone.rows[0][2] == "**holds**"
-    assert many.rows[0][2] == "**not decided**"
-    assert alone.rows[0][3:] == ["8", "1.00 (0.50 to 1.50)", "below 1.55", "degrees"]
+    alone, many = (
+        claims_table(
+            "claims", [Claim("near its bound", "here", f"{k}", VALUES, "mm", 1.0 + 1.1 * HALF) for k in range(n)]
+        )
+        for n in (1, 10)
+    )
+    assert alone.rows == [["near its bound", "here", "below 1.55 mm", "8", "**holds** 1.00 (0.50 to 1.50)"]]
+    assert all(cell.startswith("**not decided**") for cell in many.rows[0][4:])
+
+
+def test_the_claims_of_a_text_are_one_row_and_a_subject_is_a_column() -> None:
+    first = [Claim("one", "2.1", name, VALUES, bound=5.0) for name in ("run",)]
+    second = [Claim("two", "5.3", name, VALUES, bound=bound) for name, bound in (("walk", 4.0), ("run", 0.0))]
+    table = claims_table("claims", first + second)
+    assert table.heads[3:] == ["n", "walk", "run"]
+    assert [row[2] for row in table.rows] == ["below 5 degrees", "below 4 / 0 degrees"]
+    assert table.rows[0][4] == ""
+    assert [cell.split()[0] for cell in table.rows[1][4:]] == ["**holds**", "**fails**"]

@@ -26,10 +26,7 @@ def hull_distance(x: Array, y: Array, first: Array, second: Array, r0: float, r1
     """
     axis = second - first
     length = np.hypot(*axis)
-    ends = np.minimum(
-        np.hypot(x - first[0], y - first[1]) - r0,
-        np.hypot(x - second[0], y - second[1]) - r1,
-    )
+    ends = np.minimum(np.hypot(x - first[0], y - first[1]) - r0, np.hypot(x - second[0], y - second[1]) - r1)
     if length <= abs(r0 - r1):
         return ends
     e = axis / length

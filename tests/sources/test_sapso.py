@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,9 +47,6 @@ class Line:
         if self.gap is None:
             return np.ones(len(latents), dtype=bool)
         return (latents[:, 0] <= self.gap[0]) | (latents[:, 0] >= self.gap[1])
-
-    def save(self, path: str | Path) -> None:
-        raise OSError(path)
 
 
 def line_space(gap: tuple[float, float] | None = None, start: Start | None = None) -> SearchSpace:

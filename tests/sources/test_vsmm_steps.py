@@ -16,7 +16,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit_vsmm.groups import Topology, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter, _knees, detect, rule_errors
+from posefit_vsmm.joints import _TIPS, JointFilter, _knees, _tips, detect, rule_errors
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import MotionModels, library, lifted, ridge, without_heading
 from posefit_vsmm.preprocess import Lines, lines_of
@@ -151,13 +151,18 @@ def test_an_end_point_out_of_reach_is_not_assigned() -> None:  # Interpretation 
     assert unassigned == 1
 
 
-def test_the_nearest_end_point_may_be_that_of_two() -> None:  # Interpretation V15
-    image, expected = figure()
-    expected[AT["left foot"]] = expected[AT["right foot"]] + [20.0, 0.0]
-    for nearest, shared in ((False, False), (True, True)):
-        points, confidence = joints_in(image, expected, nearest=nearest)
-        assert np.allclose(points[AT["left foot"]], points[AT["right foot"]]) == shared
-        assert (confidence[AT["left foot"]] > 0.0) == shared  # its own end point is out of reach
+def test_to_the_letter_the_nearest_end_point_is_taken_first_and_by_one_joint() -> None:  # Interpretation V15
+    # by hand, on a line: the left foot at 0 and the right one at 3, end points at 2 and -9: the right foot is nearest
+    # to 2, and the left one, which is nearest to it too, takes the other; together they would be 2 + 12 or 1 + 9
+    _, expected = figure()
+    ends = np.array([[130.0, 215.0], [60.0, 215.0]])
+    expected[AT["left foot"]], expected[AT["right foot"]] = (128.0, 215.0), (131.0, 215.0)
+    for nearest in (False, True):
+        gates = np.full(len(POINTS), 1e3 if nearest else 30.0)
+        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], nearest)
+        assert np.array_equal(tips["right foot"], ends[0])
+        assert (("left foot" in tips), unassigned) == (nearest, not nearest)
+    assert np.array_equal(tips["left foot"], ends[1])
 
 
 def test_plain_joint_errors_are_unbiased_and_the_torsos_are_the_roots() -> None:  # Interpretation V8
@@ -206,7 +211,22 @@ def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM
     np.testing.assert_allclose(knees["right knee"], [80.0, 144.0], atol=1.1)
     together = np.array([[50.0, y] for y in range(100, 201)])  # both legs are one line, with one crossing
     wide = np.full(len(POINTS), 90.0)
-    assert _knees(Lines(together, together, together, legs[:0]), expected, np.ones(len(POINTS)), expected, wide) == {}
+    for nearest in (False, True):
+        one_line = Lines(together, together, together, legs[:0])
+        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, nearest) == {}
+
+
+def test_to_the_letter_the_knees_are_two_crossings_also_where_both_are_expected_at_one() -> None:  # Interpretation V15
+    expected = np.zeros((len(POINTS), 2))
+    for name, place in (("root", (50, 90)), ("left foot", (0, 200)), ("right foot", (100, 200)),
+                        ("left knee", (16, 150)), ("right knee", (24, 150))):  # fmt: skip
+        expected[AT[name]] = place
+    legs = np.array([[x, y] for x in (20.0, 80.0) for y in range(100, 201)])
+    shape, sure, gates = Lines(legs, legs, legs, legs[:0]), np.ones(len(POINTS)), np.full(len(POINTS), 1e3)
+    assert _knees(shape, expected, sure, expected, gates) == {}
+    knees = _knees(shape, expected, sure, expected, gates, nearest=True)
+    np.testing.assert_allclose(knees["left knee"], [20.0, 150.0], atol=1.1)
+    np.testing.assert_allclose(knees["right knee"], [80.0, 150.0], atol=1.1)
 
 
 def test_an_elbow_is_as_far_from_the_hand_as_from_the_shoulder() -> None:  # VSMM 2.6

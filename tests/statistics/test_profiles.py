@@ -1,4 +1,4 @@
-"""Traces, targets, running times and profiles, worked by hand."""
+"""Traces, running times and profiles, worked by hand."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,6 @@ from posefit.statistics.profiles import (
     hits,
     performance_profile,
     running_time_interval,
-    targets,
 )
 from tests.cases import each
 
@@ -57,19 +56,6 @@ def test_the_interval_of_a_running_time_is_that_of_resampled_clusters():
     assert np.isnan(running_time_interval([[1.0], [2.0]], [5.0, 5.0], [7, 7], np.random.default_rng(0))).all()
 
 
-def test_targets_fall_evenly_on_a_log_scale_between_the_first_and_the_last_costs():
-    costs = targets([QUICK, trace([5, 6], [32.0, 20.0])], 5)
-    assert np.allclose(costs, [32.0, 16.0, 8.0, 4.0, 2.0])
-    assert hits(QUICK, costs[-1:])[0] == 100.0
-    assert targets([trace([1, 2], [1.0, 0.0])], 3).tolist() == [1.0, pytest.approx(0.1), 0.01]
-
-
-def test_the_best_run_hits_the_last_target_to_the_last_bit():
-    for cost in np.random.default_rng(0).uniform(0.1, 3.0, 50):
-        run = trace([1, 7], [50.0, cost])
-        assert hits(run, targets([run]))[-1] == 7.0
-
-
 def test_a_profile_counts_runs_within_each_level():
     errors = [[[1.0, 2.0], [3.0, 4.0]], [[5.0, 5.0], [5.0, 5.0]]]
     assert performance_profile(errors, [0.5, 1.0, 3.5, 5.0]).tolist() == [[0.0, 0.25, 0.75, 1.0], [0.0, 0.0, 0.0, 1.0]]
@@ -78,7 +64,6 @@ def test_a_profile_counts_runs_within_each_level():
 @each(
     ("call", "message"),
     [
-        (lambda: targets([]), "traces and targets must be at least one, got 0 and 51"),
         (lambda: attained([np.nan, 1.0], [1]), "hits must be numbers or inf, got 1 nan of 2"),
         (lambda: expected_running_time([[1.0]], [1, 2]), r"hits must have shape \(2, targets\), got \(1, 1\)"),
         (lambda: expected_running_time([[9.0]], [5]), "hits must be within a run's evaluations or inf, got a later"),

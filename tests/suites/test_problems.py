@@ -6,7 +6,6 @@ from copy import copy, deepcopy
 from itertools import product
 from pathlib import Path
 from pickle import PicklingError
-from types import SimpleNamespace
 
 import iohinspector
 import numpy as np
@@ -21,7 +20,7 @@ from posefit.suites.functions import FUNCTIONS, HELD_OUT, SUITE, TRAINING
 from posefit.suites.instances import suite_instance
 from posefit.suites.problem import BudgetSpentError, Problem
 from posefit.suites.running import run_on
-from posefit_bridges import ioh_problem
+from posefit_bridges.problems import ioh_problem
 from tests.cases import each
 from tests.suites.numbers import FILE, addresses, areas_of, fixed_proposals, mask_of
 
@@ -194,22 +193,6 @@ def test_a_budget_of_evaluations_holds() -> None:
         posed(np.zeros(9))
 
 
-def test_a_budget_of_seconds_begins_with_the_first_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = SimpleNamespace(now=50.0, perf_counter=lambda: clock.now)
-    monkeypatch.setattr("posefit.suites.problem.time", clock)
-    posed = problem(seconds=2.0)
-    clock.now += 3.0
-    assert posed.elapsed == 0.0
-    posed(np.zeros(9))
-    clock.now += 2.0
-    posed(np.zeros(9))
-    assert posed.elapsed == 2.0
-    clock.now += 0.5
-    with pytest.raises(BudgetSpentError, match="its 2 seconds are over"):
-        posed(np.zeros(9))
-    assert posed.evaluations == 2
-
-
 def test_targets_fall_to_a_quarter_above_the_cost_of_the_true_pose() -> None:
     for posed in (problem(1, 10_000, 9), problem(8, 10_000, 9)):
         assert posed.targets - posed.truth_cost == pytest.approx([2.0 ** (5 - k / 4) for k in range(29)])
@@ -267,7 +250,6 @@ def test_a_problem_is_not_sent_to_another_process_where_its_evaluations_would_no
         (lambda: problem(7, 0, 9), "dimension of function 7 must be one of 20, 24, 40, 66, got 9"),
         (lambda: problem(infeasible="ignore"), "infeasible must be one of repair, reject, penalise, got 'ignore'"),
         (lambda: problem(budget=0), "budget must be at least 1, got 0"),
-        (lambda: problem(seconds=0.0), "seconds must be above 0, got 0.0"),
         (lambda: posefit.Suite(functions=[1], dimensions=[66]), r"at least one problem, got none in \[66\] dimensions"),
         (lambda: posefit.Suite(dimensions=[11]), "dimension must be one of 9, 10, 16, 20, 24, 40, 66, got 11"),
         (lambda: posefit.Suite(functions=9), "functions must be a list of numbers, got 9"),  # type: ignore[arg-type]

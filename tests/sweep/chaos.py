@@ -1,4 +1,4 @@
-"""A sweep under sabotage: `python -m tests.sweep.chaos --engine pool|dask --cells 300 --events 60 --seed 1`.
+"""A sweep under sabotage: `python -m tests.sweep.chaos --cells 300 --events 60 --seed 1`.
 
 Cells take half a second, or `--seconds`, so that there is time for all events; five are bad: they raise, exit, end
 their process, want all memory, or never end. While they run, events come at random moments: a process that runs a cell
@@ -30,7 +30,6 @@ from tests.sweep.fake import SLOW, SLOW_SECONDS, STARTS, bad, cells, result, sta
 
 ROOT = Path(__file__).parents[2]
 EVENTS = ("kill a worker", "kill the driver", "kill the group", "stop and go on", "start a second driver")
-DASK = ("kill a Dask worker",)  # whose processes run the cells
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.3, 1.5  # seconds between two events, at least and at most
 PATIENCE = 60.0  # seconds for a driver to begin cells, or to end
@@ -43,7 +42,6 @@ class Chaos:
     """A sabotaged sweep: its folder, what is to happen to it, and what happened."""
 
     folder: Path
-    engine: str
     count: int
     events: int
     seed: int
@@ -85,7 +83,6 @@ class Chaos:
         wanted = {cell.key: _figures(result(cell).row) for cell in cells(self.count, SLOW)}
         quarantined = {row["key"] for row in ledger.quarantined()}
         return {
-            "engine": self.engine,
             "seed": self.seed,
             "cells": self.count,
             "events": dict(sorted(self.happened.items())),
@@ -103,7 +100,7 @@ class Chaos:
         }
 
     def _begun(self) -> subprocess.Popen[bytes]:
-        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), self.engine, str(self.count), str(LIMIT)]
+        words = [sys.executable, "-m", "tests.sweep.fake", str(self._ledger), str(self.count), str(LIMIT)]
         environment = {
             **os.environ,
             STARTS: str(self._starts),
@@ -117,14 +114,10 @@ class Chaos:
 
     def _event(self) -> None:
         assert self._driver is not None
-        events = EVENTS + DASK * (self.engine == "dask")
-        event, driver = self._random.choice(events), self._driver.pid
+        event, driver = self._random.choice(EVENTS), self._driver.pid
         with suppress(ProcessLookupError, FileNotFoundError):
             if event == "kill a worker":
                 done = self._signalled(self._running(), signal.SIGKILL, signal.SIGTERM)
-            elif event in DASK:
-                parents = [ancestors[0] for process in self._running() if (ancestors := _ancestors(process))]
-                done = self._signalled(parents, signal.SIGKILL, signal.SIGTERM)
             elif event == "kill the driver":
                 done = self._signalled([driver], signal.SIGKILL)
             elif event == "kill the group":
@@ -210,13 +203,12 @@ LOST = ("lost", "doubled", "changed", "wrong in quarantine", "second drivers tha
 def main() -> None:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--engine", choices=("pool", "dask"), default="pool")
     for name, default in (("cells", 300), ("events", 60), ("seed", 1)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--seconds", type=float, default=0.5)
     asked = parser.parse_args()
     with TemporaryDirectory() as folder:
-        outcome = Chaos(Path(folder), asked.engine, asked.cells, asked.events, asked.seed, asked.seconds).run()
+        outcome = Chaos(Path(folder), asked.cells, asked.events, asked.seed, asked.seconds).run()
         output = (Path(folder) / "output.txt").read_text(errors="replace")
     print(json.dumps(outcome, indent=1))
     if any(outcome[name] for name in LOST):

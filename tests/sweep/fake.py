@@ -1,6 +1,6 @@
 """Cells that take no work: what a sweep's machinery is tried with. Each start is noted in the file POSEFIT_STARTS names.
 
-`python -m tests.sweep.fake DIR pool|dask|ADDRESS CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
+`python -m tests.sweep.fake DIR CELLS SECONDS` drives a sweep of such cells and of five bad ones; what a cell
 does follows from its `frames`: see `behave`. What drives a sweep is imported where it is used: the processes that run cells do without.
 """
 
@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,14 +102,14 @@ def result(cell: TrackCell) -> CellResult:
     return CellResult(row, packed_joints(estimate=joints, truth=joints))
 
 
-def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine | Callable[[], Engine]") -> "Tally":
-    """Return how a sweep ended, of an engine or of one that is started once the ledger is open."""
+def swept(out: Path, chosen: Sequence[TrackCell], engine: "Engine") -> "Tally":
+    """Return how a sweep by an engine ended."""
     from posefit.sweep.drive import drive
     from posefit.sweep.ledger import FILE, Writer
 
     with Writer(out / FILE) as ledger:
         ledger.plan(chosen)
-        return drive(ledger, engine() if callable(engine) else engine, print)
+        return drive(ledger, engine, print)
 
 
 class Instant:
@@ -151,21 +151,14 @@ def bad(seed: int) -> list[TrackCell]:
 
 def main() -> int:
     """Drive a sweep as the command line says, and return its exit status."""
-    from posefit.sweep.cluster import Cluster
     from posefit.sweep.pool import Pool
     from tests.sweep.fake import behave  # by a name that other processes can import
 
-    where, kind, many, seconds = sys.argv[1:5]
+    where, many, seconds = sys.argv[1:4]
     limits = Limits(float(seconds), 1.0)
     chosen = cells(int(many), SLOW)
 
-    def start() -> "Engine":
-        if kind == "pool":
-            return Pool(2, limits, behave)
-        here = {"workers": 2} if kind == "dask" else {"scheduler": kind}
-        return Cluster(**here, limits=limits, run=behave, patience=300.0)  # type: ignore[arg-type]
-
-    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], start)
+    tally = swept(Path(where), [*chosen[::2], *bad(len(chosen)), *chosen[1::2]], Pool(2, limits, behave))
     return 1 if tally.quarantined else 130 if tally.stopped else 0
 
 

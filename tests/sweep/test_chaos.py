@@ -19,9 +19,9 @@ ROOT = Path(__file__).parents[2]
 
 
 @contextmanager
-def driver(folder: Path, engine: str, count: int) -> Iterator[subprocess.Popen[bytes]]:
+def driver(folder: Path, count: int) -> Iterator[subprocess.Popen[bytes]]:
     """Start a driver of its own process group; nothing of it is left over afterwards."""
-    words = [sys.executable, "-m", "tests.sweep.fake", str(folder / "results"), engine, str(count), "300"]
+    words = [sys.executable, "-m", "tests.sweep.fake", str(folder / "results"), str(count), "300"]
     environment = {**os.environ, STARTS: str(folder / "starts"), "PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(words, cwd=ROOT, env=environment, start_new_session=True)
     try:
@@ -42,17 +42,14 @@ def wait_for(what: Callable[[], bool], seconds: float = 600.0) -> None:
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds a driver's processes in /proc")
 @pytest.mark.slow
 def test_a_sabotaged_sweep_loses_and_doubles_no_row_and_quarantines_no_healthy_cell(tmp_path: Path) -> None:
-    # `python -m tests.sweep.chaos` is the long version, and has Dask's
-    result = Chaos(tmp_path, "pool", 24, 8, 1).run()
+    # `python -m tests.sweep.chaos` is the long version
+    result = Chaos(tmp_path, 24, 8, 1).run()
     assert [result[name] for name in LOST] == [0] * len(LOST), result
 
 
-@pytest.mark.parametrize("engine", ["pool", pytest.param("dask", marks=pytest.mark.slow)])
-def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(engine: str, tmp_path: Path) -> None:
-    if engine == "dask":
-        pytest.importorskip("distributed")
+def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(tmp_path: Path) -> None:
     noted = tmp_path / "starts"
-    with driver(tmp_path, engine, 40) as process:
+    with driver(tmp_path, 40) as process:
         wait_for(lambda: len(starts(noted)) > 5)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers too
         assert process.wait(timeout=600) == 130
@@ -63,7 +60,7 @@ def test_ctrl_c_finishes_the_running_cells_and_the_next_sweep_goes_on(engine: st
 
 def test_ctrl_c_twice_stops_at_once_and_loses_no_row(tmp_path: Path) -> None:
     noted = tmp_path / "starts"
-    with driver(tmp_path, "pool", 40) as process:
+    with driver(tmp_path, 40) as process:
         wait_for(lambda: len(starts(noted)) > 5)
         for _ in range(2):
             os.killpg(process.pid, signal.SIGINT)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from posefit.sweep.command import duration_text
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
 from tests.cases import each
@@ -64,9 +63,8 @@ def test_a_sweep_writes_a_ledger_and_the_same_command_has_nothing_left_to_do(pla
     assert Ledger(out).joints(sapso["key"])["estimate"].shape == (2, 27, 3)
 
 
-@pytest.mark.slow
 def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) -> None:
-    done = run("sweep", plan, "--dry-run", "--workers", 2)
+    done = run("sweep", plan, "--dry-run")
     assert done.exit_code == 0, done.stderr
     *lines, last = done.stdout.splitlines()
     assert lines == [
@@ -76,44 +74,22 @@ def test_a_preview_counts_the_cells_and_runs_none(plan: Path, tmp_path: Path) ->
         'corruption        4 x {}, 4 x {"holes":0.5}',
         "seed              4 x 0, 4 x 1",
     ]
-    assert last.startswith("8 cells, 8 of them to run, 1,280 evaluations: about ")  # 2 frames of 80 each
-    assert last.endswith(" on 2 workers")
+    assert last == "8 cells, 8 of them to run, 1,280 evaluations"  # 2 frames of 80 each
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
     run("sweep", plan, "--out", tmp_path / "out")
     listed = json.loads(run("sweep", plan, "--dry-run", "--json", "--out", tmp_path / "out").stdout)
     assert [cell["done"] for cell in listed["cells"]] == [True] * 8
-    assert listed["seconds"] == 0.0
 
 
-def test_durations_in_words() -> None:
-    assert [duration_text(seconds) for seconds in (0.2, 1.3, 4.4, 89.0, 90.0, 5400.0)] == [
-        "0 seconds", "1 second", "4 seconds", "89 seconds", "1.5 minutes", "1.5 hours",
-    ]  # fmt: skip
-
-
-def test_a_preview_names_the_kind_of_cell_that_fails_and_estimates_the_others(plan: Path) -> None:
-    # the prior refuses its setting when it is fitted: the sweep would isolate it, and so does its preview
-    plan.write_text(PLAN + '\n[[cells]]\nmethod = "random@pca"\nmotion = "walk"\nsettings.pca.components = -1\n')
-    done = run("sweep", plan, "--dry-run", "--workers", 1)
-    assert done.exit_code == 0, done.stderr
-    *_, warning, last = done.stdout.splitlines()
-    assert warning.startswith("warning: random@pca on walk, instance 0, seed 0: InputError: ")
-    assert last.startswith("9 cells, 9 of them to run, 1,440 evaluations: about ")  # 9 x 2 frames of 80
-
-
-def test_a_preview_of_many_cells_fits_a_screen_however_many_kinds_fail(plan: Path) -> None:
+def test_a_preview_of_many_cells_fits_a_screen(plan: Path) -> None:
     methods = [f"{name}@pca" for name in ("random", "pso", "sapso", "cma", "annealed", "particle")]
-    plan.write_text(
-        f'defaults.settings.pca.components = -1\n[product]\nmethods = {methods}\nmotions = ["walk"]\nseeds = 900\n'
-    )
-    done = run("sweep", plan, "--dry-run", "--workers", 1)
+    plan.write_text(f'[product]\nmethods = {methods}\nmotions = ["walk"]\nseeds = 900\n')
+    done = run("sweep", plan, "--dry-run")
     assert done.exit_code == 0, done.stderr
-    method, motion, seed, *warnings, last = done.stdout.splitlines()
+    method, motion, seed, last = done.stdout.splitlines()
     assert method.split(maxsplit=1) == ["method", ", ".join(f"900 x {one}" for one in methods)]
     assert motion.split(maxsplit=1) == ["motion", "5,400 x walk"]
     assert seed.endswith(", 6 x 10, 6 x 11, and 888 other values")
-    assert len(warnings) == 6
-    assert warnings[-1] == "warning: the same holds of 1 other method; --json has each"
     assert last.startswith("5,400 cells, 5,400 of them to run, ")
 
 
@@ -139,8 +115,7 @@ def test_cells_in_quarantine_are_tried_again_where_that_is_asked_for(plan: Path,
     [
         (["PLAN"], "--out must name a folder for the results, got none"),
         (["PLAN", "--out", "OUT", "--workers", "0"], "--workers must be at least 1, got 0"),
-        (["PLAN", "--out", "OUT", "--dask-local", "-1"], "--dask-local must be at least 1, got -1"),
-        (["PLAN", "--out", "OUT", "--workers", "1", "--dask-local", "1"], "--workers must not be given with --dask-local"),
+        (["PLAN", "--out", "OUT", "--workers", "1", "--scheduler", "tcp://a:1"], "--workers must not be given with --scheduler"),
         (["PLAN", "--out", "OUT", "--shard", "3/2"], "--shard must be I/N such as 2/8, got 3/2"),
         (["PLAN", "--out", "OUT", "--shard", "2"], "--shard must be I/N such as 2/8, got 2"),
         (["PLAN", "--out", "OUT", "--cell-seconds", "0"], "the limit of seconds must lie in 0.001 to 1e+08, got 0.0"),
@@ -173,5 +148,5 @@ def test_without_distributed_dask_says_what_to_install(
     plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    line = error_of("sweep", plan, "--out", tmp_path / "out", "--dask-local", 2)
+    line = error_of("sweep", plan, "--out", tmp_path / "out", "--scheduler", "tcp://a:1")
     assert line.endswith("python -m pip install 'posefit[dask]'")

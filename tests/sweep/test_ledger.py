@@ -169,15 +169,6 @@ def test_what_is_no_ledger_is_named(tmp_path: Path) -> None:
             opened(folder / FILE)
 
 
-def test_a_ledger_of_an_older_posefit_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "rows").mkdir()
-    (tmp_path / "ledger.json").write_text('{"format": 1}')
-    for read in (lambda: Ledger(tmp_path), lambda: Writer(tmp_path / FILE)):
-        with pytest.raises(ValueError, match="got one of an older posefit: run its plan in a new folder"):
-            read()
-    assert not (tmp_path / FILE).exists()
-
-
 def test_a_second_driver_is_refused_in_a_line_that_names_the_first(tmp_path: Path) -> None:
     path = tmp_path / "results" / FILE
     with Writer(path) as first:

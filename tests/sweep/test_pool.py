@@ -2,11 +2,12 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,20 +33,45 @@ ROOT = Path(__file__).parents[2]
 Make = Callable[..., Engine]
 
 
-def cluster(*address: str, workers: int | None = None, limits: Limits = LIMITS, patience: float = PATIENCE) -> Any:
-    """Return an engine of Dask workers: those of a scheduler at an address, or so many of its own."""
+@pytest.fixture(params=["pool", pytest.param("dask", marks=pytest.mark.slow)])
+def make(request: pytest.FixtureRequest) -> Iterator[Make]:
+    """Yield what makes an engine of so many workers."""
+    if request.param == "pool":
+        yield lambda workers, limits=LIMITS: Pool(workers, limits, behave)
+        return
     pytest.importorskip("distributed")
     from posefit.sweep.cluster import Cluster
 
-    return Cluster(*address, workers=workers, limits=limits, run=behave, patience=patience)
+    with ExitStack() as served:
+
+        def dask(workers: int, limits: Limits = LIMITS) -> Engine:
+            return Cluster(served.enter_context(scheduler(workers)), limits, behave, PATIENCE)
+
+        yield dask
 
 
-@pytest.fixture(params=["pool", pytest.param("dask", marks=pytest.mark.slow)])
-def make(request: pytest.FixtureRequest) -> Make:
-    """Return what makes an engine of so many workers."""
-    if request.param == "pool":
-        return lambda workers, limits=LIMITS: Pool(workers, limits, behave)
-    return lambda workers, limits=LIMITS: cluster(workers=workers, limits=limits)
+@contextmanager
+def scheduler(workers: int) -> Iterator[str]:
+    """Yield the address of a Dask scheduler with so many workers of one thread."""
+    address, started = f"tcp://127.0.0.1:{(place := port())}", []
+    words = [["dask_scheduler", "--port", str(place), "--host", "127.0.0.1", "--no-dashboard", "--no-show"]]
+    words += [["dask_worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "300"]] * workers
+    try:
+        for name, *more in words:
+            command = [sys.executable, "-m", f"distributed.cli.{name}", *more]
+            quiet = subprocess.DEVNULL
+            started.append(subprocess.Popen(command, stdout=quiet, stderr=quiet, cwd=ROOT, start_new_session=True))
+        yield address
+    finally:
+        for process in started:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
 
 
 def one_by_one(engine: Engine, chosen: Sequence[TrackCell]) -> list[Outcome]:
@@ -176,79 +202,36 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(tmp_
         sweep(plan, tmp_path / "shards", Pool(1, Limits(), run_cell), print, shard=shard)
     names = sorted(path.name for path in (tmp_path / "shards").glob("*.sqlite"))
     assert names == [f"ledger-{k}-of-3.sqlite" for k in (1, 2, 3)]
-    assert swept(tmp_path / "dask", list(plan)[::-1], Cluster(workers=2, patience=PATIENCE)).done == len(plan)  # type: ignore[arg-type]
+    with scheduler(2) as address:
+        engine = Cluster(address, Limits(), patience=PATIENCE)
+        assert swept(tmp_path / "dask", list(plan)[::-1], engine).done == len(plan)  # type: ignore[arg-type]
     first = rows_in(tmp_path / "one")
     assert len(first[0]) == len(plan)
     assert rows_in(tmp_path / "shards") == rows_in(tmp_path / "dask") == first
 
 
-def port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
-
-
-class Served:
-    """A Dask scheduler at an address, with one worker; it can go away and come back."""
-
-    def __init__(self) -> None:
-        self._port = port()
-        self.address = f"tcp://127.0.0.1:{self._port}"
-        self._started: list[subprocess.Popen[bytes]] = []
-
-    def come(self) -> None:
-        for words in (
-            ["dask_scheduler", "--port", str(self._port), "--host", "127.0.0.1", "--no-dashboard", "--no-show"],
-            ["dask_worker", self.address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "300"],
-        ):
-            command = [sys.executable, "-m", f"distributed.cli.{words[0]}", *words[1:]]
-            quiet = subprocess.DEVNULL
-            self._started.append(subprocess.Popen(command, stdout=quiet, stderr=quiet, cwd=ROOT, env={**os.environ}))
-
-    def go(self) -> None:
-        while self._started:
-            process = self._started.pop()
-            process.kill()
-            process.wait()
-
-
-@pytest.fixture
-def served() -> Iterator[Served]:
-    pytest.importorskip("distributed")
-    scheduler = Served()
-    scheduler.come()
-    yield scheduler
-    scheduler.go()
-
-
 def test_a_scheduler_that_is_not_there_is_named() -> None:
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
+
     address = f"tcp://127.0.0.1:{port()}"
-    with pytest.raises(InputError, match=f"scheduler must be one that answers, got {address}"):
-        cluster(address, patience=1.0)
+    with pytest.raises(InputError, match=f"scheduler must be one with workers that answers, got {address}"):
+        Cluster(address, LIMITS, behave, patience=1.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("returns", [False, True])
-def test_a_scheduler_that_goes_away_leaves_all_rows_and_one_that_comes_back_is_waited_for(
-    served: Served, returns: bool, tmp_path: Path
-) -> None:
-    engine = cluster(served.address)
-    assert engine.window() == 1
-    engine._patience = PATIENCE if returns else 1.0
-    gone = []
+def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    from posefit.sweep.cluster import Cluster
 
-    def watch(tally: Tally) -> None:
-        if tally.done == 3 and not gone:
-            gone.append(True)
-            served.go()
-            if returns:
-                served.come()
+    with ExitStack() as served, Writer(tmp_path / "results" / FILE) as ledger:
+        engine = Cluster(served.enter_context(scheduler(1)), LIMITS, behave, PATIENCE)
 
-    with Writer(tmp_path / "results" / FILE) as ledger:
+        def watch(tally: Tally) -> None:
+            if tally.done >= 3:
+                served.close()
+
         ledger.plan(cells(10))
-        if returns:
-            assert drive(ledger, engine, print, watch).done == 10
-        else:
-            with pytest.raises(ValueError, match=r"127.*; \d+ of 10 cells are done and safe: the same command goes on"):
-                drive(ledger, engine, print, watch)
+        with pytest.raises(ValueError, match=r"127.*went away; \d+ of 10 cells are done and safe: the same command"):
+            drive(ledger, engine, print, watch)
     assert swept(tmp_path / "results", cells(10), Pool(2, LIMITS, behave)).done == 10

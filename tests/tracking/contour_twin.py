@@ -14,6 +14,14 @@ BONE_STARTS = np.array(PARENTS[1:])
 COUNT = 2 * len(JOINTS) + 2 * len(BONES)  # of a drawn body: pixels of joints, then radii of bones
 
 
+def cone_distance(x: float, y: float, points: Array, radii: Array) -> tuple[float, float, float, float]:
+    """Return how far a point is outside the cone of two discs, at which share of it, and its normal."""
+    cones, discs = np.empty((1, 8)), np.empty((1, 3))
+    kernels.write_cones(np.zeros(1, int), np.asarray(points), np.asarray(radii)[None], cones, discs)
+    distance, *others = kernels.cone_distance(x, y, cones[0])
+    return distance, *others
+
+
 def drawn_body(body: Body, camera: Camera, joints: Array) -> Array:
     """Return where joints (27, 3) are in the picture, and how wide the bones' ends (106,), in pixels."""
     pixels, far = camera.project(joints)

@@ -19,6 +19,8 @@ from posefit.output.folder import OutputFolder, Recorder
 from posefit.progress import Progress
 from posefit.silhouette.cost import areas
 from posefit.tracking import method
+from posefit.tracking.defaults import completed
+from posefit.tracking.options import TrackOptions
 from posefit.tracking.pipeline import track_scene
 from posefit.tracking.result import Track
 from posefit.uncertainty.calibration import Recalibration
@@ -87,7 +89,8 @@ def tracked(scene: Scene, frames: Sequence[Frame], recorder: Recorder | None = N
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(method.Method, "follow", follow)
-        track = track_scene(scene, [built_in.motion("walk-b", frames=20)], recorder=recorder)
+        options = completed(TrackOptions(method="annealed@pca"), scene.truth)
+        track = track_scene(scene, [built_in.motion("walk-b", frames=20)], options, recorder=recorder)
     if recorder is not None:
         recorder.finish(track.content)
     return track

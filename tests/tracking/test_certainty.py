@@ -35,7 +35,7 @@ def measured(scene: Scene, frames: list[Frame]) -> tuple[Table, Measures]:
 
 def test_nothing_is_reported_of_a_method_that_reports_no_certainty(scene: Scene) -> None:
     columns, measures = measured(scene, exact_frames(scene))
-    names = ("coverage", "interval_mm", "unknown_rate", "swapped_known_rate", "lost_said_rate")
+    names = ("coverage", "interval_mm", "unknown_rate", "swapped_known_rate", "lost_flagged_rate")
     assert [getattr(measures, name) for name in names] == [None] * 5
     assert np.isnan([columns[name] for name in ("unknown_sides", "lost", "interval_mm")]).all()
 
@@ -85,7 +85,7 @@ def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:
     probabilities = [0.0, 0.25, 0.5, 0.75, 1.0, None]
     frames = [replace(frame, lost=p) for frame, p in zip(exact_frames(scene), probabilities, strict=True)]
     columns, measures = measured(scene, frames)
-    assert measures.lost_said_rate == pytest.approx(3 / 5)
+    assert measures.lost_flagged_rate == pytest.approx(3 / 5)
     assert columns["lost"][:5].tolist() == probabilities[:5]
     assert np.isnan(columns["lost"][5])
     for lost in (-0.1, 1.5, float("nan")):
@@ -121,7 +121,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["unknown_sides"] == [2, 3, 4]
     assert summary["lost_frames"] == [4]
-    assert summary["lost_said_rate"] == pytest.approx(1 / 6)
+    assert summary["lost_flagged_rate"] == pytest.approx(1 / 6)
     assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.summary)
 
 

@@ -29,7 +29,16 @@ from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 from tests.cases import each
-from tests.tracking.contour_twin import BONE_STARTS, COUNT, STEP, drawn_body, moved_bodies, pull_of_view, pulled
+from tests.tracking.contour_twin import (
+    BONE_STARTS,
+    COUNT,
+    STEP,
+    cone_distance,
+    drawn_body,
+    moved_bodies,
+    pull_of_view,
+    pulled,
+)
 
 CAMERA = Camera.around(np.array([0.0, 0.9, 0.0]), 0.4, 4.0, (200, 200))
 
@@ -77,7 +86,7 @@ def test_the_distance_from_a_cone_is_that_from_the_nearest_of_all_its_discs(radi
     for x, y in rng.uniform(-10.0, 50.0, (40, 2)):
         far = np.linalg.norm((x, y) - (start + shares * (end - start)), axis=1)
         expected = (far - (radii[0] + shares[:, 0] * (radii[1] - radii[0]))).min()
-        distance, share, across, down = kernels.cone_distance(x, y, *start, radii[0], *end, radii[1])
+        distance, share, across, down = cone_distance(x, y, np.array([start, end]), radii)
         assert distance == pytest.approx(expected, abs=1e-4)
         assert 0.0 <= share <= 1.0
         assert np.hypot(across, down) == pytest.approx(1.0)
@@ -142,7 +151,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
         joints, radii, total = numbers[:54].reshape(27, 2), numbers[54:].reshape(26, 2), 0.0
         for x, y in points:
             total += 0.5 * min(
-                kernels.cone_distance(x, y, *joints[p], r[0], *joints[b + 1], r[1])[0]
+                cone_distance(x, y, joints[[p, b + 1]], r)[0]
                 for b, (p, r) in enumerate(zip(BONE_STARTS, radii, strict=True))
             ) ** 2  # fmt: skip
         return total
@@ -170,7 +179,7 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
     curves, slopes = np.zeros((6, 6)), np.zeros(6)
     for (x, y), edge in zip(middles, edges, strict=True):
         length, off = np.linalg.norm(edge), slope @ [x - 20.0, y - 30.0]
-        share = kernels.cone_distance(x, y, *joints[0], radii[0, 0], *joints[1], radii[0, 1])[1]
+        share = cone_distance(x, y, joints, radii[0])[1]
         outwards = slope @ [edge[1], -edge[0]] / length
         way = np.concatenate([np.outer([1.0 - share, share], slope).ravel(), outwards * np.array([1.0 - share, share])])
         weight = length / (1.0 + (off / scale) ** 2)

@@ -22,6 +22,8 @@ from posefit.geometry.calibration import Calibration
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
+from posefit.motion.bvh import write_bvh
+from posefit.progress import Progress
 from posefit.silhouette.cost import project
 from posefit.tracking.live import track_live, write_live
 from tests.cases import each
@@ -172,6 +174,31 @@ def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off
         assert arrays["translations"].shape == (count, 3)
 
 
+def test_what_a_stream_does_not_state_is_logged_and_the_unit_of_its_calibration_is_used(
+    monkeypatch, every_frame, walk, tmp_path
+):
+    write_bvh(tmp_path / "walk.bvh", built_in.motion("walk-b").turned(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
+    pinhole = np.array([[165.0, 0.0, 79.5], [0.0, 165.0, 59.5], [0.0, 0.0, 1.0]])
+    stated = Calibration("a", (160, 120), pinhole, np.zeros(4), np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 30.0]))
+    assumed, person = "30 frames a second", "a person of 1.74 m"
+    for options, guesses in (
+        ({}, [assumed, "a level camera, 40 degrees across: distances and sizes are as good as that", person]),
+        (
+            {"fps": 25.0, "height": 1.8, "camera": (stated,), "unit": "cm", "train": (tmp_path / "walk.bvh",)},
+            ["+y is up in the cameras' world"],
+        ),
+    ):
+        messages = []
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"".join(map(pgm, walk[:12])))))
+        frames = list(track_live(**{**QUICK, **options}, progress=Progress(messages.append)))
+        assert f"guessed: {'; '.join(guesses)}" in messages
+        if options:
+            (warning,) = (message for message in messages if message.startswith("warning: "))
+            assert "z is taken to be up, as the person stands along it" in warning  # in what is learned from
+            # from 30 cm beside the origin, along -z, the person is 165 pixels x 1.8 m / 109 pixels away
+            assert -2.9 < frames[0].frame.translation[2] < -1.9
+
+
 @each(
     "options, expected",
     [
@@ -182,6 +209,20 @@ def test_masks_from_a_pipe_become_poses_on_disk_also_where_the_stream_breaks_off
 def test_options_that_need_all_frames_are_refused(options, expected):
     with pytest.raises(InputError, match=expected):
         next(track_live(**options))
+
+
+@each(
+    "options, expected",
+    [
+        ({"extraction": Extraction("median")}, "extraction must be given for video only, got .* for masks"),
+        ({"unit": "cm"}, "unit must be given for calibrations and files of motions only, got 'cm' for masks"),
+        ({"up": "z"}, "up must be given for calibrations and files of motions only, got 'z' for masks"),
+    ],
+)
+def test_options_that_masks_have_no_use_for_are_refused(options, expected, monkeypatch, every_frame, walk):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"".join(map(pgm, walk[:8])))))
+    with pytest.raises(InputError, match=expected):
+        next(track_live(**QUICK, **options))
 
 
 def test_images_of_another_size_are_refused(every_frame, walk):

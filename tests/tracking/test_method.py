@@ -11,12 +11,12 @@ import pytest
 import posefit
 from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.scene import synthetic
-from posefit.footage.source import scene_of
+from posefit.footage.source import kind_of, scene_of
 from posefit.motion import built_in, recorded
 from posefit.progress import Progress
 from posefit.registry import Offer, Plugin, Registry, registry
-from posefit.tracking import method
-from posefit.tracking.method import resolved
+from posefit.tracking import defaults, method
+from posefit.tracking.defaults import completed
 from posefit.tracking.options import TrackOptions
 from tests.cases import each
 from tests.testing import planted
@@ -172,16 +172,36 @@ def test_the_method_and_the_training_motions_depend_on_the_source() -> None:
         ("a.npz", {"settings": {"exemplars.lag": 0}}, "exemplars", ["library"]),
         ("a.npz", {"method": "vsmm"}, "vsmm", WALKS),
     ):
-        options = resolved(source, TrackOptions(**given))
+        motion = source if kind_of(source) == "motion" else None
+        options = completed(TrackOptions(**given), motion)
         assert (options.method, options.train) == (expected, train), (source, given)
-        again = resolved(source, TrackOptions(**{**given, "method": options.method}))
+        again = completed(TrackOptions(**{**given, "method": options.method}), motion)
         assert (again.method, again.train) == (expected, train), (source, given)
+
+
+@each(
+    ("motion", "options", "evaluations", "restarts", "body_frames", "translation", "smooth"),
+    [
+        ("walk", {}, 2440, 0, 0, "known", False),
+        ("16_15", {}, 9760, 0, 0, "known", False),
+        (None, {}, 9760, 0, 12, "aligned", True),  # its tracker looks ahead, and searches the first pose by itself
+        (None, {"method": "vsmm"}, 2440, 8, 12, "aligned", True),
+        (None, {"method": ("sapso", "pca"), "asf": "a.asf"}, 2440, 8, 0, "aligned", True),  # the build is known
+        (None, {"evaluations": 99, "restarts": 0, "body_frames": 0, "smooth": False}, 99, 0, 0, "aligned", False),
+        ("walk", {"translation": "searched", "restarts": 2, "smooth": True}, 2440, 2, 0, "searched", True),
+    ],
+)
+def test_every_default_is_completed(motion: Any, options: dict[str, Any], **expected: Any) -> None:
+    done = completed(TrackOptions(**options), motion)
+    assert {name: getattr(done, name) for name in expected} == expected
+    assert completed(done, motion) == done
 
 
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
-    options = resolved("a.npz", TrackOptions())
+    monkeypatch.setattr(defaults, "registry", lambda: without)
+    options = completed(TrackOptions(), None)
     assert (options.method, options.train) == ("annealed@loose", WALKS)
 
 

@@ -16,14 +16,14 @@ from posefit.output.folder import Recorder
 from posefit.progress import Progress
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.pipeline import follow
+from posefit.tracking.pipeline import follow_all
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
+    best_ends,
     facing_consensus,
     initial_guess,
     retrack_spins,
     spin_mask,
-    surest_ends,
 )
 from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import Posterior
@@ -115,12 +115,12 @@ def test_a_frame_has_a_vote_for_each_camera_that_sees_the_person() -> None:
 def test_what_stays_lies_between_the_surest_frames_near_both_ends(start: int, stop: int, ends: tuple[int, int]) -> None:
     costs = {4: 0.5, 32: 0.6, 33: 0.4, 57: 0.5}
     frames = [frame(0.0, costs.get(k, 1.0)) for k in range(60)]
-    assert surest_ends(frames, start, stop, FPS) == ends
+    assert best_ends(frames, start, stop, FPS) == ends
 
 
 def test_the_surest_frame_is_one_that_most_cameras_see() -> None:
     frames = [frame(0.0, 9.0 if k in (5, 50) else 1.0, cameras=1 + (k in (5, 50))) for k in range(60)]
-    assert surest_ends(frames, 1, 59, FPS) == (5, 50)
+    assert best_ends(frames, 1, 59, FPS) == (5, 50)
 
 
 def posterior(offset: float) -> Posterior:
@@ -201,7 +201,7 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
         relocalise_gap=0,
         follow=lambda task, observations, rng: Tracker(task).track(observations, rng),
     )
-    (_, frames), _ = follow(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())
+    frames = follow_all(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())[0].frames
     (back, behind), (onward, ahead), (again, _), _ = calls
     assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])
     assert back.backwards
@@ -210,5 +210,5 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
     assert [np.degrees(f.pose[0]) for f in frames] == pytest.approx(range(10))
     assert again.yaw == initial_guess(1, TASK, None, False, frames[5])[1].yaw  # a guess is of the frame it is for
     calls.clear()
-    follow(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
+    follow_all(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
     assert [rows for _, rows in calls] == [list(range(10))]  # what is known of the first frame is kept

@@ -146,7 +146,7 @@ def test_a_track_without_a_sign_against_it_is_good() -> None:
     assert sentence(FINE, []).startswith(
         "Trust: good. No sign speaks against it: size 1.80 m, the fitted body's 1.80 m, "
     )
-    unknown = FINE | {sign.name: None for sign in SIGNS} | {"size_m": None}
+    unknown = FINE | dict.fromkeys(SIGNS) | {"size_m": None}
     assert signs_against(unknown) == []
 
 

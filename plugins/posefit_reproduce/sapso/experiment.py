@@ -26,6 +26,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.cameras import place_of
 from posefit.footage.scene import Scene, with_corruption
 from posefit.motion.motion import Motion
+from posefit.tracking.defaults import completed
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
 from posefit.tracking.method import prepare
@@ -135,7 +136,7 @@ def estimate_images(
 
     `images` are observations of the scene by their frames' numbers; a method is run that `METHODS` names.
     """
-    options = TrackOptions(**options_of(name, training, iterations), seed=seed)
+    options = completed(TrackOptions(**options_of(name, training, iterations), seed=seed), scene.truth)
     task = replace(task_of(scene, options, training), yaw=None)  # Interpretation S17
     method, frames = prepare(options, task), list[Frame]()
     for k, image in images.items():

@@ -1,7 +1,6 @@
 """The SAPSO paper's tables beside ours, its claims with verdicts, and what each part of its method is worth."""
 
 from collections.abc import Iterator, Mapping
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,13 +80,13 @@ def paper_tables(results: Results, motions: Mapping[str, PaperMotion]) -> Iterat
     """Yield all tables: the paper's, its claims, by view, what each part is worth, the turn."""
     analysis = Analysis(results, motions)
     yield motions_table(analysis)
-    yield table_1(analysis)
-    yield table_1_errors(analysis)
-    yield from (table_2(analysis, motion) for motion in motions)
     yield claims_table("claims", list(claims(analysis)))
-    yield by_view(analysis)
     yield parts(analysis)
+    yield table_2(analysis)
+    yield flaws(analysis)
     yield turn(analysis)
+    yield by_view(analysis)
+    yield table_1(analysis)
 
 
 def motions_table(analysis: Analysis) -> Table:
@@ -105,107 +104,109 @@ def motions_table(analysis: Analysis) -> Table:
 
 
 def table_1(analysis: Analysis) -> Table:
-    """Return table 1: twelve angles of one image; ours is the middle frame of the first seed from 45 degrees."""
+    """Return table 1: twelve angles of one image, and the mean error of those that can err, of all images for ours.
+
+    Ours is the middle frame of the first seed from 45 degrees.
+    """
     rows = []
-    for motion, (truth, estimate) in TABLE_1.items():
+    for motion, pair in TABLE_1.items():
         test = analysis.motions[motion].test.poses
-        frame = len(test) // 2
-        angles: dict[str, Array] = {"paper, truth": truth, "paper, estimate": estimate}
-        angles[f"truth of frame {frame}"] = np.degrees(wrapped(test[frame, ANGLES])).reshape(-1, 3)
-        for name in (OURS, LETTER):
-            pose = analysis.results.of("poses", "image", motion, name)[1, 0, frame]
-            angles[LABELS[name]] = np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3)
-        for label, values in angles.items():
-            rows.append([MOTIONS[motion], label, *(", ".join(f"{value:.1f}" for value in joint) for joint in values)])
-    return Table("table-1", ["motion", "", *TABLE_1_JOINTS], rows, 2)
-
-
-def table_1_errors(analysis: Analysis) -> Table:
-    """Return the mean errors of table 1's angles over all images, of the eight that can err and of all twelve."""
-    rows = []
-    for motion, (truth, estimate) in TABLE_1.items():
-        cells = [MOTIONS[motion], f"{np.abs(estimate - truth).mean():.2f}"]
-        for name, kind in ((OURS, "image"), (LETTER, "image"), ("mean_pose", "track"), ("nearest", "track")):
-            errors = table_1_angles(analysis, motion, name, kind)
-            cells += [bounded(interval(errors)), f"{analysis.away(motion, name, kind)[..., ANGLES].mean():.2f}"]
-        rows.append(cells)
-    names = [LABELS[name] for name in (OURS, LETTER, "mean_pose", "nearest")]
-    heads = [head for name in names for head in (f"{name}: angles that can err", "all 12")]
-    return Table("table-1-errors", ["motion", "paper, all 12", *heads], rows)
-
-
-def table_2(analysis: Analysis, motion: str) -> Table:
-    """Return what each method and each baseline is worth on a motion, beside the paper's table 2."""
-    rows, mean = [], analysis.errors(motion, "mean_pose")
-    for name in (*PAPER, *OTHERS, *BASELINES):
-        error = analysis.errors(motion, name)
-        paper = [f"{value:.2f}" for value in TABLE_2[motion][name]] if name in TABLE_2.get(motion, {}) else [""] * 3
-        cells = [LABELS[name], *paper[:2], bounded(interval(error)), f"{analysis.spread(motion, name).mean():.2f}"]
-        cells += [f"{error.max():.2f}", f"{analysis.errors(motion, name, free=True).mean():.2f}"]
-        cells += [f"{100 * analysis.share(which, motion, name).mean():.0f}" for which in ("swapped", "lost")]
-        cells += [f"{100 * (error > mean).mean():.0f}" if name in METHODS else "", paper[2]]
-        cells.append(
-            f"{analysis.results.of('cpu_seconds', 'track', motion, name).mean():.4f}" if name in METHODS else ""
+        frame, images = len(test) // 2, analysis.results.of("poses", "image", motion, OURS)
+        ours = [np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3) for pose in (test[frame], images[1, 0, frame])]
+        mean, letter = (
+            interval(table_1_angles(analysis, motion, *way)) for way in ((OURS, "image"), (LETTER, "image"))
         )
-        unknown = analysis.results.has("unknown", motion, name)
-        cells.append(f"{analysis.errors(motion, name, 'unknown').mean():.2f}" if unknown else "")
+        pose = table_1_angles(analysis, motion, "mean_pose", "track").mean()
+        labels = ["paper, truth", "paper, estimate", f"truth of frame {frame}", "PCA + SAPSO"]
+        errors = ["", f"{np.abs(np.subtract(*pair)).mean():.1f}", f"mean pose {pose:.1f}"]
+        errors.append(f"{bounded(mean, 1)}, the letter {letter.value:.1f}")
+        for label, angles, error in zip(labels, (*pair, *ours), errors, strict=True):
+            cells = [" ".join(f"{value:.1f}" for value in joint) for joint in angles]
+            rows.append([MOTIONS[motion], label, *cells, error])
+    return Table("table-1", ["motion", "", *TABLE_1_JOINTS, "mean error"], rows, 2)
+
+
+def table_2(analysis: Analysis) -> Table:
+    """Return table 2 beside ours: error (9), deviation (10) and seconds a frame of each method and baseline."""
+    rows = []
+    for name in (*PAPER, *OTHERS, *BASELINES):
+        cells = [LABELS[name]]
+        for motion in TABLE_2:
+            paper = TABLE_2[motion].get(name)
+            cells.append("" if paper is None else " / ".join(f"{value:.2f}" for value in paper))
+            figures = [bounded(interval(analysis.errors(motion, name))), f"{analysis.spread(motion, name).mean():.2f}"]
+            if name in METHODS:
+                figures.append(f"{analysis.results.of('cpu_seconds', 'track', motion, name).mean():.4f}")
+            cells.append(" / ".join(figures))
         rows.append(cells)
-    heads = ["method", "paper, (9)", "paper, (10)", "(9), degrees", "(10)", "worst run", "of the angles that can err"]
-    heads += ["swapped %", "lost %", "wrong runs %", "paper, s a frame", "CPU s", "yaw unknown: (9)"]
-    return Table(f"table-2-{motion}", heads, rows)
+    heads = [f"{motion}, {whose}" for motion in TABLE_2 for whose in ("the paper", "here")]
+    return Table("table-2", ["(9) / (10) / seconds", *heads], rows)
+
+
+def flaws(analysis: Analysis) -> Table:
+    """Return how often tracks of each motion go wrong, and their error where the first yaw is unknown."""
+    rows = []
+    for name in (*PAPER, *OTHERS):
+        figures: list[list[str]] = [[], [], [], []]
+        for motion in analysis.motions:
+            worse = analysis.errors(motion, name) > analysis.errors(motion, "mean_pose")
+            shares = [analysis.share(which, motion, name) for which in ("swapped", "lost")]
+            for cell, share in zip(figures, (*shares, worse), strict=False):
+                cell.append(f"{100 * share.mean():.0f}")
+            if analysis.results.has("unknown", motion, name):
+                figures[3].append(f"{analysis.errors(motion, name, 'unknown').mean():.2f}")
+        rows.append([LABELS[name], *(" / ".join(cell) for cell in figures)])
+    heads = ["left for right, % of frames", "lost, % of frames", "worse than the mean pose, % of runs"]
+    return Table("flaws", [" / ".join(analysis.motions), *heads, "(9), first yaw unknown"], rows)
 
 
 def claims(analysis: Analysis) -> Iterator[Claim]:
-    """Yield the paper's claims, each on one motion."""
-    results, motions, all_three, tracked = analysis.results, analysis.motions, [*analysis.motions], ("walk", "run")
-    for motion, (lower, other) in product(tracked, (("sapso@full", "particle@full"), (OURS, "sapso@full"))):
-        difference = analysis.errors(motion, lower) - analysis.errors(motion, other)
-        yield Claim(f"{LABELS[lower]} has a smaller error than {LABELS[other]}, {motion}", "table 2", difference)
+    """Yield the paper's claims, each on one motion: of tracks by (8), of single images by the angles that can err."""
+    results, labels, tracked = analysis.results, MOTIONS, ("walk", "run")
     for motion in tracked:
+        for lower, other in (("sapso@full", "particle@full"), (OURS, "sapso@full")):
+            difference = analysis.errors(motion, lower) - analysis.errors(motion, other)
+            text = f"{LABELS[lower]} has a smaller error than {LABELS[other]}"
+            yield Claim(text, "table 2", labels[motion], difference, "degrees of (8)")
         ours, full = (1e3 * results.of("cpu_seconds", "track", motion, name) for name in (OURS, "sapso@full"))
-        yield Claim(f"PCA + SAPSO takes less time than SAPSO, {motion}", "table 2", ours - full, "CPU ms a frame")
-    for motion in tracked:
-        text = f"tracks have an error of about 4 degrees, {motion}"
-        yield Claim(text, "5.4", analysis.errors(motion), bound=TRACK_DEGREES)
-    # the walk with a turn is followed in the space of the straight walk
-    for (words, count), (motion, name) in product((("six", 6), ("five", 5)), (("turn", "walk"), ("run", "run"))):
-        share = np.asarray(100.0 * PCA().fit(motions[motion].angles).explained[:count].sum())
-        text = f"{words} components keep 95 % of the variance, {name}"
-        yield Claim(text, "2.1", share, "%", 100.0 * VARIANCE, above=True)
-    for motion, (name, form) in product(tracked, ((OURS, ""), (LETTER, ", the letter"))):
-        history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
-        usual = history[:, :, SWARMS.index(40)]
-        fall = usual[:, :, min(CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
-        text = f"after 30 iterations the cost falls by less than 1, {motion}{form}"
-        yield Claim(text, "figure 6", fall, "cost", SAME_COST)
-        ends = np.abs(history[:, :, 0, -1] - history[:, :, -1, -1])
-        text = f"N = 20 and N = 100 differ by less than 1, {motion}{form}"
-        yield Claim(text, "figure 6", ends, "cost", SAME_COST)
-    for motion in all_three:
+        yield Claim("PCA + SAPSO takes less time than SAPSO", "table 2", labels[motion], ours - full, "CPU ms a frame")
+        errors = analysis.errors(motion)
+        yield Claim(
+            "a track's error is about 4 degrees at most", "5.4", labels[motion], errors, "degrees of (8)", TRACK_DEGREES
+        )
+        share = 100.0 * few_joints(analysis, motion)
+        yield Claim("a few joints make up high errors", "5.4", labels[motion], share, "% by 3 of 22", 50.0, above=True)
+        # the walk with a turn is followed in the space of the straight walk
+        space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
+        for words, count in (("six", 6), ("five", 5)):
+            share = np.asarray(100.0 * space.explained[:count].sum())
+            text = f"{words} components keep 95 % of the variance"
+            yield Claim(text, "2.1", labels[motion], share, "%", 100.0 * VARIANCE, above=True)
+        for name, form in ((OURS, ""), (LETTER, ", the letter")):
+            history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
+            usual = history[:, :, SWARMS.index(40)]
+            fall = usual[:, :, min(CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
+            text = f"the cost falls by less than 1 after 30 iterations{form}"
+            yield Claim(text, "figure 6", labels[motion], fall, "of 100", SAME_COST)
+            ends = history[:, :, 0, -1] - history[:, :, -1, -1]
+            text = f"N = 20 ends less than 1 above N = 100{form}"
+            yield Claim(text, "figure 6", labels[motion], ends, "of 100", SAME_COST)
+    for motion in analysis.motions:
+        where, degrees = labels[motion], "degrees"
         away = analysis.away(motion, OURS, "image")
         small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < SMALL_DEGREES).mean(axis=2)
-        text = f"most dimensions have an error below 5 degrees, {motion}"
-        yield Claim(text, "figure 7", small, "% of those that can err", 50.0, above=True)
-    for motion in all_three:
-        errors, paper = (
-            table_1_angles(analysis, motion, OURS, "image"),
-            float(np.abs(np.subtract(*TABLE_1[motion])).mean()),
-        )
-        yield Claim(f"femora and knees are as near as in table 1, {motion}", "table 1", errors, bound=paper)
-    for motion in all_three:
+        yield Claim("most angles have an error below 5 degrees", "figure 7", where, small, "%", 50.0, above=True)
+        paper = float(np.abs(np.subtract(*TABLE_1[motion])).mean())
+        errors = table_1_angles(analysis, motion, OURS, "image")
+        yield Claim("femora and knees are as near as in table 1", "table 1", where, errors, degrees, paper)
+        images = analysis.errors(motion, OURS, "image", free=True)
         hidden = analysis.errors(motion, OURS, "hidden", free=True)
-        worse = hidden - analysis.errors(motion, OURS, "image", free=True)[: len(hidden)]  # of the same views
-        text = f"a hidden part adds less than 1 degree, {motion}"
-        yield Claim(text, "figure 8", worse, bound=SAME_DEGREES)
-    for motion in all_three:
-        around = np.ptp(analysis.errors(motion, OURS, "image", free=True), axis=0)[None]
-        yield Claim(f"eight views have the same error to 1 degree, {motion}", "5.3", around, bound=SAME_DEGREES)
-    for motion in all_three:
+        worse = hidden - images[: len(hidden)]  # of the same views
+        yield Claim("a hidden part adds less than 1 degree", "figure 8", where, worse, degrees, SAME_DEGREES)
+        around = np.ptp(images, axis=0)[None]
+        yield Claim("eight views differ by less than 1 degree", "5.3", where, around, degrees, SAME_DEGREES)
         swapped = 100.0 * analysis.share("swapped", motion, OURS, "image")
-        yield Claim(f"left and right are never exchanged, {motion}", "5.3", swapped, "% of frames", 100.0 * SWAPPED)
-    for motion in tracked:
-        share = 100.0 * few_joints(analysis, motion)
-        yield Claim(f"a few joints make up high errors, {motion}", "5.4", share, "% by 3 of 22", 50.0, above=True)
+        yield Claim("left and right are not exchanged", "5.3", where, swapped, "% of frames", 100.0 * SWAPPED)
 
 
 def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> Array:
@@ -232,14 +233,11 @@ def by_view(analysis: Analysis) -> Table:
     rows = []
     for motion in analysis.motions:
         yaw = analysis.away(motion, OURS, "image")[..., 0]
-        figures = {
-            "PCA + SAPSO, degrees": analysis.errors(motion, OURS, "image", free=True),
-            "the letter, degrees": analysis.errors(motion, LETTER, "image", free=True),
-            "its yaw, degrees": yaw.mean(axis=2),
-            "the wrong way round, %": 100.0 * (yaw > TURNED_ROUND).mean(axis=2),
-            "left for right, %": 100.0 * analysis.share("swapped", motion, OURS, "image"),
-        }
-        for label, values in figures.items():
+        for label, values in (
+            ("PCA + SAPSO, degrees", analysis.errors(motion, OURS, "image", free=True)),
+            ("the letter, degrees", analysis.errors(motion, LETTER, "image", free=True)),
+            ("the wrong way round, %", 100.0 * (yaw > TURNED_ROUND).mean(axis=2)),
+        ):
             digits = 0 if "%" in label else 1
             cells = [f"{value:.{digits}f}" for value in values.mean(axis=1)]
             rows.append([MOTIONS[motion], label, *cells, bounded(interval(values), digits)])
@@ -248,27 +246,19 @@ def by_view(analysis: Analysis) -> Table:
 
 def parts(analysis: Analysis) -> Table:
     """Return by how much PCA + SAPSO is worse without each part, and others than it is, paired by view and seed."""
-    labels = {"sapso@full": "no PCA space: all angles"} | {name: LABELS[name] for name in (*PARTS, *OTHERS, *BASELINES)}
-    rows = []
+    labels = {"sapso@full": "no PCA space: all angles"} | {name: LABELS[name] for name in (*PARTS, *OTHERS)}
+    rows = [["PCA + SAPSO itself", *(bounded(interval(analysis.errors(motion))) for motion in analysis.motions)]]
     for name, label in labels.items():
-        cells = [label]
-        for motion in analysis.motions:
-            cells.append(bounded(interval(analysis.errors(motion, name) - analysis.errors(motion))))
-        rows.append(cells)
-    first = [
-        "PCA + SAPSO itself, degrees",
-        *(bounded(interval(analysis.errors(motion))) for motion in analysis.motions),
-    ]
-    return Table("parts", ["without, or instead", *(MOTIONS[motion] for motion in analysis.motions)], [first, *rows])
+        differences = [analysis.errors(motion, name) - analysis.errors(motion) for motion in analysis.motions]
+        rows.append([label, *(bounded(interval(difference)) for difference in differences)])
+    return Table("parts", ["without, or instead", *(MOTIONS[motion] for motion in analysis.motions)], rows)
 
 
 def turn(analysis: Analysis) -> Table:
     """Return the errors on the walk with a turn, by view."""
     views = sorted({run.view for run in analysis.results.runs if run.kind == "track"})
     rows = []
-    for name in (*COMPARED["turn"], *BASELINES):
-        if name in PARTS:
-            continue
+    for name in (*(name for name in COMPARED["turn"] if name not in PARTS), "mean_pose"):
         errors, worst = analysis.errors("turn", name), analysis.away("turn", name)[..., 0].mean(axis=2)
         cells = [f"{value:.2f}" for value in errors.mean(axis=1)]
         yaw = f"{worst.mean():.1f}" if name in METHODS else ""

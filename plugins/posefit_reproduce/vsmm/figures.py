@@ -7,9 +7,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from posefit.arrays import Array
-from posefit.geometry.skeleton import PARENTS
-from posefit.output.drawing import draw_body, side_view
+from posefit.output.drawing import draw_body
 from posefit.silhouette.foreground import Image
 from posefit_reproduce.experiment import Arrays, Results
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film, film_of
@@ -78,46 +76,21 @@ def _activities(axes: Any, film: Film, label: bool) -> None:
 
 
 def film_stills(film: Film, arrays: Arrays) -> Image:
-    """Return stills: the detected joints on the mask, the fitted body on it, and the body from its side."""
-    columns = [_still(film, {name: value[k] for name, value in arrays.items() if value.ndim}, k) for k in STILLS]
-    rows = [np.hstack(columns[k : k + len(columns) // 2]) for k in (0, len(columns) // 2)]
-    return np.asarray(np.vstack(rows))
+    """Return stills: the detected joints on the mask, filled where they are seen, and below it the fitted body."""
+    stills = [_still(film, {name: value[k] for name, value in arrays.items() if value.ndim}, k) for k in STILLS]
+    rows = [np.hstack(stills[k : k + len(stills) // 2]) for k in (0, len(stills) // 2)]
+    return np.asarray(cv2.resize(np.vstack(rows), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
 
 
 def _still(film: Film, frame: Arrays, k: int) -> Image:
     mask = film.observations[k].silhouettes[0].mask
-    grey = np.where(mask, 150, 28).astype(np.uint8)
-    marked = np.repeat(np.kron(grey, np.ones((LARGER, LARGER), dtype=np.uint8))[..., None], 3, axis=2)
-    for point, confidence in zip(frame["joints"][0], frame["confidence"][0], strict=True):
-        cv2.circle(
-            marked,
-            _pixel(point),
-            4,
-            _JOINT if confidence > 0.0 else _HIDDEN,
-            -1 if confidence > 0.0 else 1,
-            cv2.LINE_AA,
-        )
-    drawn = np.repeat(grey[..., None], 3, axis=2)
+    grey: Image = np.repeat(np.where(mask, 150, 28).astype(np.uint8)[..., None], 3, axis=2)
+    drawn = grey.copy()
     draw_body(drawn, film.body, film.camera, frame["poses"], frame["translations"])
-    drawn = np.asarray(cv2.resize(drawn, None, fx=LARGER, fy=LARGER, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
-    true = film.body.skeleton.joints(film.truth.poses[k], film.truth.translations[k])
-    pixels = film.camera.project(true)[0]
-    for joint, parent in enumerate(PARENTS):
-        if parent >= 0:
-            cv2.line(drawn, _pixel(pixels[parent]), _pixel(pixels[joint]), (90, 255, 90), 1, cv2.LINE_AA)
-    side = side_view(film.body, film.camera, frame["poses"], frame["translations"], drawn.shape[0])
+    marked, drawn = (np.asarray(cv2.resize(i, None, fx=LARGER, fy=LARGER), dtype=np.uint8) for i in (grey, drawn))
+    for point, confidence in zip(LARGER * frame["joints"][0], frame["confidence"][0], strict=True):
+        colour, thickness = (_JOINT, -1) if confidence > 0.0 else (_HIDDEN, 1)
+        cv2.circle(marked, tuple(np.rint(point).astype(int).tolist()), 4, colour, thickness, cv2.LINE_AA)
     middle = slice(drawn.shape[1] // 5, -drawn.shape[1] // 5)
     cv2.putText(marked, f"{k}", (middle.start + 8, 44), cv2.FONT_HERSHEY_SIMPLEX, 1.3, (240, 240, 240), 2, cv2.LINE_AA)
-    parts = (marked[:, middle], drawn[:, middle], side)
-    height = drawn.shape[0] // 2
-    small = [cv2.resize(part, (round(part.shape[1] / 2), height), interpolation=cv2.INTER_AREA) for part in parts]
-    widest = max(int(part.shape[1]) for part in small)
-    columns = []
-    for part in small:  # in the middle, on a background of its own
-        free = widest - part.shape[1]
-        columns.append(cv2.copyMakeBorder(part, 0, 0, free // 2, free - free // 2, cv2.BORDER_REPLICATE))
-    return np.asarray(np.vstack(columns))
-
-
-def _pixel(point: Array) -> tuple[int, int]:
-    return round(LARGER * float(point[0])), round(LARGER * float(point[1]))
+    return np.vstack([marked[:, middle], drawn[:, middle]])

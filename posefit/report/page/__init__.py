@@ -4,7 +4,7 @@
 |---|---|
 | the sections, empty, and how they look | report.html, report.css |
 | colours and marks of methods, the legend whose buttons show and hide them | methods.js |
-| charts: lines with bands and dots, errors of joints | charts.js |
+| charts: lines with bands, errors of joints | charts.js |
 | the first screen: all methods, three tracks of the leader, trouble | first.js |
 | the tables: leaderboard, all runs, running times, failures; the command that runs a cell again | tables.js |
 | paired tests: one method against all others | compare.js |

@@ -1,4 +1,4 @@
-// Charts of the methods that are shown: lines with bands and dots, and errors of joints.
+// Charts of the methods that are shown: lines with bands, and errors of joints.
 const LABELLED = 8; // lines that have their names at their ends
 
 // Round values of a logarithmic scale.
@@ -25,11 +25,11 @@ function textWidth(text, weight = 400) {
   return measuring.measureText(text).width;
 }
 
-// The charts of a section, each with a line of the methods that are shown.
-function drawCharts(section) {
-  for (const about of D.charts.filter(({ section: own }) => own === section)) {
+// The charts, each with a line of the methods that are shown.
+function drawCharts() {
+  for (const about of D.charts) {
     const [box, note] = [make("div", { class: "chart", id: about.name }), make("p", { class: "small" })];
-    $(`${section}-charts`).append(make("figure", {}, make("figcaption", {}, about.title), box, note));
+    $("curves-charts").append(make("figure", {}, make("figcaption", {}, about.title), box, note));
     drawn(box, (width) => {
       const [lines, without] = [[], []];
       for (const [m, place] of visible())
@@ -47,13 +47,13 @@ function usualMost(values) {
   return rising[Math.floor(0.98 * (rising.length - 1))] || 1;
 }
 
-// A chart of lines {m, x, y, low, high, dots}.
-function chart(width, lines, { x_label, y_label, most, log, stepped, guides }) {
+// A chart of lines {m, x, y, low, high}.
+function chart(width, lines, { x_label, y_label, most, log, stepped }) {
   const height = between(240, 380, 0.62 * width);
   const longest = Math.max(0, ...lines.map(({ m }) => textWidth(METHODS[m])));
   const named = lines.length > 0 && lines.length <= LABELLED && longest < 0.3 * width;
   const edges = { left: 46, right: named ? longest + 16 : 22, top: 24, bottom: 40 };
-  const places = [...lines.flatMap(({ x }) => x), ...guides.flatMap(([x, , end]) => [x, end])];
+  const places = lines.flatMap(({ x }) => x);
   const ends = [log ? Math.min(...places) : 0, places.length ? Math.max(...places) : 1];
   const x = { from: ends[0], to: ends[1], log, label: x_label, show: log ? whole : rounded };
   const inner = width - edges.left - edges.right;
@@ -62,9 +62,7 @@ function chart(width, lines, { x_label, y_label, most, log, stepped, guides }) {
   const to = most ?? 1.05 * usualMost(lines.flatMap(({ y }) => y));
   const y = { to, marks: steps(0, to, 5), show: rounded, label: y_label };
   const frame = axes({ ...edges, width, height, name: `${y_label} over ${x_label}` }, x, y);
-  const { svg, at, up } = frame;
-  for (const [x1, y1, x2, y2] of guides)
-    svg.append(drawLine(at(x1), up(y1), at(x2), up(y2), { class: "axis", "stroke-dasharray": "4 4" }));
+  const { svg, up } = frame;
   svg.append(...lines.map((line, order) => drawnLine(frame, line, order, stepped)));
   if (named)
     spread(
@@ -76,8 +74,8 @@ function chart(width, lines, { x_label, y_label, most, log, stepped, guides }) {
   return svg;
 }
 
-// A line with its band, and marks of its method: on every dot, else now and then.
-function drawnLine({ at, up }, { m, x, y, low, high, dots }, order, stepped) {
+// A line with its band, and marks of its method now and then.
+function drawnLine({ at, up }, { m, x, y, low, high }, order, stepped) {
   const points = x.map((value, k) => [at(value), up(y[k])]);
   const line = path(
     stepped ? points.flatMap((point, k) => (k ? [[point[0], points[k - 1][1]], point] : [point])) : points,
@@ -97,9 +95,7 @@ function drawnLine({ at, up }, { m, x, y, low, high, dots }, order, stepped) {
     ends.length ? band(ends, { class: "band", style: `fill: ${colour(m)}` }) : null,
     draw("path", { class: "near", d: line }, title),
     draw("path", { class: "curve", d: line, ...stroke(m, 2) }),
-    ...(dots.length
-      ? points.map(([left, top], k) => mark(m, left, top, 4.5, `${METHODS[m]}: ${dots[k]}`))
-      : marked.map(([left, top]) => mark(m, left, top, 3.6))),
+    ...marked.map(([left, top]) => mark(m, left, top, 3.6)),
   );
 }
 
@@ -118,7 +114,7 @@ function spread(wanted, gap, low, high) {
 
 function curves() {
   legend();
-  if (D.charts.length) drawCharts("curves");
+  if (D.charts.length) drawCharts();
   else $("curves-charts").append("No run has a trace.");
 }
 
@@ -145,7 +141,6 @@ function joints() {
 }
 
 function certainty() {
-  drawCharts("certainty");
   const { levels, methods } = D.certainty;
   const share = (value) => `${number(100 * value, 1)} %`;
   const percents = (value) => `${whole(100 * value)} %`;
@@ -154,7 +149,7 @@ function certainty() {
     column(`within ${percents(level)}`, ({ coverage }) => coverage[k], share, { about: within(level) }),
     column("mm", ({ width }) => width[k], whole, { about: "Mean radius of these balls" }),
   ]);
-  const about = "Expected calibration error of the likeliest mode's probability: the mean distance from the diagonal";
+  const about = "Expected calibration error of the likeliest mode's probability: the mean distance from how often it is right";
   const error = column("calibration error", "ece", (value) => number(value, 3), { about });
   const rows = D.taking_part.flatMap((m, place) => (methods[place] ? [{ m, ...methods[place] }] : []));
   table($("sure"), [methodColumn("m"), ...columns, error], rows, { name: "Uncertainty" });

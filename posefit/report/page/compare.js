@@ -8,14 +8,13 @@ function duelsOf(m) {
   const P = D.pairs;
   const place = P.methods.indexOf(m);
   const minus = (value) => (given(value) ? -value : null);
-  const not = (share) => (given(share) ? 1 - share : null);
   return P.pairs
     .filter((pair) => pair.slice(0, 2).includes(place))
-    .map(([first, second, difference, from, to, p, adjusted, better, low, high]) => {
-      if (first === place) return { other: P.methods[second], difference, from, to, p, adjusted, better, low, high };
-      const opposite = { difference: -difference, from: minus(to), to: minus(from), p, adjusted };
-      return { other: P.methods[first], ...opposite, better: not(better), low: not(high), high: not(low) };
-    });
+    .map(([first, second, difference, from, to, p, adjusted]) =>
+      first === place
+        ? { other: P.methods[second], difference, from, to, p, adjusted }
+        : { other: P.methods[first], difference: -difference, from: minus(to), to: minus(from), p, adjusted },
+    );
 }
 
 function comparison() {
@@ -33,11 +32,6 @@ function comparison() {
     intervalColumn("Of the median, from six runs on", "difference", 2, ["from", "to"]),
     column("p", "p", probability),
     column("p after Holm", "adjusted", probability, { about: `Adjusted for all ${P?.pairs.length} comparisons` }),
-    column("probability of improvement", "better", twoDigits, {
-      about: "That a run of the chosen method has the lower error",
-      down: true,
-    }),
-    intervalColumn("Of the probability, from three seeds on, if the runs are not too many", "low", 2),
     textColumn("verdict", verdict),
   ];
   const show = (m) => {

@@ -24,17 +24,32 @@ TINY = 1e-9
 
 
 @jit
-def cone_distance(x, y, x0, y0, r0, x1, y1, r1):
+def write_cones(parents, centres, radii, cones, discs):
+    """Write what distances from bones need (B, 8), and a disc about each bone (B, 3): its middle and radius.
+
+    A cone is its first point and radius, by how much the last point is off it and the last radius is less, its length,
+    and that of its sides; 0 where one of its discs covers the other.
+    """
+    for b in range(parents.size):
+        x, y, r0, r1 = centres[parents[b], 0], centres[parents[b], 1], radii[b, 0], radii[b, 1]
+        dx, dy, dr = centres[b + 1, 0] - x, centres[b + 1, 1] - y, r0 - r1
+        square = dx * dx + dy * dy
+        length, side = math.sqrt(square), math.sqrt(square - dr * dr) if square > dr * dr + TINY else 0.0
+        for i, value in enumerate((x, y, r0, dx, dy, dr, length, side)):
+            cones[b, i] = value
+        discs[b, 0], discs[b, 1], discs[b, 2] = x + 0.5 * dx, y + 0.5 * dy, 0.5 * length + max(r0, r1)
+
+
+@inlined
+def cone_distance(x, y, cone):
     """Return how far a point is outside a cone, below 0 within, the share of the bone it is at, and its normal."""
-    dx, dy, dr = x1 - x0, y1 - y0, r0 - r1
-    square = dx * dx + dy * dy
-    if square <= dr * dr + TINY:  # one disc covers the other
-        share = 0.0 if r0 >= r1 else 1.0
+    x0, y0, r0, dx, dy, dr, length, side = cone[0], cone[1], cone[2], cone[3], cone[4], cone[5], cone[6], cone[7]
+    if side == 0.0:
+        share = 0.0 if dr >= 0.0 else 1.0
     else:
-        length = math.sqrt(square)
         along = ((x - x0) * dx + (y - y0) * dy) / length
         across = abs((y - y0) * dx - (x - x0) * dy) / length
-        share = min(max((along - across * dr / math.sqrt(square - dr * dr)) / length, 0.0), 1.0)
+        share = min(max((along - across * dr / side) / length, 0.0), 1.0)
     ox, oy = x - (x0 + share * dx), y - (y0 + share * dy)
     off = math.sqrt(ox * ox + oy * oy)
     return off - (r0 - share * dr), share, ox / max(off, TINY), oy / max(off, TINY)
@@ -52,48 +67,15 @@ def _add(block, slope, share, across, down, wide, off, weight):
 
 
 @jit
-def _write_cones(parents, centres, radii, cones, discs):
-    """Write what distances from bones need (B, 8), and a disc about each (B, 3).
-
-    A cone is its first point, its axis, of length 1, its length, its first radius, by how much less the last is, and
-    how far along the axis a point's nearest is from where it would be on a cylinder, for each pixel across.
-    """
-    for b in range(parents.size):
-        x, y = centres[parents[b], 0], centres[parents[b], 1]
-        r0, r1 = radii[b, 0], radii[b, 1]
-        dx, dy, dr = centres[b + 1, 0] - x, centres[b + 1, 1] - y, r0 - r1
-        length = math.sqrt(dx * dx + dy * dy)
-        discs[b, 0], discs[b, 1], discs[b, 2] = x + 0.5 * dx, y + 0.5 * dy, 0.5 * length + max(r0, r1)
-        if length <= abs(dr) + TINY:  # one disc covers the other
-            if dr < 0.0:
-                x, y, r0 = x + dx, y + dy, r1
-            dx, dy, dr, length = 0.0, 0.0, 0.0, 0.0
-        inverse, slope = 1.0 / max(length, TINY), dr / math.sqrt(max(length * length - dr * dr, TINY))
-        cones[b, 0], cones[b, 1], cones[b, 2], cones[b, 3] = x, y, dx * inverse, dy * inverse
-        cones[b, 4], cones[b, 5], cones[b, 6], cones[b, 7] = length, r0, dr * inverse, slope
-
-
-@inlined
-def _from_cone(x, y, cone):
-    """Return how far a point is off the nearest of a cone's discs, in x and in y, and its radius."""
-    ox, oy = x - cone[0], y - cone[1]
-    along = ox * cone[2] + oy * cone[3]
-    across = abs(oy * cone[2] - ox * cone[3])
-    at = min(max(along - across * cone[7], 0.0), cone[4])
-    return ox - at * cone[2], oy - at * cone[3], cone[5] - at * cone[6]
-
-
-@jit
 def _nearest_bone(x, y, first, cones, discs):
-    """Return the bone whose border is nearest to a point, and how far that is off; begin with `first`."""
+    """Return the bone whose border is nearest to a point; begin with `first`."""
     least, bone = np.inf, first
     for k in range(-1, discs.shape[0]):
         b = first if k < 0 else k
         reach = least + discs[b, 2]
         if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 >= reach * reach:
             continue
-        ox, oy, radius = _from_cone(x, y, cones[b])
-        off = math.sqrt(ox * ox + oy * oy) - radius
+        off = cone_distance(x, y, cones[b])[0]
         if off < least:
             least, bone = off, b
     return bone
@@ -115,10 +97,9 @@ def _write_neighbours(bone, discs, neighbours):
 @jit
 def _covered(x, y, neighbours, cones, discs):
     for b in neighbours:
-        if (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[b, 2]:
-            ox, oy, radius = _from_cone(x, y, cones[b])
-            if radius > COVERED and ox * ox + oy * oy < (radius - COVERED) ** 2:
-                return True
+        near = (x - discs[b, 0]) ** 2 + (y - discs[b, 1]) ** 2 < discs[b, 2] * discs[b, 2]
+        if near and cone_distance(x, y, cones[b])[0] < -COVERED:
+            return True
     return False
 
 
@@ -131,15 +112,12 @@ def add_pulls(parents, centres, radii, contour, scale, blocks, slopes):
     """
     field, corner, size, points, step = contour
     cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
-    _write_cones(parents, centres, radii, cones, discs)
+    write_cones(parents, centres, radii, cones, discs)
     bone, neighbours = 0, np.empty(parents.size, np.int64)
     for i in range(points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         bone = _nearest_bone(x, y, bone, cones, discs)
-        p, n = parents[bone], bone + 1
-        off, share, nx, ny = cone_distance(
-            x, y, centres[p, 0], centres[p, 1], radii[bone, 0], centres[n, 0], centres[n, 1], radii[bone, 1]
-        )
+        off, share, nx, ny = cone_distance(x, y, cones[bone])
         weight = step / (1.0 + (off / scale) ** 2)
         _add(blocks[bone], slopes[bone], share, -nx, -ny, -1.0, off, weight)
     spacing = 2.0 * step

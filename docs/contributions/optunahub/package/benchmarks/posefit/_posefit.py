@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import optunahub
 import posefit
-from posefit_bridges import optunahub_problem
+from posefit_bridges.problems import optunahub_problem
 
 
 def Problem(function: int = 1, instance: int = 0, dimension: int = 9) -> optunahub.benchmarks.BaseProblem:

@@ -1,4 +1,13 @@
-"""Optuna's samplers by ask and tell."""
+"""Samplers of Optuna for posefit: `optuna:SAMPLER`, such as `optuna:TPESampler` or `optuna:GPSampler`.
+
+T. Akiba et al., Optuna: a next-generation hyperparameter optimization framework, KDD 2019.
+`pip install posefit[optuna]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", method="optuna:CmaEsSampler", frames=(0, 3), evaluations=100)
+>>> track.summary["iou"] > 0.3
+True
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

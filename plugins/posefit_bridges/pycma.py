@@ -1,4 +1,12 @@
-"""pycma's evolution strategy by ask and tell."""
+"""CMA-ES as the library pycma implements it, for posefit: `pycma`.
+
+N. Hansen, Y. Akimoto, P. Baudis, CMA-ES/pycma on GitHub, 2019. `pip install posefit[pycma]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", method="pycma", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from typing import Any, final
 

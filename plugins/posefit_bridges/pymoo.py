@@ -1,4 +1,12 @@
-"""pymoo's algorithms by ask and tell."""
+"""Optimisers of pymoo for posefit: `pymoo:NAME`, one of its single-objective algorithms with a population.
+
+J. Blank, K. Deb, pymoo: multi-objective optimization in Python, IEEE Access 8, 2020. `pip install posefit[pymoo]`.
+
+>>> import posefit
+>>> track = posefit.track("walk", method="pymoo:DE", frames=(0, 3))
+>>> track.summary["iou"] > 0.5
+True
+"""
 
 from importlib import import_module
 from typing import Any, Literal, final
