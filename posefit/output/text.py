@@ -9,12 +9,13 @@ from posefit.evaluation.trust import trust_line
 from posefit.reading import counted
 
 MIN_BUILD_CHANGE = 0.05  # a part of the build that is off the average by less is not worth a word
+MIN_MODE = 0.08  # of the weight of a pose that is worth a word
 WIDTH = 30  # of the names
 MAX_NAMED = 8  # motions that were learned from, and are named
 
 
 def brief(summary: Mapping[str, Any]) -> list[str]:
-    """Return in two lines what a track is worth, and what it took."""
+    """Return in lines what a track is worth, which poses a single frame leaves open, and what it took."""
     trust = summary["trust"]
     if trust is None:
         error = MEASURES["error_degrees"].shown(summary["error_degrees"]["mean"])
@@ -24,7 +25,11 @@ def brief(summary: Mapping[str, Any]) -> list[str]:
     guessed = ", camera guessed" if summary["camera"] == "guessed" else ""
     frames = counted(summary["frames"], "frame")
     work = f"{summary['motion']}: {frames} by {summary['method']}{guessed}, {_effort(summary)}"
-    return [printable(worth), printable(work)]
+    weights = [weight * (1.0 - summary["none_of_modes"]) for weight in summary["modes"] or [] if weight >= MIN_MODE]
+    if summary["frames"] > 1 or len(weights) < 2:
+        return [printable(worth), printable(work)]
+    shares = ", ".join(f"{100.0 * weight:.0f} %" for weight in weights)
+    return [printable(worth), f"one silhouette leaves {len(weights)} poses open: {shares}", printable(work)]
 
 
 def table(summary: Mapping[str, Any]) -> str:

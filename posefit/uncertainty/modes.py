@@ -93,13 +93,18 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in clusters]
 
 
-def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
-    """Return the likeliest mode but the one nearest to a pose (66,); None where no weight is above `above`."""
+def other_modes(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> list[Mode]:
+    """Return the modes with weights above `above` but the one nearest to a pose (66,), the likeliest first."""
     if len(modes) < 2:
-        return None
+        return []
     nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
-    other = max((mode for k, mode in enumerate(modes) if k != nearest), key=lambda mode: mode.weight)
-    return other if other.weight > above else None
+    others = [mode for k, mode in enumerate(modes) if k != nearest and mode.weight > above]
+    return sorted(others, key=lambda mode: -mode.weight)
+
+
+def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
+    """Return the likeliest of the `other_modes`; None where there are none."""
+    return next(iter(other_modes(skeleton, modes, pose, above)), None)
 
 
 def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART) -> bool:
