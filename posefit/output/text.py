@@ -25,11 +25,9 @@ def brief(summary: Mapping[str, Any]) -> list[str]:
     guessed = ", camera guessed" if summary["camera"] == "guessed" else ""
     frames = counted(summary["frames"], "frame")
     work = f"{summary['motion']}: {frames} by {summary['method']}{guessed}, {_effort(summary)}"
-    weights = [weight * (1.0 - summary["none_of_modes"]) for weight in summary["modes"] or [] if weight >= MIN_MODE]
-    if summary["frames"] > 1 or len(weights) < 2:
-        return [printable(worth), printable(work)]
-    shares = ", ".join(f"{100.0 * weight:.0f} %" for weight in weights)
-    return [printable(worth), f"one silhouette leaves {len(weights)} poses open: {shares}", printable(work)]
+    open_poses = sum(weight >= MIN_MODE for weight in summary["modes"] or [])
+    modes = [f"one silhouette leaves {open_poses} poses open"] if summary["frames"] == 1 and open_poses > 1 else []
+    return [printable(line) for line in (worth, *modes, work)]
 
 
 def table(summary: Mapping[str, Any]) -> str:
