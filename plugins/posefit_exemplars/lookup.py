@@ -129,7 +129,11 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
 
 
 class Lookup:
-    """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones."""
+    """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones.
+
+    Settings:
+        mirrored: whether the mirror images of all clips are learned from as well.
+    """
 
     def __init__(self, task: Task, *, mirrored: bool = True) -> None:
         training = [motion.reversed() for motion in task.training] if task.backwards else task.training
