@@ -158,7 +158,8 @@ def evaluations(each: int) -> None:
             posterior = Lookup(task).posterior(observation)
             spaces = {"blind": space, "from the start": space}
             if posterior is not None:
-                start = start_in(space, modes_apart(task.body.skeleton, posterior), 0.05)
+                problem = posefit.PoseProblem(task.body, task.cameras, observation.silhouettes, space)
+                start = start_in(problem, modes_apart(task.body.skeleton, posterior))
                 spaces["from the start"] = replace(space, start=start)
             names.append(image.clip.name)
             for optimiser in ("sapso", "cma"):

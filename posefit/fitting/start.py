@@ -11,13 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.box import Start, displacement
+from posefit.fitting.box import Start
+from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
 
 MODES = 8  # at most
 APART = 0.2  # metres, the mean over joints, beyond which poses are of different modes: what a library's poses are off
+SPREAD = 0.08  # of a mode in half-ranges of the box: standard deviation
+SMALL_SIDE = 60  # pixels of the picture in which projected poses are compared, at least
+TEMPERATURE = 2.0  # divides their costs
+INFEASIBLE = 5.0  # added to the cost of a pose that is none to the prior
 
 
 def modes_apart(skeleton: Skeleton, posterior: Posterior) -> list[tuple[float, Posterior]]:
@@ -31,19 +36,24 @@ def modes_apart(skeleton: Skeleton, posterior: Posterior) -> list[tuple[float, P
     return modes
 
 
-def start_in(space: SearchSpace, modes: Sequence[tuple[float, Posterior]], floor: float) -> Start:
-    """Return the start around modes in a space: standard deviations are those of their poses, at least a `floor`."""
-    starts = [_start_of(space, weight, mode, floor) for weight, mode in modes]
+def start_in(problem: PoseProblem, modes: Sequence[tuple[float, Posterior]]) -> Start:
+    """Return the start of a problem around modes of what it may show, the likeliest first.
+
+    Each mode is around that of its poses which, projected onto the latents, costs least in a small picture; these costs
+    weigh the modes again, as a space that cannot show a pose need not be searched there.
+    """
+    space, factor = problem.space, max(min(problem.silhouettes[0].size) // SMALL_SIDE, 1)
+    projected = [space.proposals(coordinates_of(space, mode.poses, mode.translations)) for _, mode in modes]
+    costs = [problem.coarser(factor).evaluate(poses) + INFEASIBLE * ~space.feasible(poses) for poses in projected]
+    least = min(float(each.min()) for each in costs)
+    weights = [float(np.exp((least - each) / TEMPERATURE).sum()) for each in costs]
+    spread, still = np.full(space.dimensions, SPREAD), np.zeros(space.dimensions)
+    starts = [
+        Start(poses[each.argmin()], spread, still, weight)
+        for poses, each, weight in zip(projected, costs, weights, strict=True)
+    ]
+    starts.sort(key=lambda start: -start.weight)
     return replace(starts[0], others=starts[1:])
-
-
-def _start_of(space: SearchSpace, weight: float, mode: Posterior, floor: float) -> Start:
-    proposals = space.proposals(coordinates_of(space, mode.poses, mode.translations))
-    away = displacement(space, proposals[0], proposals)
-    shift = mode.weights @ away
-    spread = np.sqrt(mode.weights @ (away - shift) ** 2)
-    mean = np.clip(proposals[0] + shift, -1.0, 1.0)
-    return Start(mean, np.maximum(spread, floor), np.zeros(space.dimensions), weight)
 
 
 def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Array:

@@ -215,7 +215,9 @@ class Follower:
             if anchor is not None:
                 space = space.around(space.centre, anchor=anchor)
             if modes := self._task.modes or guessed_modes(self._task, observation):
-                space = replace(space, start=start_in(space, modes, self._how.floor))
+                views = self._task.cameras, observation.silhouettes
+                problem = PoseProblem(self._task.body, *views, space, beta=self._how.beta, blank=True)
+                space = replace(space, start=start_in(problem, modes))
             elif self._task.first_pose is not None:
                 space = replace(space, start=self._given(space, self._task.first_pose))
             self._space = space

@@ -3,18 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 import posefit
 from posefit.fitting.box import Start, draw_population
+from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.start import APART, modes_apart, start_in
+from posefit.fitting.start import APART, SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
 from posefit.testing.toy import Toy
 from posefit.uncertainty.modes import Posterior
 
-FLOOR = 0.05
 WALK = built_in.motion("walk-a", frames=40)
 PRIOR = posefit.prior("pca")().fit(WALK.poses[:, 3:], WALK.skeleton)
 SPACE = SearchSpace(PRIOR, np.zeros(3), np.array([np.pi, 0.3, 0.3]), np.zeros(3))
@@ -56,24 +55,33 @@ def test_poses_near_each_other_are_one_mode_with_the_sum_of_their_weights() -> N
     assert 0.1 < APART < 0.4  # a body that is turned by half a circle is farther from itself
 
 
-def test_a_mode_is_projected_onto_the_latents_of_the_prior() -> None:
-    start = start_in(SPACE, modes_apart(WALK.skeleton, weighted([5, 20], [0.0, 2.5], [3.0, 1.0])), FLOOR)
+def problem_of(row: int, turn: float) -> PoseProblem:
+    """Return the problem whose silhouette is of one of the walker's poses, turned."""
+    body = posefit.Body.of(WALK.skeleton)
+    camera = posefit.Camera.around(WALK.translations[row], 0.3, 5.0, (160, 120))
+    pose = WALK.poses[row].copy()
+    pose[0] += turn
+    mask = posefit.project(body, camera, pose, WALK.translations[row])
+    space = replace(SPACE, anchor=WALK.translations[row])
+    return PoseProblem(body, [camera], [posefit.Silhouette.of(mask)], space)
+
+
+def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_costs_there() -> None:
+    start = start_in(problem_of(20, 2.5), modes_apart(WALK.skeleton, weighted([5, 20], [0.0, 2.5], [3.0, 1.0])))
     (other,) = start.others
-    assert (start.weight, other.weight) == (0.75, 0.25)
-    for mode, row, turn in ((start, 5, 0.0), (other, 20, 2.5)):
+    assert start.weight > other.weight > 0.0  # the silhouette is that of the mode whose weight was less
+    for mode, row, turn in ((start, 20, 2.5), (other, 5, 0.0)):
         pose = SPACE.decode(mode.mean[None])[0][0]
-        np.testing.assert_allclose(pose[0], WALK.poses[row, 0] + turn, atol=1e-9)
+        np.testing.assert_allclose(np.cos(pose[0] - WALK.poses[row, 0] - turn), 1.0)
         projected = PRIOR.inverse_transform(PRIOR.transform(WALK.poses[row : row + 1, 3:]))[0]
         np.testing.assert_allclose(pose[3:], projected, atol=1e-9)
-        np.testing.assert_array_equal(mode.spread, np.full(SPACE.dimensions, FLOOR))
+        np.testing.assert_array_equal(mode.spread, np.full(SPACE.dimensions, SPREAD))
 
 
-def test_a_spread_is_that_of_the_poses_of_a_mode_also_across_the_end_of_the_circle() -> None:
-    yaw = WALK.poses[5, 0]
-    ((_, mode),) = modes_apart(WALK.skeleton, weighted([5, 5], [np.pi - yaw - 0.2, 0.2 - np.pi - yaw], [1.0, 1.0]))
-    start = start_in(SPACE, [(1.0, mode)], 0.001)
-    np.testing.assert_allclose(start.spread[0], 0.2 / np.pi, rtol=1e-9)
-    assert abs(start.mean[0]) == pytest.approx(1.0)
+def test_a_mode_is_around_its_pose_that_costs_least() -> None:
+    ((_, mode),) = modes_apart(WALK.skeleton, weighted([5, 5, 5], [0.3, 0.2, 0.0], [5.0, 4.0, 1.0]))
+    start = start_in(problem_of(5, 0.0), [(1.0, mode)])
+    np.testing.assert_allclose(SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9)
 
 
 class Knows:
