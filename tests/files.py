@@ -1,5 +1,6 @@
 """Files that tests read back."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -10,3 +11,9 @@ def arrays(path: Path) -> dict[str, NDArray[np.generic]]:
     """Return the arrays of an .npz file, which is closed again: left open, it warns in whichever test comes later."""
     with np.load(path) as stored:
         return dict(stored)
+
+
+def csv_rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a .csv file."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))

@@ -13,7 +13,6 @@ import click
 
 from posefit.cli.options import JSON
 from posefit.cli.output import progress, say
-from posefit.errors import InputError
 
 if TYPE_CHECKING:
     from posefit_reproduce.experiment import Experiment
@@ -72,32 +71,18 @@ def _print(experiment: "Experiment", out: str | None, workers: int, as_json: boo
 
 @click.command("bench")
 @click.option("--threads", type=click.IntRange(1), help="Threads of the multi-threaded figures; by default every core.")
-@click.option("--device", type=click.Choice(["cuda"]), help="Time a GPU beside the CPU instead, and compare counts.")
 @JSON
-def bench_command(threads: int | None, device: str | None, as_json: bool) -> None:
+def bench_command(threads: int | None, as_json: bool) -> None:
     """Time the kernel, the OpenCV way, a SAPSO frame and every optimiser's ask and tell, all in one run.
 
     `cpu` names the processor that the loops are compiled for: this machine's, or the one that the environment variable
     NUMBA_CPU_NAME names, such as x86-64-v3, which has AVX2 and no AVX-512, or x86-64-v2, which has SSE4.
     """
-    from posefit.silhouette.cuda.device import check_device
+    from posefit_reproduce.bench.loop import loop_figures
 
-    if None not in (threads, device):
-        raise InputError("bench must have --threads or --device, got both")
-    if device is None:
-        from posefit_reproduce.bench.loop import loop_figures
-
-        say("timing; this takes half a minute ...")
-        figures = loop_figures(threads)
-        lines = _named_lines(figures)
-    else:
-        from posefit_reproduce.bench.device import device_figures, device_lines
-
-        check_device(device)
-        say("timing the GPU beside the CPU; this takes a minute or more ...")
-        figures = device_figures(device)
-        lines = device_lines(figures)
-    click.echo(json.dumps(figures) if as_json else "\n".join(lines))
+    say("timing; this takes half a minute ...")
+    figures = loop_figures(threads)
+    click.echo(json.dumps(figures) if as_json else "\n".join(_named_lines(figures)))
 
 
 def _named_lines(figures: Mapping[str, Any], group: str = "") -> Iterator[str]:

@@ -53,11 +53,11 @@ def write_iohprofiler(runs: Sequence[SuiteRun], path: str | Path) -> None:
         # names of several words, which no optimiser's setting has
         budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
         settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
-        of_one = algorithms.setdefault((run.method, json.dumps(settings, sort_keys=True, default=str)), {})
+        logged = algorithms.setdefault((run.method, json.dumps(settings, sort_keys=True, default=str)), {})
         place = run.function, run.dimension, run.instance, run.seed
-        if place in of_one:
+        if place in logged:
             raise InputError(f"runs must differ, got two of {run.method} on {run.suite}, {place}: f, d, instance, seed")
-        of_one[place] = run
+        logged[place] = run
     algorithms = dict(sorted(algorithms.items()))
     methods = [method for method, _ in algorithms]
     numbers = [methods[: k + 1].count(method) for k, method in enumerate(methods)]
@@ -66,10 +66,10 @@ def write_iohprofiler(runs: Sequence[SuiteRun], path: str | Path) -> None:
         for method, number in zip(methods, numbers, strict=True)
     ]
     with new_folder(path) as folder:
-        for (_, info), name, file_name, own in zip(
+        for (_, info), name, file_name, logged in zip(
             algorithms, names, _file_names(names), algorithms.values(), strict=True
         ):
-            for _, here in groupby([own[key] for key in sorted(own)], key=lambda run: run.function):
+            for _, here in groupby([logged[key] for key in sorted(logged)], key=lambda run: run.function):
                 _write_function(folder / file_name, {"name": name, "info": info}, list(here))
 
 

@@ -17,11 +17,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from posefit import testing
 from posefit.errors import InputError
 from posefit.fitting.check import one_of
 from posefit.limits import end_with_parent, memory
-from posefit.testing import results
+from posefit.testing import checks_of, results
 from posefit.testing.results import Check, Report, Result, not_run
 
 GIGABYTES = 4.0  # what a check may need
@@ -122,8 +121,8 @@ def _checks(kind: Any, name: str, texts: Sequence[str], only: Sequence[str]) -> 
     if kind == "prior" and settings:
         offer.factory(**settings)  # a value that makes no sense is one mistake, not one a check
     registered = {"optimiser": "next_frame", "tracker": "looks_ahead"}
-    options: dict[str, Any] = {registered[kind]: getattr(offer, registered[kind])} if kind in registered else {}
-    checks: list[Check] = getattr(testing, f"{kind}_checks")(offer.factory, settings=settings, **options)
+    more = [getattr(offer, registered[kind])] if kind in registered else []
+    checks = checks_of(kind, offer.factory, settings, *more)
     names = [check.name for check in checks]
     for rule in only:
         one_of("--only", rule, names)

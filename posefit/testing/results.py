@@ -40,10 +40,9 @@ class Result:
 
 @dataclass(frozen=True)
 class Check:
-    """One rule, ready to be checked against one plugin; calling it is a test for pytest."""
+    """One rule, ready to be checked against one plugin."""
 
     name: str
-    rule: str
     body: Callable[[], str | None] = field(repr=False)
 
     def run(self) -> Result:
@@ -62,16 +61,6 @@ class Check:
         except Exception as raised:  # a plugin may raise anything
             detail, error = f"it must not fail, got {type(raised).__name__}: {raised}", raised
         return Result(self.name, "failed", detail, _plugin_traceback(error))
-
-    def __call__(self) -> None:
-        """Raise BrokenError where the rule is broken; skip the test where it does not apply."""
-        result = self.run()
-        if result.outcome == "skipped":
-            import pytest
-
-            pytest.skip(result.detail)
-        if result.outcome == "failed":
-            raise BrokenError(f"{self.rule}: {result.detail}")
 
 
 @dataclass(frozen=True)
@@ -140,10 +129,3 @@ def _plugin_traceback(error: BaseException) -> str:
             return "".join(traceback.format_exception(type(error), error, rest)).strip()
         rest = rest.tb_next
     return ""
-
-
-def parametrize(checks: Sequence[Check]) -> Any:
-    """Return the pytest mark that makes a test with the argument `check` one test a check."""
-    import pytest
-
-    return pytest.mark.parametrize("check", checks, ids=[check.name for check in checks])

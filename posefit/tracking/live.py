@@ -98,8 +98,8 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         task = task_of(scene, chosen, training)
         method = prepare(chosen, task)
         task, _, _ = initialise(scene, method, task, chosen, progress)
-        rng = np.random.default_rng(chosen.seed)
-        for frame in follow(Hypothesis(SEARCHED, task, rng, rng), method, coming(), method.relocalise_gap):
+        hypothesis = Hypothesis(SEARCHED, task, np.random.default_rng(chosen.seed))
+        for frame in follow(hypothesis, method, coming(), method.relocalise_gap):
             live = waiting.popleft()
             arrived, start = live.source.arrived, first[0].source.arrived
             yield LiveFrame(live.source.number, arrived - start, time.perf_counter() - arrived, live.usable, frame)

@@ -110,14 +110,15 @@ def follow_all(
         done, which = len(frames), f"track {number + 1} of {total}"
         if 0 < done < count and state is not None:
             hypothesis = _resumed(hypothesis, frames, state)
+            frames = list(hypothesis.frames)
             progress.log(f"going on from frame {done} of {count}" + f" of {which}, {hypothesis.guess}" * (total > 1))
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
-            back = (scene.observations[k] for k in range(start, -1, -1)) if start and not done else None
+            rng = stream(options.seed, "back", number)
+            behind = _followed_back(scene, hypothesis, method, start, rng, progress) if start and not done else []
             ahead = (scene.observations[k] for k in range(done or start, count))
-            frames = list(hypothesis.frames)
-            for frame in progress.steps(follow(hypothesis, method, ahead, gap, back), count - done):
+            for frame in progress.steps(follow(hypothesis, method, ahead, gap, behind), count - done):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
                 frames.append(frame)
         followed.append(replace(hypothesis, frames=frames))
@@ -129,17 +130,14 @@ def follow(
     method: Method,
     ahead: Iterable[Observation],
     gap: int,
-    back: Iterable[Observation] | None = None,
+    behind: Sequence[Frame] = (),
 ) -> Iterator[Frame]:
     """Yield the frames of one hypothesis in the order of time, one for each observation that is `ahead`.
 
-    Observations `back` in time begin with the first one ahead, from which the person is followed both ways. After a
-    `gap` of so many frames without the person they are searched again.
+    After a `gap` of so many frames without the person they are searched again. Frames `behind` were followed back in
+    time from the first observation ahead; what comes goes on from there, and they are yielded before it.
     """
-    task, behind = hypothesis.task, list[Frame]()
-    if back is not None:
-        behind = list(method.follow(backwards(task), back, hypothesis.back_rng))
-        task = after(task, behind[0])
+    task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
     frames = relocalised(task, method.follow, ahead, hypothesis.rng, gap)
     if behind:
         first = next(frames)
@@ -160,13 +158,20 @@ def _start(scene: Scene, task: Task, method: Method) -> int:
     return first_shown_whole(scene.observations) if task.yaw == first_yaw else 0
 
 
+def _followed_back(
+    scene: Scene, hypothesis: Hypothesis, method: Method, start: int, rng: np.random.Generator, progress: Progress
+) -> list[Frame]:
+    """Return the frames from the one that is tracked first back to the first of the scene."""
+    back = (scene.observations[k] for k in range(start, -1, -1))
+    return list(progress.steps(method.follow(backwards(hypothesis.task), back, rng), start + 1))
+
+
 def _begun(number: int, scene: Scene, first: Task, options: TrackOptions, reference: Frame | None) -> Hypothesis:
     """Return a hypothesis before its first frame, guessed by a frame of the first hypothesis, if it is another."""
-    back_rng = stream(options.seed, "back", number)
     if reference is None:
-        return Hypothesis(SEARCHED, first, np.random.default_rng(options.seed), back_rng)
+        return Hypothesis(SEARCHED, first, np.random.default_rng(options.seed))
     guess, task = initial_guess(number, first, scene.yaw, options.first_pose == "given", reference)
-    return Hypothesis(guess, task, stream(options.seed, "hypothesis", number), back_rng)
+    return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
 
 
 def _resumed(hypothesis: Hypothesis, recorded: Sequence[Frame], state: dict[str, Any]) -> Hypothesis:

@@ -27,7 +27,7 @@ from posefit.motion.motion import Motion
 from posefit.output.content import Content
 from posefit.output.files import page_of
 from posefit.output.folder import OutputFolder
-from posefit.output.text import brief, table
+from posefit.output.text import table
 from posefit.progress import QUIET
 from posefit.reading import quoted, suggestion
 from posefit.uncertainty.modes import TrackMode
@@ -115,11 +115,6 @@ class Track:
     def content(self) -> Content:
         """What its files are made of."""
         return Content(self.scene, self.frames, self.table, self.gait, self.summary)
-
-    @property
-    def verdict(self) -> str:
-        """Whether the track can be trusted, in one sentence; where the truth is known, its errors."""
-        return brief(self.summary)[0]
 
     @property
     def truth(self) -> Motion | None:

@@ -32,7 +32,6 @@ class Hypothesis:
     guess: str
     task: Task
     rng: np.random.Generator
-    back_rng: np.random.Generator  # of what is followed back in time
     frames: Sequence[Frame] = ()
 
 

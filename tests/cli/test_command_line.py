@@ -1,6 +1,5 @@
 """What a user types, and what comes back: results, files, and one line for every mistake."""
 
-import csv
 import json
 import os
 import re
@@ -26,7 +25,7 @@ from posefit.motion.asf import write_asf
 from posefit_priors.pca import PCA
 from tests.cases import each
 from tests.commands import error_of, printed, run
-from tests.files import arrays
+from tests.files import arrays, csv_rows
 from tests.geometry.turns import about
 from tests.motion.rigs import STYLES, write_rig
 from tests.plugins.test_registry import point, registering
@@ -88,8 +87,7 @@ def test_track_writes_a_folder_that_can_be_opened_again(tmp_path: Path) -> None:
     difference = (again.poses - stored["poses"] + np.pi) % (2 * np.pi) - np.pi
     np.testing.assert_allclose(difference, 0.0, atol=1e-8)
     np.testing.assert_allclose(again.translations, stored["translations"], atol=1e-9)
-    with (out / "frames.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(out / "frames.csv")
     assert len(rows) == 5
     summary = json.loads((out / "summary.json").read_text())
     assert np.mean([float(row["error_degrees"]) for row in rows]) == pytest.approx(summary["error_degrees"]["mean"])
@@ -165,8 +163,7 @@ def test_a_bvh_of_another_program_is_tracked_and_its_frames_keep_their_numbers(t
     assert unit.startswith(f"{path}: lengths are taken for centimetres")
     assert axis == f"{path}: z is taken to be up, as the person stands along it; --up sets it"
     for name in ("frames.csv", "angles.csv"):
-        with (out / name).open(newline="") as file:
-            rows = list(csv.DictReader(file))
+        rows = csv_rows(out / name)
         assert [int(float(row["frame"])) for row in rows] == [5, 6, 7]
         assert [float(row["seconds"]) for row in rows] == pytest.approx([5 / 30, 6 / 30, 7 / 30], abs=1e-3)
     assert arrays(out / "poses.npz")["frames"].tolist() == [5, 6, 7]
@@ -403,7 +400,6 @@ def installed(kind: str, name: str, folder: Path) -> Callable[..., subprocess.Co
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
     subprocess.run([*pip, "--target", str(site), str(made)], check=True, capture_output=True)
     environment = {**os.environ, "PYTHONPATH": str(site)}
-    environment.pop("POSEFIT_LOAD_PLUGINS", None)
 
     def called(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", *words]

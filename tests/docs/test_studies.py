@@ -10,11 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 import functions
+import gpu
 from make_boxes import learned_from, upright_poses
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
 from posefit.motion.built_in import average_skeleton
 from posefit.suites.boxes import STEP, TRAINING_PEOPLE, learned_without
 from posefit.sweep.plan import Plan
+from posefit_reproduce.bench import kernel
 from scores import auroc, calibration_error, conformal_factor, false_alarms, kept_errors
 from tests.docs.pages import DOCS
 
@@ -233,3 +235,35 @@ def test_a_problem_of_the_suite_is_measured(monkeypatch: pytest.MonkeyPatch) -> 
     lines = list(functions.share_lines({2: functions.shares_of(targets[None], [costs])}))
     assert lines[2].startswith("| 2 next frame |")
     assert picture.any()
+
+
+@pytest.mark.device
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernel, "ROUNDS", 1)
+    monkeypatch.setattr(gpu, "_gpu", lambda: "simulated")
+    figures = gpu.figures_of(sizes=((24, 18),), poses=(1, 2))
+    assert [(case["poses"], case["differing"], case["off_by"]) for case in figures["cases"]] == [(1, 0, 0), (2, 0, 0)]
+    lines = list(gpu.lines_of(figures))
+    assert len(lines) == 4
+    assert lines[2].endswith("  equal")
+
+
+def test_blind_equivalents_lie_between_the_budgets_measured_by_their_logarithm() -> None:
+    equivalent = importlib.import_module("agents").equivalent
+    blind = {100: 10.0, 10_000: 2.0}
+    assert [equivalent(blind, cost) for cost in (10.0, 6.0, 2.0)] == ["100", "1,000", "10,000"]
+    assert [equivalent(blind, cost) for cost in (10.1, 1.9)] == ["< 100", "> 10,000"]
+
+
+def test_the_table_of_agents_has_a_search_in_a_line_and_the_mean_of_seeds() -> None:
+    agents = importlib.import_module("agents")
+    rows = [
+        {"agent": name, "budget": budget, "costs": [cost, cost + 2.0], "cpu_seconds": 3.0}
+        for name, budget, cost in (("sapso", 40, 9.0), ("sapso", 4_000, 1.0), ("cma", 40, 9.0), ("cma", 4_000, 5.0))
+    ]
+    rows += [{"agent": "PPO", "budget": 1_000, "costs": [cost, cost], "cpu_seconds": 60.0} for cost in (5.0, 7.0)]
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in agents.table(rows)][2:]
+    assert lines[0][:2] == ["sapso", "40; 4,000"]
+    assert lines[0][5] == "10.0; 2.0"
+    assert lines[2] == ["PPO", "8", "1,000", "60", "2", "6.0", "5.0 to 7.0", "400", "4,000"]

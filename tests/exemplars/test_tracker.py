@@ -15,7 +15,7 @@ from posefit.cli import main
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import wrapped
 from posefit.motion import built_in, recorded
-from posefit.testing import run_checks, tracker_checks
+from posefit.testing import check_tracker
 from posefit_exemplars import tracker
 from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
 from tests.cases import each
@@ -25,7 +25,7 @@ OTHERS = ["library:05,09,16,127"]  # none of whom is subject 2
 
 
 def test_the_kit_passes() -> None:
-    report = run_checks("exemplars", tracker_checks(ExemplarTracker, looks_ahead=True))
+    report = check_tracker(ExemplarTracker, looks_ahead=True)
     assert [result for result in report.results if result.outcome != "passed"] == []
 
 

@@ -12,6 +12,7 @@ import pytest
 
 import posefit
 from posefit.footage import segmentation
+from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in
 from posefit.registry import Offer
 from posefit.silhouette.cost import project
@@ -72,6 +73,27 @@ def six_masks() -> list[Any]:
 def filmed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
     masks = [NOBODY] * EMPTY + truth()
     return film(tmp_path_factory.mktemp("video") / "walk.avi", masks), masks
+
+
+class Box:
+    """Reports a box on the left as the person; from its second picture on, their facing and a landmark, too."""
+
+    def __init__(self, footage: Any, *, wrong: str = "") -> None:
+        self.footage, self.wrong, self.facing, self.landmarks = footage, wrong, np.nan, None
+        self.count, self.first, self.pictures = len(footage), next(iter(footage.frames())), 0
+
+    def segment(self, image: Any) -> Any:
+        if self.wrong == "fails":
+            raise KeyError("lost")
+        if self.pictures:
+            self.facing, self.landmarks = 0.5, np.zeros((len(JOINTS), 2 if self.wrong == "landmarks" else 3))
+            self.landmarks[0] = [5.0, 7.0, 0.5][: self.landmarks.shape[1]]
+        self.pictures += 1
+        mask = np.zeros(image.shape[:2], dtype=bool)
+        mask[20:90, 5 : 5 + image.shape[1] // 6] = True
+        if self.wrong == "shape":
+            return mask[1:], mask
+        return (mask.astype(np.uint8), mask) if self.wrong == "type" else (mask, np.zeros_like(mask))
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """Masks from video: synthetic ones with a known person, and video whose frames come at uneven times."""
 
-import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -20,8 +19,8 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, median_background, person
 from tests.cases import each
 from tests.commands import error_of, run
-from tests.files import arrays
-from tests.footage.conftest import EMPTY, FRAMES, SIZE, iou, truth
+from tests.files import arrays, csv_rows
+from tests.footage.conftest import EMPTY, FRAMES, SIZE, Box, iou, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -39,8 +38,7 @@ def test_each_method_finds_the_person(
     overlaps = [iou(a > 0, b) for a, b, ok in zip(stored["masks"], masks[EMPTY:], stored["usable"], strict=True) if ok]
     assert np.mean(overlaps) > 0.8  # a person of 900 pixels: half a pixel all along the edge costs 0.15
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"masks.npz", "preview.mp4", "quality.csv"}
-    with (tmp_path / "out" / "quality.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(tmp_path / "out" / "quality.csv")
     assert [int(row["frame"]) for row in rows] == list(range(EMPTY, EMPTY + FRAMES))
     assert sum(int(row["usable"]) for row in rows) == result["usable"]
 
@@ -294,34 +292,15 @@ def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]],
     assert np.abs(middles - true)[stored["usable"]].max() < 3.0  # pixels: the frame at its own time
 
 
-class Joints:
-    """Gives landmarks beside a mask of the left half, but in the first frame; as wide a table of them as `wide`."""
-
-    wide = 3
-
-    def __init__(self, film: Any) -> None:
-        self.landmarks: Any = None
-        self.next = np.zeros((len(JOINTS), self.wide))
-        self.next[0], self.frames = [5.0, 7.0, 0.5][: self.wide], 0
-
-    def segment(self, image: Any) -> tuple[Any, Any]:
-        self.frames += 1
-        if self.frames > 1:
-            self.landmarks = self.next
-        mask = np.zeros(image.shape[:2], dtype=bool)
-        mask[10:90, :40] = True
-        return mask, np.zeros_like(mask)
-
-
 def test_landmarks_are_kept_at_their_place_in_the_whole_picture(
-    filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None], monkeypatch: pytest.MonkeyPatch
+    filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None]
 ) -> None:
-    segmenter("joints", Joints)
-    masks = Segmentation(Video.of(filmed[0]), Extraction("joints", roi=(20, 10, 120, 100)), (0, 3)).masks()
+    segmenter("box", Box)
+    masks = Segmentation(Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)).masks()
     assert masks.landmarks is not None
     assert masks.landmarks.shape == (3, len(JOINTS), 3)
     assert not masks.landmarks[0, :, 2].any()
     np.testing.assert_array_equal(masks.landmarks[1:, 0], [[25.0, 17.0, 0.5]] * 2)
-    monkeypatch.setattr(Joints, "wide", 2)
+    how = Extraction("box", settings={"wrong": "landmarks"})
     with pytest.raises(BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"):
-        Segmentation(Video.of(filmed[0]), Extraction("joints"), (0, 3)).masks()
+        Segmentation(Video.of(filmed[0]), how, (0, 3)).masks()

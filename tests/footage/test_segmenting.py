@@ -28,7 +28,7 @@ from tests.cases import each
 from tests.commands import error_of, run
 from tests.files import arrays
 from tests.footage.composites import DEMO, Kind, backgrounds, composed
-from tests.footage.conftest import camera, iou, truth
+from tests.footage.conftest import Box, camera, iou, truth
 
 ALWAYS: tuple[Kind, ...] = ("jumping", "waving", "standing")
 mediapipe = pytest.mark.skipif(find_spec("mediapipe") is None, reason="without mediapipe")
@@ -289,45 +289,28 @@ def test_cameras_that_disagree_on_the_person_are_refused(tmp_path: Path) -> None
         posefit.track([tmp_path / "c" / "0.npz", tmp_path / "c" / "1.npz"], camera=moved)
 
 
-class Half:
-    """Reports the left half as the person."""
-
-    def __init__(self, footage: Any, *, wrong: str = "") -> None:
-        self.footage, self.wrong = footage, wrong
-        self.count, self.first = len(footage), next(iter(footage.frames()))
-
-    def segment(self, image: Any) -> Any:
-        if self.wrong == "fails":
-            raise KeyError("lost")
-        mask = np.zeros(image.shape[:2], dtype=bool)
-        mask[20:90, : image.shape[1] // 4] = True
-        if self.wrong == "shape":
-            return mask[1:], mask
-        return (mask.astype(np.uint8), mask) if self.wrong == "type" else (mask, ~mask)
-
-
 def test_a_segmenter_gets_the_roi_alone_and_its_masks_are_put_there(
     filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
 ) -> None:
-    segmenter("half", Half)
-    segmentation, masks = segmented(filmed[0], Extraction("half", roi=(40, 10, 80, 100)), (0, 4))
+    segmenter("box", Box)
+    segmentation, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
     assert masks[0].shape == (120, 160)
     rows, columns = np.flatnonzero(masks[0].any(axis=1)), np.flatnonzero(masks[0].any(axis=0))
-    assert (rows[0], columns[0], columns[-1]) == (30, 40, 59)
+    assert (rows[0], columns[0], columns[-1]) == (30, 45, 57)
     assert segmentation.summary["frames"] == 4
 
 
 def test_a_segmenter_that_breaks_a_rule_is_named(
     filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
 ) -> None:
-    segmenter("half", Half)
+    segmenter("box", Box)
     for wrong, message in [
         ("shape", r"segment must return two boolean masks of shape \(120, 160\), got \(119, 160\) bool"),
-        ("type", r"segmenter 'half': segment must return two boolean masks .* got \(120, 160\) uint8"),
-        ("fails", "segmenter 'half': segment must not fail, got KeyError: 'lost'"),
+        ("type", r"segmenter 'box': segment must return two boolean masks .* got \(120, 160\) uint8"),
+        ("fails", "segmenter 'box': segment must not fail, got KeyError: 'lost'"),
     ]:
         with pytest.raises(BrokenRuleError, match=message):
-            segmented(filmed[0], Extraction("half", settings={"wrong": wrong}))
+            segmented(filmed[0], Extraction("box", settings={"wrong": wrong}))
 
 
 def test_settings_of_a_segmenter_reach_it(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
@@ -378,27 +361,12 @@ def test_facings_of_a_person_who_goes_along_are_dropped() -> None:
     np.testing.assert_array_equal(facings_on_the_spot([0.5] * 2, [np.nan] * 2, [0.0] * 2, FPS), [0.5] * 2)
 
 
-class Knowing:
-    """Finds the same figure in every picture, and knows how it faces but in the first one."""
-
-    def __init__(self, _film: Any) -> None:
-        self.facing = np.nan
-        self._first = True
-
-    def segment(self, image: Image) -> Any:
-        self.facing = np.nan if self._first else 0.5
-        self._first = False
-        mask = np.zeros(image.shape[:2], dtype=bool)
-        mask[20:80, 60:85] = True
-        return mask, np.zeros_like(mask)
-
-
 def test_a_scene_has_the_yaws_that_a_segmenter_reports(
     filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
 ) -> None:
-    segmenter("half", Knowing)
+    segmenter("box", Box)
     camera = Camera.around(MIDDLE, 0.25, 5.0, (160, 120))
-    scene = scene_of([filmed[0]], camera=(camera,), frames=(0, 6), extraction=Extraction("half"))
+    scene = scene_of([filmed[0]], camera=(camera,), frames=(0, 6), extraction=Extraction("box"))
     assert [observation.yaw for observation in scene.observations] == pytest.approx([0.75] * 6)
     assert scene.yaw == pytest.approx(0.75)
     assert scene_of([filmed[0]], camera=(camera,)).yaw is None

@@ -1,6 +1,5 @@
 """Clinical angles of whole bodies: zero where a person stands, one sign for both sides; and files for other programs."""
 
-import csv
 import importlib
 import json
 from pathlib import Path
@@ -23,6 +22,7 @@ from posefit.motion.bvh import write_bvh
 from posefit.motion.motion import Motion
 from posefit.motion.opensim import write_mot
 from tests.cases import each
+from tests.files import csv_rows
 from tests.measuring.walker import angle
 
 SKELETON = built_in.motion("walk", frames=1).skeleton
@@ -154,11 +154,6 @@ def rigid(points: Array) -> bool:
     return bool((np.nanmax(lengths, axis=0) - np.nanmin(lengths, axis=0) < TENTH).all())
 
 
-def rows_of(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_a_c3d_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> None:
     ezc3d = pytest.importorskip("ezc3d")
     write_c3d(tmp_path / "walk.c3d", walk, BLANK, gait_of(walk))
@@ -249,7 +244,7 @@ def test_a_bvh_is_what_another_reader_reads(walk: Motion, tmp_path: Path) -> Non
 
 def test_angles_are_written_in_degrees_and_blank_where_nobody_knows(walk: Motion, tmp_path: Path) -> None:
     write_angles(tmp_path / "angles.csv", walk, BLANK)
-    rows, expected = rows_of(tmp_path / "angles.csv"), clinical_angles(walk.skeleton, walk.poses)
+    rows, expected = csv_rows(tmp_path / "angles.csv"), clinical_angles(walk.skeleton, walk.poses)
     assert list(rows[0]) == ["frame", "seconds", *COLUMNS]
     assert len(rows) == len(walk)
     for k, row in enumerate(rows):
@@ -293,7 +288,7 @@ def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_
     write_c3d(tmp_path / "a.c3d", part, (), gait)
     write_mot(tmp_path / "a.mot", part)
     write_amc(tmp_path / "a.amc", part)
-    rows = rows_of(tmp_path / "a.csv")
+    rows = csv_rows(tmp_path / "a.csv")
     assert (rows[0]["frame"], rows[-1]["frame"]) == ("20", "79")
     assert float(rows[0]["seconds"]) == pytest.approx(20 / 30.0, abs=1e-6)
     lines = [line.split("\t") for line in (tmp_path / "a.trc").read_text().splitlines()]
@@ -313,14 +308,14 @@ def test_a_part_of_a_motion_keeps_its_frame_numbers_and_times(walk: Motion, tmp_
 def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
     gait = gait_of(walk)
     write_gait(tmp_path / "gait.csv", gait)
-    rows = rows_of(tmp_path / "gait.csv")
+    rows = csv_rows(tmp_path / "gait.csv")
     assert list(rows[0]) == list(STEP_COLUMNS)
     assert [row["foot"] for row in rows] == ["right", "left", "right", "left"]
     assert rows[0]["step_length"] == ""  # it is unknown where it came from
     assert float(rows[1]["step_length"]) == pytest.approx(gait.steps[1].step_length, abs=1e-6)
     assert float(rows[1]["strike_seconds"]) == pytest.approx(gait.steps[1].strike_seconds, abs=1e-6)
     write_gait(tmp_path / "dance.csv", NO_WALK)
-    assert rows_of(tmp_path / "dance.csv") == []
+    assert csv_rows(tmp_path / "dance.csv") == []
 
 
 def test_a_gait_is_json(walk: Motion) -> None:

@@ -1,6 +1,5 @@
 """Gait of walks, beside an independent slow twin and published ranges; why a motion is no walk; who walks backwards."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit.output.text import gait_line, table
 from tests.cases import each
+from tests.files import csv_rows
 from tests.measuring.walker import SPEED, walker
 
 WALKS = ("02_01", "05_01", *(f"16_{k}" for k in (*range(12, 19), *range(20, 33), 47, 58)))
@@ -181,8 +181,7 @@ def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> No
     assert gait["speed"] == pytest.approx(true.speed, abs=0.05)
     assert gait_line(gait) in table(tracked.summary).splitlines()
     assert gait_line(gait).startswith(f"gait: {gait['cadence']:.0f} steps a minute, step ")
-    with (out / "gait.csv").open(newline="") as file:
-        steps = list(csv.DictReader(file))
+    steps = csv_rows(out / "gait.csv")
     assert sum(step["step_seconds"] != "" for step in steps) == gait["steps"]
 
 

@@ -99,15 +99,6 @@ def test_a_copy_goes_on_as_the_original(copied: Any) -> None:
         second.tell(proposals, sphere(proposals))
 
 
-def test_a_tell_that_does_not_fit_is_refused() -> None:
-    optimiser = Bridged(Toy(3), np.random.default_rng(0), climbs)
-    with pytest.raises(ValueError, match="tell must follow ask"):
-        optimiser.tell(np.zeros((5, 3)), np.zeros(5))
-    optimiser.ask()
-    with pytest.raises(ValueError, match="tell must get 5 costs, got 3"):
-        optimiser.tell(np.zeros((3, 3)), np.zeros(3))
-
-
 def test_a_borrowed_global_generator_is_put_back() -> None:
     def draws(generator: GlobalRandom) -> list[float]:
         with generator:

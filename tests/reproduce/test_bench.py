@@ -11,7 +11,7 @@ from posefit.cli import main
 from posefit.fitting.problem import PoseProblem
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit_reproduce.bench import device, kernel, loop
+from posefit_reproduce.bench import kernel, loop
 from posefit_reproduce.bench.kernel import bench_problem, opencv_costs
 from tests.cases import each
 
@@ -46,21 +46,3 @@ def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert min([*optimisers.values(), *steps.values()]) > 0.0
     # the same silhouettes but for their edges
     assert figures["mean_cost_difference_to_opencv"] < 1.0
-
-
-def test_mistakes_are_reported_before_anything_is_timed() -> None:
-    for words in ("--device cuda --threads 2", "--threads 0", "--device tpu"):
-        done = CliRunner().invoke(main, ["bench", *words.split()])
-        assert (done.exit_code, done.stdout) == (2, ""), words
-
-
-@pytest.mark.device
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernel, "ROUNDS", 1)
-    monkeypatch.setattr(device, "_gpu", lambda: "simulated")
-    figures = device.device_figures("cuda", sizes=((24, 18),), poses=(1, 2))
-    assert [(case["poses"], case["differing"], case["off_by"]) for case in figures["cases"]] == [(1, 0, 0), (2, 0, 0)]
-    lines = list(device.device_lines(figures))
-    assert len(lines) == 4
-    assert lines[2].endswith("  equal")

@@ -16,6 +16,7 @@ from posefit.evaluation.measures import BASELINES
 from posefit.fitting.tracker import Follower, Prediction
 from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
+from posefit.tracking.defaults import completed
 from posefit.tracking.front import track
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
@@ -152,7 +153,7 @@ def test_errors_are_those_of_poses() -> None:
     joints = replace(test, poses=test.poses + np.eye(1, 66)[0] * np.pi).joints
     expected = nearer_mirrored(test.joints, joints).mean()
     analysis = Analysis(shifted(motions, 180.0, slice(0, 1)), motions)
-    assert analysis.share("swapped", "walk")[0, 0] == expected
+    assert analysis.swapped("walk")[0, 0] == expected
 
 
 def test_a_part_that_is_left_out_is_left_out(walk: PaperMotion) -> None:
@@ -248,7 +249,7 @@ def test_a_single_image_is_estimated_by_itself_whichever_way_the_person_faces(wa
 def test_the_first_yaw_is_searched_within_45_degrees_of_the_true_one(walk: PaperMotion) -> None:  # Interpretation S17
     scene = paper_scene(walk, 45.0)
     assert scene.yaw == walk.test.poses[0, 0]
-    options = TrackOptions(**options_of(OURS, walk.training, 4))
+    options = completed(TrackOptions(**options_of(OURS, walk.training, 4)), scene.truth)
     space = Follower(task_of(scene, options, walk.training), UnclusteredPCA().fit(walk.angles), Prediction(tilt="box"))
     first = space.space(scene.observations[0])
     assert first.root_centre[0] == scene.yaw

@@ -3,7 +3,6 @@
 import json
 import os
 import pickle
-import shutil
 import signal
 import sqlite3
 import subprocess
@@ -198,34 +197,6 @@ def test_a_driver_that_was_killed_holds_nothing(tmp_path: Path) -> None:
         held.send_signal(signal.SIGKILL)
         held.wait()
     Writer(path).close()
-
-
-FILL = "import sys, pathlib, tests.sweep.fake as fake; fake.filled(pathlib.Path(sys.argv[1]), 20_000)"
-
-
-def test_a_ledger_copied_while_its_driver_writes_opens_with_all_that_was_committed_before(tmp_path: Path) -> None:
-    # as after a power failure: a reader's open transaction keeps rows from moving between the two files meanwhile
-    path, copy = tmp_path / "results" / FILE, tmp_path / "copy" / FILE
-    missing: list[int] = []
-    with subprocess.Popen([sys.executable, "-c", FILL, str(path.parent)], cwd=ROOT) as driver:
-        while len(missing) < 40:
-            if not path.exists() or not path.with_name(f"{FILE}-wal").exists():
-                time.sleep(0.05)
-                continue
-            with closing(sqlite3.connect(path, isolation_level=None)) as reader:
-                reader.execute("BEGIN")
-                try:
-                    before = reader.execute("SELECT count(*) FROM cells WHERE status = 'done'").fetchone()[0]
-                except sqlite3.OperationalError:  # no table yet
-                    continue
-                copy.parent.mkdir()
-                for name in (FILE, f"{FILE}-wal"):
-                    shutil.copyfile(path.with_name(name), copy.with_name(name))
-            with closing(Ledger(copy)) as copied:
-                missing += [before - len(copied)] * (before > 0)
-            shutil.rmtree(copy.parent)
-        driver.kill()
-    assert max(missing) <= 0
 
 
 def test_a_full_disk_ends_the_sweep_in_one_line_and_finished_rows_are_safe(tmp_path: Path) -> None:

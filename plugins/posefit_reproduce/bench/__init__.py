@@ -2,5 +2,4 @@
 
 loop.py    all figures, from one run
 kernel.py  the problem, the same costs drawn by OpenCV, timing, and the processor
-device.py  a GPU beside the CPU: `posefit bench --device cuda`
 """

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from posefit.output.drawing import draw_body
+from posefit.output.drawing import draw_body, side_view
 from posefit.silhouette.foreground import Image
 from posefit_reproduce.experiment import Arrays, Results
 from posefit_reproduce.vsmm.activities import ACTIVITIES, FPS, Film, film_of
@@ -76,7 +76,7 @@ def _activities(axes: Any, film: Film, label: bool) -> None:
 
 
 def film_stills(film: Film, arrays: Arrays) -> Image:
-    """Return stills: the detected joints on the mask, filled where they are seen, and below it the fitted body."""
+    """Return stills: detected joints on the mask, filled unless hidden; the body on it; the body from its side."""
     stills = [_still(film, {name: value[k] for name, value in arrays.items() if value.ndim}, k) for k in STILLS]
     rows = [np.hstack(stills[k : k + len(stills) // 2]) for k in (0, len(stills) // 2)]
     return np.asarray(cv2.resize(np.vstack(rows), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
@@ -91,6 +91,7 @@ def _still(film: Film, frame: Arrays, k: int) -> Image:
     for point, confidence in zip(LARGER * frame["joints"][0], frame["confidence"][0], strict=True):
         colour, thickness = (_JOINT, -1) if confidence > 0.0 else (_HIDDEN, 1)
         cv2.circle(marked, tuple(np.rint(point).astype(int).tolist()), 4, colour, thickness, cv2.LINE_AA)
-    middle = slice(drawn.shape[1] // 5, -drawn.shape[1] // 5)
+    middle = slice(drawn.shape[1] // 5, drawn.shape[1] - drawn.shape[1] // 5)
     cv2.putText(marked, f"{k}", (middle.start + 8, 44), cv2.FONT_HERSHEY_SIMPLEX, 1.3, (240, 240, 240), 2, cv2.LINE_AA)
-    return np.vstack([marked[:, middle], drawn[:, middle]])
+    side = side_view(film.body, film.camera, frame["poses"], frame["translations"], middle.stop - middle.start)
+    return np.vstack([marked[:, middle], drawn[:, middle], side])

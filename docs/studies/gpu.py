@@ -1,11 +1,16 @@
-"""How fast is a GPU, and does it count the same? Beside the CPU in the same run: `posefit bench --device cuda`."""
+"""How fast is a GPU, and does it count the same? Beside all threads of the CPU, in the same run.
+
+python docs/studies/gpu.py
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import click
 import numpy as np
 
+from posefit.cli.output import Command
 from posefit.fitting.box import draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.geometry.camera import Camera
@@ -20,22 +25,20 @@ POSES = (40, 4_000, 400_000)
 DRAWN = 4_000  # to draw proposals that are poses takes long
 
 
-def device_figures(
-    device: str, sizes: Sequence[tuple[int, int]] = SIZES, poses: Sequence[int] = POSES
-) -> dict[str, Any]:
+def figures_of(sizes: Sequence[tuple[int, int]] = SIZES, poses: Sequence[int] = POSES) -> dict[str, Any]:
     """Return poses a second on a device and on the CPU, and whether both count the same.
 
     Of every size and number of poses: `cpu_per_second` on all threads; on the device `poses_per_second`, which come
     from the CPU, and `resident_per_second`, which are there already, areas copied back in both. `differing` are poses
     whose areas are not the CPU's, and `off_by` the most pixels of one.
     """
-    check_device(device)
-    cases = [_case(seen_at(bench_problem(cores()), size), device, count) for size in sizes for count in poses]
+    check_device("cuda")
+    cases = [_case(seen_at(bench_problem(cores()), size), count) for size in sizes for count in poses]
     return {"cases": cases, "gpu": _gpu(), "cpu": processor(), "threads": cores()}
 
 
-def device_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    """Yield `device_figures` as lines of text."""
+def lines_of(figures: Mapping[str, Any]) -> Iterator[str]:
+    """Yield `figures_of` as lines of text."""
     yield f"{figures['gpu']} beside {figures['threads']} threads of {figures['cpu']}"
     names = ("cpu", "poses", "resident")
     yield f"{'size':>10} {'poses':>8} " + " ".join(f"{name + ' /s':>13}" for name in names) + "  areas"
@@ -56,7 +59,7 @@ def seen_at(problem: PoseProblem, size: tuple[int, int]) -> PoseProblem:
     return replace(problem, cameras=[camera], silhouettes=[observed])
 
 
-def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
+def _case(problem: PoseProblem, count: int) -> dict[str, Any]:
     from numba import cuda
 
     from posefit.silhouette.cuda.areas import drawing_on_device, launched
@@ -64,7 +67,7 @@ def _case(problem: PoseProblem, device: str, count: int) -> dict[str, Any]:
     rng = np.random.default_rng(0)
     drawn = draw_population(problem.space, rng, min(count, DRAWN))
     poses, places = problem.decode(np.resize(drawn, (count, drawn.shape[1])) + rng.normal(0.0, 1e-3, (count, 1)))
-    body, camera, observed = problem.body, problem.cameras[0], moved_to(problem.silhouettes[0], device)
+    body, camera, observed = problem.body, problem.cameras[0], moved_to(problem.silhouettes[0], "cuda")
     drawing, moved = drawing_on_device(body, camera, observed), (cuda.to_device(poses), cuda.to_device(places))
     jobs: dict[str, Callable[[], Any]] = {
         "cpu": lambda: problem.cost_and_areas(poses, places)[1],
@@ -87,3 +90,13 @@ def _gpu() -> str:
 
     name = cuda.get_current_device().name
     return name.decode() if isinstance(name, bytes) else str(name)
+
+
+@click.command(cls=Command)
+def main() -> None:
+    """Time the GPU beside the CPU, and compare counts."""
+    click.echo("\n".join(lines_of(figures_of())))
+
+
+if __name__ == "__main__":
+    main()
