@@ -12,7 +12,7 @@ from posefit.cli.output import print_result, results_alone
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array.")
 @click.pass_context
 def plugins(context: click.Context, as_json: bool) -> None:
-    """List the optimisers, priors, trackers and segmenters that are installed, with their settings.
+    """List the optimisers, priors, trackers, starts and segmenters that are installed, with their settings.
 
     `show NAME` says what the settings of one mean.
     """

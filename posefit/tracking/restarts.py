@@ -2,7 +2,7 @@
 
 | when | what is tried | what is kept |
 |---|---|---|
-| before the first frame | `best_restart`: searches of the first frame, followed over a few more | the cheapest |
+| before the first frame | `best_restart`: searches around what it may show, followed for a second | the cheapest |
 | after a gap, or while costs are high | `relocalised`: such restarts beside the track as it is | the cheapest |
 | with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
 | where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
@@ -164,7 +164,7 @@ def relocalised(
     """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
 
     That is in the first frame that shows the person after a `gap` of frames that do not, none for 0, and where for half
-    a second every cost is half as high again as is typical since the last relocalisation. Eight restarts are compared
+    a second every cost is half as high again as is typical since the last relocalisation. Restarts are compared
     with the track as it is, over about a second of the observations to come; the cheapest goes on. The frame has the
     evaluations and the time of all of them.
     """
