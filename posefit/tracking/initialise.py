@@ -57,7 +57,8 @@ def initialise(
     if options.restarts:
         first = usable_observations(scene.observations, 1)
         modes = guessed_modes(task, first[0]) if first else []
-        where = f"around {counted(len(modes), 'pose')} of such silhouettes" if modes else "anywhere"
+        tried = counted(min(len(modes), options.restarts), "pose")
+        where = f"around at most {tried} with such a silhouette" if modes else "anywhere"
         progress.log(f"looking for the first pose {where}")
         task, _ = best_restart(task, scene.observations, method.follow, options.restarts, options.seed)
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
