@@ -85,9 +85,9 @@ def check(
     same cause, the others are not checked.
     """
     from posefit.fitting.check import one_of
-    from posefit.registry import KINDS
+    from posefit.registry import AUTHORED
 
-    one_of("kind", kind, KINDS)
+    one_of("kind", kind, AUTHORED)
     with results_alone():
         from posefit.testing.process import check_in_process
 
