@@ -9,7 +9,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.geometry.skeleton import JOINTS
 from posefit.report.columns import mean
-from posefit.report.kind import Contest
+from posefit.report.contest import Contest
 from posefit.report.tracks import LEVEL_NAMES
 from posefit.statistics.intervals import Intervals, iqm_intervals
 from posefit.statistics.profiles import Trace, performance_profile

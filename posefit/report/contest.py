@@ -2,12 +2,75 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple
-from typing import Any
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
+from typing import Any, Self
 
-from posefit.report.kind import Contest, Runs
-from posefit.statistics.pairing import most_shared
-from posefit.statistics.ranks import LEVEL, compact_letters
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.arrays import Array
+from posefit.report.kind import Runs
+from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
+from posefit.statistics.pairing import Shared, most_shared
+from posefit.statistics.ranks import LEVEL, Comparison, compact_letters, wilcoxon
+
+BOOTSTRAP_SEED = 2013
+WORK = 1e8  # numbers that the resamples of one study may come to
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Contest(Shared):
+    """The runs that some methods share, paired by instance and seed: `rows` and `blocks` are indices of `runs`."""
+
+    runs: Runs
+
+    def of(self, figure: str) -> Array:
+        """Return a figure of all runs (methods, instances, seeds)."""
+        return np.asarray(self.runs.figures[figure][self.rows])
+
+    def rows_of(self, method: int) -> NDArray[np.int64]:
+        """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
+        if method in self.methods:
+            return np.asarray(self.rows[self.methods.index(method)].ravel())
+        return np.flatnonzero(self.runs.method == method).astype(np.int64)
+
+    def places(self) -> list[dict[str, Any]]:
+        """Return the fields of a plan that make each instance."""
+        return [self.runs.places[i] for i in self.instances]
+
+    def tested_errors(self) -> Array:
+        """Return the errors (methods, blocks, 1) that tests compare."""
+        return self.runs.kind.tested_errors(self)
+
+    @property
+    def testable(self) -> bool:
+        """Whether there are methods and blocks enough for a paired test."""
+        return bool(min(self.tested_errors().shape[:2]) > 1)
+
+    @cached_property
+    def comparisons(self) -> list[Comparison]:
+        """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
+        return wilcoxon(self.tested_errors()) if self.testable else []
+
+    def rng(self) -> np.random.Generator:
+        """Return what resamples are drawn by."""
+        return np.random.default_rng(BOOTSTRAP_SEED)
+
+    def resamples(self, numbers: int) -> int:
+        """Return how many bootstrap resamples so many numbers may have."""
+        return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
+
+    def fewer(self, points: int) -> Self:
+        """Return the contest on so few seeds and instances that intervals at so many points are little work.
+
+        These are the first seeds, and every second, third, ... instance.
+        """
+        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
+        _, instances, seeds = self.rows.shape
+        seeds = min(seeds, max(2, most // instances))
+        step = -(-instances * seeds // most)
+        return replace(self, instances=self.instances[::step], rows=self.rows[:, ::step, :seeds])
 
 
 def contest_of(runs: Runs) -> Contest | None:
@@ -45,8 +108,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     worst = [math.inf if row[score.name] is None else sign * row[score.name] for row in board]
     board.sort(key=lambda row: (not row["taking_part"], worst[row["method"]], row.get("above", 0.0)))
     best_first = [row["method"] for row in board if row["taking_part"]]
-    letters, duels = _letters(contest, best_first), _duels(contest, best_first[0])
-    return [{**row, **duels[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
+    letters, comparisons = _letters(contest, best_first), _leader_comparisons(contest, best_first[0])
+    return [{**row, **comparisons[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
 
 
 def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
@@ -56,10 +119,12 @@ def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
     return dict(zip(best_first, compact_letters(len(best_first), different), strict=True)) if contest.testable else {}
 
 
-def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
+def _leader_comparisons(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
     """Return how far each method is behind the leader, with the p of the difference; None where there is no test."""
     place, names = contest.methods.index(leader), ("behind", "behind_low", "behind_high", "p")
-    duels: dict[int, dict[str, float | None]] = {m: dict.fromkeys(names) for m in range(len(contest.runs.methods))}
+    comparisons: dict[int, dict[str, float | None]] = {
+        m: dict.fromkeys(names) for m in range(len(contest.runs.methods))
+    }
     for pair in contest.comparisons:
         if place == pair.first:
             ends = -pair.difference, -pair.high, -pair.low
@@ -67,8 +132,8 @@ def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
             ends = pair.difference, pair.low, pair.high
         if place in (pair.first, pair.second):
             other = contest.methods[pair.first + pair.second - place]
-            duels[other] = dict(zip(names, (*ends, pair.adjusted), strict=True))
-    return duels
+            comparisons[other] = dict(zip(names, (*ends, pair.adjusted), strict=True))
+    return comparisons
 
 
 def paired_tests(contest: Contest) -> dict[str, Any] | None:

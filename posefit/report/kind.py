@@ -1,22 +1,18 @@
-"""What a report knows of runs: their table, those that methods share, and what their kind says of both."""
+"""What a report knows of runs: their table, and what their kind says of it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.report.columns import Column, Score
-from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
-from posefit.statistics.pairing import Shared
-from posefit.statistics.ranks import Comparison, wilcoxon
 
-BOOTSTRAP_SEED = 2013
-WORK = 1e8  # numbers that the resamples of one study may come to
+if TYPE_CHECKING:
+    from posefit.report.contest import Contest
+
 
 Place = Mapping[str, Any]  # the fields of a plan that make an instance
 
@@ -113,57 +109,3 @@ class Runs:
     def values(self, field: str) -> list[Any]:
         """Return the values of a field of methods or instances, rising."""
         return sorted({fields[field] for fields in (*self.variants, *self.places) if field in fields})
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Contest(Shared):
-    """The runs that some methods share, paired by instance and seed: `rows` and `blocks` are indices of `runs`."""
-
-    runs: Runs
-
-    def of(self, figure: str) -> Array:
-        """Return a figure of all runs (methods, instances, seeds)."""
-        return np.asarray(self.runs.figures[figure][self.rows])
-
-    def rows_of(self, method: int) -> NDArray[np.int64]:
-        """Return the rows (k,) of a method that count: those shared, or all its own if it does not take part."""
-        if method in self.methods:
-            return np.asarray(self.rows[self.methods.index(method)].ravel())
-        return np.flatnonzero(self.runs.method == method).astype(np.int64)
-
-    def places(self) -> list[dict[str, Any]]:
-        """Return the fields of a plan that make each instance."""
-        return [self.runs.places[i] for i in self.instances]
-
-    def tested_errors(self) -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare."""
-        return self.runs.kind.tested_errors(self)
-
-    @property
-    def testable(self) -> bool:
-        """Whether there are methods and blocks enough for a paired test."""
-        return bool(min(self.tested_errors().shape[:2]) > 1)
-
-    @cached_property
-    def comparisons(self) -> list[Comparison]:
-        """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
-        return wilcoxon(self.tested_errors()) if self.testable else []
-
-    def rng(self) -> np.random.Generator:
-        """Return what resamples are drawn by."""
-        return np.random.default_rng(BOOTSTRAP_SEED)
-
-    def resamples(self, numbers: int) -> int:
-        """Return how many bootstrap resamples so many numbers may have."""
-        return int(np.clip(WORK / max(numbers, 1), MIN_RESAMPLES, RESAMPLES))
-
-    def fewer(self, points: int) -> Self:
-        """Return the contest on so few seeds and instances that intervals at so many points are little work.
-
-        These are the first seeds, and every second, third, ... instance.
-        """
-        most = int(WORK / (MIN_RESAMPLES * max(points, 1) * len(self.methods)))  # runs of a method
-        _, instances, seeds = self.rows.shape
-        seeds = min(seeds, max(2, most // instances))
-        step = -(-instances * seeds // most)
-        return replace(self, instances=self.instances[::step], rows=self.rows[:, ::step, :seeds])

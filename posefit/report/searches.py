@@ -11,7 +11,8 @@ from posefit.evaluation.measures import Measure
 from posefit.reading import counted
 from posefit.report.charts import Chart, Line
 from posefit.report.columns import Column, Score, listed, mean, median
-from posefit.report.kind import Contest, Kind, Place, Runs
+from posefit.report.contest import Contest
+from posefit.report.kind import Kind, Place, Runs
 from posefit.statistics.means import mean_interval, mean_intervals
 from posefit.statistics.profiles import attained, hits
 from posefit.suites.functions import suite_function

@@ -8,7 +8,7 @@ import numpy as np
 from posefit.errors import printable
 from posefit.reading import counted
 from posefit.report.columns import listed
-from posefit.report.kind import Contest
+from posefit.report.contest import Contest
 from posefit.statistics.ranks import LEVEL
 
 Row = Mapping[str, Any]

@@ -14,7 +14,8 @@ from posefit.evaluation.measures import BASELINES, MEASURES, Measure
 from posefit.fitting.metrics import skill
 from posefit.reading import counted
 from posefit.report.columns import NAMED, Column, Score, interquartile_mean, listed, mean
-from posefit.report.kind import Contest, Kind, Place, Runs
+from posefit.report.contest import Contest
+from posefit.report.kind import Kind, Place, Runs
 from posefit.statistics.intervals import iqm_intervals
 from posefit.uncertainty.calibration import BINS, LEVELS
 
