@@ -98,10 +98,10 @@ def _print(
     if verbose:
         click.echo(table(summary))
     else:
-        worth, work = brief(summary)
+        worth, *work = brief(summary)
         grade = "good" if summary["trust"] is None else summary["trust"]["grade"]
         click.secho(worth, bold=True, fg=COLOURS[grade])
-        click.echo(work)
+        click.echo("\n".join(work))
     if out or not verbose:
         click.echo(f"written to {out}: {hint}" if out else "--verbose prints all figures; --out DIR writes files")
 
