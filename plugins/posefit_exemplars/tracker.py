@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from posefit.geometry.rotation import wrapped
 from posefit_exemplars import beam as beams
 from posefit_exemplars import hypotheses, markov
 from posefit_exemplars.beam import JUMP_COST, Beam
+from posefit_exemplars.calibration import reported
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.lost_model import reported, stored_classifier, with_failure_probabilities
+from posefit_exemplars.lookup import YAW_STEP, Lookup
+from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
@@ -27,8 +29,7 @@ FULL_SHARE = 0.6  # of the beam's evaluations: for full-size costs of states
 FIT_SHARE = 0.8  # of the budget: for fitting hypotheses
 CONTINUED_SHARE = 0.25  # of the small pictures: for where clips continue; the rest is for a search everywhere
 SEARCHES_PER_SECOND = 10.0  # everywhere
-SEARCHED_GROUPS = 40  # those that fit best anywhere, whose poses are evaluated; in the first frame more
-FIRST_SEARCHED_GROUPS = 200
+SEARCHED_GROUPS = 200  # those that fit best anywhere, whose poses are evaluated
 GROUP_POSES = 20  # drawn at random, that stand for a group in a search everywhere
 YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
@@ -44,6 +45,21 @@ class _BeamFrame(NamedTuple):
     states: markov.FrameStates
     frame_costs: FrameCosts
     evaluations: float
+
+
+class _Delays(NamedTuple):
+    """How many later frames each stage uses; together they are the lag."""
+
+    path: int
+    fits: int
+    smoothing: int
+
+    @classmethod
+    def of(cls, lag: int, smoothing: float, fitted: bool) -> Self:
+        """Return the delays of a smoothing over so many frames; what it leaves of the lag is halved with the fits."""
+        ahead = min(math.ceil(FILTER_REACH * smoothing), lag)
+        fits = (lag - ahead) // 2 if fitted else 0
+        return cls(lag - ahead - fits, fits, ahead)
 
 
 class ExemplarTracker:
@@ -81,34 +97,32 @@ class ExemplarTracker:
         # one set of states serves both directions
         training = [motion.reversed() for motion in task.training] if task.backwards else task.training
         self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
-        self.step = beams.Step.of(task, spread)
+        self.step, self.lookup = beams.Step.of(task, spread), Lookup(task, mirrored=mirrored)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
-        self.lag, self.ahead = lag, min(math.ceil(FILTER_REACH * self.smoothing), lag)  # the latter for smoothing alone
-        self.delay, self.evaluations = lag - self.ahead, float(task.evaluations)  # of the beam
         self.sampling = markov.Sampling(samples, temperature / POSTERIOR_TEMPERATURE)
         self.hypotheses: hypotheses.HypothesisFilter | None = None
-        share = FIT_SHARE * task.evaluations
-        if fitted and share >= hypotheses.MIN_EVALUATIONS:
-            self.evaluations -= share
-            delay = self.delay // 2
-            self.delay -= delay
-            self.hypotheses = hypotheses.HypothesisFilter(
-                task, self.exemplars, self.step, self.temperature, share, delay, self.sampling
-            )
+        fit_evaluations = FIT_SHARE * task.evaluations if fitted else 0.0
+        if fit_evaluations < hypotheses.MIN_EVALUATIONS:
+            fit_evaluations = 0.0
+        self.evaluations = task.evaluations - fit_evaluations  # of the beam
+        self.delays = _Delays.of(lag, self.smoothing, fit_evaluations > 0.0)
+        if fit_evaluations:
+            known = task, self.exemplars, self.step, self.temperature
+            self.hypotheses = hypotheses.HypothesisFilter(*known, fit_evaluations, self.delays.fits, self.sampling)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
         estimates = self._path(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
-        frames = map(reported, smoothed(estimates, self.smoothing, self.ahead))
+        frames = map(reported, smoothed(estimates, self.smoothing, self.delays.smoothing))
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame on the likeliest path of the beam."""
         rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else None
-        for window in markov.windows(self._beams(observations, rng), self.delay):
+        for window in markov.windows(self._beams(observations, rng), self.delays.path):
             frame, states = window[0], [frame.states for frame in window]
             estimate = self._estimated(frame, markov.viterbi_state(states), markov.state_weights(states))
             if sampler is not None and self.sampling.paths:
@@ -119,7 +133,6 @@ class ExemplarTracker:
             yield estimate
 
     def _beams(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[_BeamFrame]:
-        """Yield the beam of each frame."""
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
         latest: _BeamFrame | None = None
         for number, observation in enumerate(observations):
@@ -189,21 +202,24 @@ class ExemplarTracker:
         self, frame_costs: FrameCosts, before: Beam | None, count: int, rng: np.random.Generator
     ) -> tuple[Beam, int]:
         """Return states that fit, from anywhere, and the number of small pictures that were evaluated."""
-        max_groups = FIRST_SEARCHED_GROUPS if before is None else SEARCHED_GROUPS
-        group_count = min(max_groups, max(count // (4 * GROUP_POSES), 1))
-        drawn = max(count - group_count * GROUP_POSES, 1)
-        states, middle, reach = self.exemplars.draw(drawn, rng), 0.0, np.pi
+        group_count = min(SEARCHED_GROUPS, max(count // (4 * GROUP_POSES), 1))
+        tried = max(count - group_count * GROUP_POSES, 1)
         known = self.task.yaw if before is None and frame_costs.yaw is None else frame_costs.yaw
-        if known is not None:
-            middle, reach = known, YAW_TOLERANCE
-        yaws = middle + rng.uniform(-reach, reach, drawn)
+        nearest = self.lookup.nearest(frame_costs.observation, tried, known)
+        if nearest is not None:
+            states, yaws = np.resize(nearest[0], tried), np.resize(nearest[1], tried)
+            yaws += YAW_STEP * rng.uniform(-0.5, 0.5, tried)
+        else:  # no camera shows the whole person
+            middle, reach = (0.0, np.pi) if known is None else (known, YAW_TOLERANCE)
+            states, yaws = self.exemplars.draw(tried, rng), middle + rng.uniform(-reach, reach, tried)
         beam = self._placed(frame_costs, self._started(states, yaws, before), False)
-        best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[:group_count]
+        best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[: 4 * group_count]
         members, starts = self.exemplars.members, self.exemplars.starts
         groups = [members[starts[group] : starts[group + 1]] for group in self.exemplars.groups[states[best]]]
         poses = [rows if len(rows) <= GROUP_POSES else rng.choice(rows, GROUP_POSES, replace=False) for rows in groups]
         yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
-        return self._started(np.concatenate(poses), yaws, before), len(beam)
+        room = slice(count - tried)  # for that many poses, of more groups where they are small
+        return self._started(np.concatenate(poses)[room], yaws[room], before), len(beam)
 
     def _first_states(self, angles: Array, count: int) -> Beam:
         """Return the states, at most `count`, nearest to a first pose whose angles (63,) and yaw are known."""

@@ -14,6 +14,7 @@ from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, min
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace, Translation
+from posefit.fitting.start import modes_apart, start_in
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -22,7 +23,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
 SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted step
-KEPT = 3  # frames: how far back a prediction looks
+HISTORY_FRAMES = 3  # how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
 RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
@@ -83,6 +84,9 @@ class Task:
     fps: float = 30.0
     training: Sequence[Motion] = field(default=(), repr=False)  # what may be learned from
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where they are known
+    # what the first frame may show, where it was guessed: modes with their weights, see `posefit.fitting.start`
+    modes: Sequence[tuple[float, Posterior]] = field(default=(), repr=False)
+    start: "InitialiserFactory | None" = field(default=None, repr=False)  # guesses them; None for a blind search
     before: Sequence[Frame] = field(default=(), repr=False)  # earlier ones, where an interrupted track goes on
     threads: int = 1
     backwards: bool = False  # whether observations and training come in reverse, the last one first
@@ -113,6 +117,26 @@ class Tracker(Protocol):
 TrackerFactory = Callable[..., Tracker]
 
 
+class Initialiser(Protocol):
+    """Guesses which poses an observation may show; nothing to inherit."""
+
+    def posterior(self, observation: Observation) -> Posterior | None:
+        """Return weighted poses with their translations; None where it knows of none, and the search is blind."""
+        ...
+
+
+# Builds an initialiser, as `factory(task, **settings)`: a Task and keyword-only settings.
+InitialiserFactory = Callable[..., Initialiser]
+
+
+def guessed_modes(task: Task, observation: Observation) -> Sequence[tuple[float, Posterior]]:
+    """Return the modes of what an observation may show; none where nothing guesses them, or the pose is known."""
+    if task.start is None or task.first_pose is not None or not observation.usable:
+        return ()
+    posterior = task.start(task).posterior(observation)
+    return () if posterior is None else modes_apart(task.body.skeleton, posterior)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prediction:
     """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
@@ -124,6 +148,7 @@ class Prediction:
         tilt: pitch and roll are "learned" with the latents, or a "box" around upright; by default learned, and a box
             to the letter of the paper. Interpretation S16.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
+        start: what guesses the first pose where the yaw is unknown, by name, "blind" for nothing; by default "lookup".
         relocalise_gap: in footage, frames of a gap after which several starts look all around; 0 never. Ours.
         variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
             (S16), and a root that turns about x, then y, then z (S3).
@@ -134,6 +159,7 @@ class Prediction:
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
     tilt: Literal["learned", "box"] | None = None
     beta: float = BETA
+    start: str | None = None
     relocalise_gap: int = RELOCALISE_GAP
     variant: Literal["default", "paper"] = "default"
 
@@ -155,7 +181,7 @@ class Prediction:
         return Tilt.of(prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES)))
 
 
-class Follower:
+class Predictor:
     """Goes from frame to frame: gives the space of the next one, and takes the best proposal in it.
 
     A `tilt` that was learned from the task's training before is not learned again.
@@ -180,7 +206,7 @@ class Follower:
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
         earlier = [frame.details[COORDINATES] for frame in task.before if COORDINATES in frame.details]
-        self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
+        self._latest: list[Array] = earlier[-HISTORY_FRAMES:]  # coordinates of the latest gbest, the newest last
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
@@ -188,8 +214,12 @@ class Follower:
         if not latest:
             if anchor is not None:
                 space = space.around(space.centre, anchor=anchor)
-            if self._task.first_pose is not None:
-                space = replace(space, start=self._given(space, self._task.first_pose))
+            if modes := self._task.modes or guessed_modes(self._task, observation):
+                views = self._task.cameras, observation.silhouettes
+                problem = PoseProblem(self._task.body, *views, space, beta=self._how.beta, blank=True)
+                space = replace(space, start=start_in(problem, modes))
+            elif self._task.first_pose is not None:
+                space = replace(space, start=self._start_at_known_pose(space, self._task.first_pose))
             self._space = space
             return space
         if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
@@ -211,14 +241,14 @@ class Follower:
 
     def commit(self, proposal: Array) -> None:
         """Take the best proposal (d,) of the space that was given last."""
-        self._latest = [*self._latest, self._space.coordinates(proposal)][-KEPT:]
+        self._latest = [*self._latest, self._space.coordinates(proposal)][-HISTORY_FRAMES:]
 
-    def _given(self, space: SearchSpace, angles: Array) -> Start:
+    def _start_at_known_pose(self, space: SearchSpace, angles: Array) -> Start:
         """Return the start of a first frame whose joint angles are about known; its root need not be."""
         latents = self._prior.transform(np.asarray(angles, dtype=np.float64)[None])[0]
         first = space.dimensions - len(latents)
         root = space.centre[:first].copy()
-        root[1:3] = 0.0  # upright, or as the pose lets expect
+        root[1:3] = 0.0  # upright, or tilted as the pose predicts
         away = space.proposals(np.concatenate([root, latents]))
         spread = np.full(space.dimensions, self._how.floor)
         if self._task.yaw is None:
@@ -242,11 +272,11 @@ class SynthesisTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
-        task, follower = self.task, Follower(self.task, self.prior, self.prediction, self.tilt)
+        task, predictor = self.task, Predictor(self.task, self.prior, self.prediction, self.tilt)
         optimiser: Optimiser | None = None
         latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:
-            space = follower.space(observation)
+            space = predictor.space(observation)
             if not observation.usable:
                 latest = self._held(latest, space, observation)
                 yield latest
@@ -254,7 +284,7 @@ class SynthesisTracker:
             optimiser = self._ready(optimiser, space, rng)
             problem = self.problem(space, observation)
             best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
-            follower.commit(best.proposal)
+            predictor.commit(best.proposal)
             latest = _frame(problem, best)
             yield latest
 
@@ -276,7 +306,6 @@ class SynthesisTracker:
         return PoseProblem(task.body, task.cameras, silhouettes, space, beta=beta, threads=task.threads, blank=True)
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
-        """Return the optimiser of the next frame, as `next_frame` asks."""
         if self.next_frame == "carry" and optimiser is not None:
             cast(Filter, optimiser).advance(space)
             return optimiser

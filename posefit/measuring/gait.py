@@ -234,7 +234,7 @@ def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:
     return curves
 
 
-def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
+def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
     """Return in which frames (T,) the root faces away from its way; `unknown` frames count for nothing.
 
     The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who

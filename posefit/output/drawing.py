@@ -144,7 +144,6 @@ def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Itera
 
 
 def _hull(centres: Array, radii: Array) -> Any:
-    """Return the convex hull of discs, in sixteenths of a pixel."""
     angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     outline = centres[:, None] + radii[:, None, None] * circle

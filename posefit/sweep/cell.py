@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
-UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
+RENAMED_MEASURES = (
+    "evaluations",
+    "evaluations_per_second",
+)  # measures that a row has under another name, or not at all
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,10 @@ class TrackCell(Cell):
                 raise InputError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
-        shared = {one.name for one in fields(TrackOptions)} & {one.name for one in fields(self)} - {*VIEW, "train"}
+        shared = {option.name for option in fields(TrackOptions)} & {field.name for field in fields(self)} - {
+            *VIEW,
+            "train",
+        }
         values = {name: getattr(self, name) for name in shared}
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, completed(options, self.motion))
@@ -142,8 +148,8 @@ class TrackCell(Cell):
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
         measured = asdict(result.measures)
         row = {
-            **{name: measured[name] for name in MEASURES if name not in UNLIKE},
-            "warnings": result.course.warnings,
+            **{name: measured[name] for name in MEASURES if name not in RENAMED_MEASURES},
+            "warnings": result.log.warnings,
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],
@@ -231,7 +237,7 @@ def other_version(origin: str) -> str | None:
     name, installed = origin.partition(" ")[0], _installed()
     if origin in installed:
         return None
-    return next((one for one in installed if one.partition(" ")[0] == name), None)
+    return next((other for other in installed if other.partition(" ")[0] == name), None)
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,16 @@ from posefit.fitting.box import Space
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.tracker import RELOCALISE_GAP, Frame, Observation, Prediction, SynthesisTracker, Task, Tracker
+from posefit.fitting.tracker import (
+    RELOCALISE_GAP,
+    Frame,
+    InitialiserFactory,
+    Observation,
+    Prediction,
+    SynthesisTracker,
+    Task,
+    Tracker,
+)
 from posefit.fitting.validation import CheckedOptimiser, CheckedPrior, check_prior, plugin_errors
 from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
@@ -22,6 +31,7 @@ from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR = "pca"
+DEFAULT_START, BLIND = "lookup", "blind"  # where it is installed; for none
 
 
 class MethodNames(NamedTuple):
@@ -74,8 +84,9 @@ class Method:
     settings: dict[str, dict[str, Any]]
     looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
     relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never
-    audit: Audit  # of what its trackers report
+    audit: Audit  # of what its trackers report: grows while they do
     build: Callable[[Task], Tracker] = field(repr=False)
+    start: InitialiserFactory | None = field(default=None, repr=False)  # guesses first poses; None for blind searches
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""
@@ -123,7 +134,16 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
     label = f"{optimiser.name}@{name}"
     audit = Audit(label, prediction.beta)
-    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build)
+    start = start_of(prediction.start)
+    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build, start)
+
+
+def start_of(name: str | None = None) -> InitialiserFactory | None:
+    """Return what guesses first poses, by its name; the default one where it is installed; None for "blind"."""
+    if name == BLIND or (name is None and DEFAULT_START not in registry().offers["start"]):
+        return None
+    factory: InitialiserFactory = registry().offer("start", name or DEFAULT_START).factory
+    return factory
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
@@ -143,30 +163,36 @@ def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequenc
     """
     places = places_of(offers)
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
-    for item in values:
-        key, equals, value = (item, "=", values[item]) if isinstance(values, Mapping) else item.partition("=")
-        name, dot, setting = key.partition(".")
-        if not dot:  # the name may be left out where one plugin alone has the setting
-            names = {name: settings.names(factory) for name, (_, factory) in places.items()}
-            owners = [name for name in names if key in names[name]]
-            if equals and len(owners) != 1:
-                known = ", ".join(f"{name}.{each}" for name in names for each in names[name])
-                raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
-            name, setting = (owners or [""])[0], key
-        if not (equals and setting):
-            raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
-        if name not in places:
-            known = ", ".join(places)
-            raise InputError(f"a setting must name one of {known}, which are in use here, got {quoted(item)}")
+    stated = isinstance(values, Mapping)  # else texts, whose values are to be parsed
+    for key, value in values.items() if isinstance(values, Mapping) else map(_assignment, values):
+        name, setting = _owner(key, places)
         if setting in each[name]:
             raise InputError(f"a setting must be given once, got {quoted(key)} twice")
         each[name][setting] = value
-    for name, (_, factory) in places.items():
-        if isinstance(values, Mapping):
-            each[name] = settings.check(name, factory, each[name])
-        else:
-            each[name] = settings.parse(name, factory, each[name])
-    return {kind: each[name] for name, (kind, _) in places.items()}
+    checked = settings.check if stated else settings.parse
+    return {kind: checked(name, factory, each[name]) for name, (kind, factory) in places.items()}
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals or key.endswith("."):
+        raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(text)}")
+    return key, value
+
+
+def _owner(key: str, places: Mapping[str, tuple[str, Callable[..., Any]]]) -> tuple[str, str]:
+    """Return the plugin and the setting that a key names; the plugin may be left out where it alone has the setting."""
+    plugin, dot, setting = key.partition(".")
+    if dot and plugin in places:
+        return plugin, setting
+    if dot:
+        raise InputError(f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(key)}")
+    names = {plugin: settings.names(factory) for plugin, (_, factory) in places.items()}
+    owners = [plugin for plugin in names if key in names[plugin]]
+    if len(owners) != 1:
+        known = ", ".join(f"{plugin}.{setting}" for plugin in names for setting in names[plugin])
+        raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
+    return owners[0], key
 
 
 def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> Method:
@@ -181,9 +207,8 @@ def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> 
         return tracker
 
     gap = 0 if offer.looks_ahead else RELOCALISE_GAP
-    return Method(
-        offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, Audit(offer.label, beta), build
-    )
+    audit = Audit(offer.label, beta)
+    return Method(offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, audit, build, start_of())
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:

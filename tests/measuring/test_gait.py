@@ -11,7 +11,7 @@ import pytest
 import posefit
 from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.measuring.events import gait_events, low_pass
-from posefit.measuring.gait import Gait, backwards, backwards_warning, gait_of, stride_curves
+from posefit.measuring.gait import Gait, backwards_warning, gait_of, stride_curves, walks_backwards
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
@@ -226,18 +226,18 @@ def turned(degrees: float) -> Motion:
 @each(("degrees", "back"), [(0.0, False), (60.0, False), (120.0, True), (180.0, True)])
 def test_a_person_who_faces_away_from_their_way_walks_backwards(degrees: float, back: bool) -> None:
     # half of half a second, beyond which nothing is known, is 8 frames
-    assert backwards(turned(degrees)).tolist() == [False] * 8 + [back] * 44 + [False] * 8
+    assert walks_backwards(turned(degrees)).tolist() == [False] * 8 + [back] * 44 + [False] * 8
 
 
 @each(("speed", "back"), [(0.29, False), (0.31, True)])
 def test_below_30_cm_a_second_a_person_has_no_way(speed: float, back: bool) -> None:
     places = np.array([0.0, 1.0, 0.0]) + np.arange(60)[:, None] / 30.0 * speed * np.array([0.0, 0.0, -1.0])
-    assert backwards(replace(WALK, poses=np.zeros((60, 66)), translations=places)).any() == back
+    assert walks_backwards(replace(WALK, poses=np.zeros((60, 66)), translations=places)).any() == back
 
 
 def test_unknown_frames_and_those_about_them_count_for_nothing() -> None:
-    assert np.flatnonzero(backwards(turned(180.0), {30})).tolist() == [*range(8, 22), *range(39, 52)]
-    assert not backwards(turned(180.0).frames(0, 16)).any()
+    assert np.flatnonzero(walks_backwards(turned(180.0), {30})).tolist() == [*range(8, 22), *range(39, 52)]
+    assert not walks_backwards(turned(180.0).frames(0, 16)).any()
 
 
 def test_a_few_frames_are_not_worth_a_warning() -> None:

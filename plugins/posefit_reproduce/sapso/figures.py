@@ -1,21 +1,24 @@
 """The figures of the SAPSO paper, drawn again: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from posefit.arrays import Array
-from posefit.fitting.space import SearchSpace
+from posefit.fitting.optimiser import populations
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.tracker import Prediction, Predictor
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit.report.figures import COLOURS
+from posefit.tracking.defaults import completed
+from posefit.tracking.initialise import task_of
+from posefit.tracking.options import TrackOptions
 from posefit_priors.pca import PCA
-from posefit_reproduce.experiment import Run
-from posefit_reproduce.sapso.experiment import ITERATIONS, first_frame
+from posefit_reproduce.sapso.experiment import ITERATIONS, options_of
 from posefit_reproduce.sapso.methods import LABELS as METHODS
 from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
 from posefit_reproduce.sapso.motions import LABELS, PaperMotion, paper_scene
@@ -58,55 +61,43 @@ def _latents(axes: Any, motion: PaperMotion, prior: PCA) -> str:
         points = prior.transform(clip.poses[:, 3:])
         axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
     axes.legend(fontsize=7, frameon=False)
-    kept = 100.0 * prior.explained
-    return f"{kept[:3].sum():.0f} % of the variance, six keep {kept.sum():.1f} %"
+    shares = 100.0 * prior.explained
+    return f"{shares[:3].sum():.0f} % of the variance, six keep {shares.sum():.1f} %"
 
 
 def _clusters(axes: Any, motion: PaperMotion, prior: PCA) -> str:
     """Draw the training poses by their nearest centre of K-means, with the centres."""
     points = prior.transform(motion.angles)
     away = np.abs(points[:, None] - prior.centres).mean(axis=2)
-    for one, colour in zip(range(len(prior.centres)), COLOURS, strict=False):
-        axes.plot(*points[away.argmin(axis=1) == one, :3].T, ".", color=colour, markersize=3)
-        axes.plot(*prior.centres[one, :3, None], "*", color=colour, markersize=13, markeredgecolor="black")
+    for k, (centre, colour) in enumerate(zip(prior.centres, COLOURS, strict=False)):
+        axes.plot(*points[away.argmin(axis=1) == k, :3].T, ".", color=colour, markersize=3)
+        axes.plot(*centre[:3, None], "*", color=colour, markersize=13, markeredgecolor="black")
     within = 100.0 * (away.min(axis=1) < prior.reach).mean()
     return f"K = {len(prior.centres)}, {within:.0f} % of the poses valid"
 
 
-@dataclass(frozen=True, eq=False)
-class WatchedSwarm:
+class WatchedSwarm(NamedTuple):
     """A swarm in the first frame, from iteration to iteration."""
 
     scene: Scene
-    poses: list[Array] = field(repr=False)  # of each iteration (n, 66)
-    translations: list[Array] = field(repr=False)  # of each iteration (n, 3)
+    poses: list[Array]  # of each iteration (n, 66)
+    translations: list[Array]  # of each iteration (n, 3)
     best: list[int]  # of each iteration, the proposal of lowest cost
-    history: Array = field(repr=False)  # (iterations + 1,) lowest cost so far
+    history: Array  # (iterations + 1,) lowest cost so far
 
 
 def watched_swarm(motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS) -> WatchedSwarm:
     """Return the proposals of SAPSO in the first frame."""
-
-    class Watched(SAPSO):
-        def __init__(
-            self, space: SearchSpace, rng: np.random.Generator, *, population_size: int, iterations: int
-        ) -> None:
-            super().__init__(space, rng, population_size=population_size, iterations=iterations)
-            self.searched = space
-            for series in (poses, translations, best):
-                del series[:]  # a search before only compiles
-
-        def tell(self, proposals: Array, costs: Array) -> None:
-            decoded = self.searched.decode(proposals)
-            poses.append(decoded[0])
-            translations.append(decoded[1])
-            best.append(int(np.argmin(costs)))
-            super().tell(proposals, costs)
-
-    poses, translations, best = list[Array](), list[Array](), list[int]()
-    run = Run("first", "walk", OURS, SHOWN_VIEW)
-    frame = first_frame(motion, iterations, particles, run, method=(Watched, "pca"))
-    return WatchedSwarm(paper_scene(motion, SHOWN_VIEW, (0, 1)), poses, translations, best, frame.trace[:, 1])
+    scene = paper_scene(motion, SHOWN_VIEW, (0, 1))
+    options = completed(TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth)
+    task, observation = task_of(scene, options, motion.training), scene.observations[0]
+    space = Predictor(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(observation)
+    problem = PoseProblem(scene.body, scene.cameras, observation.silhouettes, space)
+    search = SAPSO(space, np.random.default_rng(0), population_size=particles, iterations=iterations)
+    steps = list(populations(search, problem.evaluate, particles * (iterations + 1)))
+    poses, translations = zip(*(problem.decode(proposals) for proposals, _ in steps), strict=True)
+    history = np.minimum.accumulate([costs.min() for _, costs in steps])
+    return WatchedSwarm(scene, [*poses], [*translations], [int(costs.argmin()) for _, costs in steps], history)
 
 
 def swarm_figure(swarm: WatchedSwarm) -> Figure:
@@ -134,20 +125,17 @@ def swarm_figure(swarm: WatchedSwarm) -> Figure:
 
 def lowest_cost_figure(analysis: Analysis) -> Figure:
     """Return the lowest cost against the iteration in the first frame, for each N: medians over views and seeds."""
-    figure = Figure(figsize=(10.0, 3.8), layout="constrained")
-    panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
+    figure, panels = _panels((10.0, 3.8), 1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
         for name, style in ((OURS, "-"), (LETTER, ":")):
             histories = analysis.results.of("history", "first", motion, name)
             for k, count in enumerate(SWARMS):
-                middle = np.median(histories[:, :, k].reshape(-1, histories.shape[-1]), axis=0)
-                axes.plot(
-                    middle, style, color=COLOURS[k], linewidth=1.3, label=f"N = {count}" + " letter" * (style == ":")
-                )
+                middle, label = np.median(histories[:, :, k], axis=(0, 1)), f"N = {count}" + " letter" * (style == ":")
+                axes.plot(middle, style, color=COLOURS[k], linewidth=1.3, label=label)
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
         runs = histories.shape[0] * histories.shape[1]
-        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {runs} runs")
-        _plain(axes)
+        axes.set(xlabel="iteration", ylim=(0.0, None))
+        axes.set_title(f"{LABELS[motion]}, first frame, {runs} runs", fontsize=9)
     panels[0].set_ylabel("lowest cost")
     panels[-1].legend(ncols=2, **_LEGEND)
     return figure
@@ -156,8 +144,7 @@ def lowest_cost_figure(analysis: Analysis) -> Figure:
 def dimension_figure(analysis: Analysis) -> Figure:
     """Return the error of each angle in single images of eight views, of PCA + SAPSO, its letter and the mean pose."""
     names = ["root", *(JOINTS[joint] for joint in INNER)]
-    figure = Figure(figsize=(12.0, 7.5), layout="constrained")
-    panels: Any = figure.subplots(len(analysis.motions), 1, sharex=True)
+    figure, panels = _panels((12.0, 7.5), len(analysis.motions), sharex=True)
     for axes, motion in zip(panels, analysis.motions, strict=True):
         for name, kind, style in ((LETTER, "image", "x"), ("mean_pose", "track", "_")):
             away = analysis.away(motion, name, kind).mean(axis=(0, 1, 2))
@@ -166,10 +153,10 @@ def dimension_figure(analysis: Analysis) -> Figure:
         ours = analysis.away(motion, OURS, "image").mean(axis=(0, 1, 2))
         axes.bar(np.arange(len(ours)), ours, color=COLOURS[0], label=METHODS[OURS])
         axes.axhline(SMALL_DEGREES, color=_DIM, linewidth=0.8, linestyle=":")
-        axes.set(ylabel="degrees", xlim=(-1, len(ours)), ylim=(0.0, 25.0), title=LABELS[motion])
+        axes.set(ylabel="degrees", xlim=(-1, len(ours)), ylim=(0.0, 25.0))
+        axes.set_title(LABELS[motion], fontsize=9)
         for k in range(3, len(ours), 3):
             axes.axvline(k - 0.5, color="0.92", linewidth=0.8, zorder=0)
-        _plain(axes)
     panels[0].legend(**_LEGEND)
     panels[-1].set_xticks(3 * np.arange(len(names)) + 1, names, rotation=60, ha="right", fontsize=8)
     panels[-1].tick_params(axis="x", length=0)
@@ -178,28 +165,26 @@ def dimension_figure(analysis: Analysis) -> Figure:
 
 def frame_figure(analysis: Analysis) -> Figure:
     """Return the error of each frame of the paper's methods and the letter: medians of all runs, middle halves."""
-    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
-    panels: Any = figure.subplots(len(MOTIONS), 1)
+    figure, panels = _panels((10.0, 6.4), len(MOTIONS))
     for axes, motion in zip(panels, MOTIONS, strict=True):
         for name, colour in zip((*PAPER, LETTER), (*COLOURS[1::-1], *COLOURS[2:4]), strict=True):
             errors = analysis.away(motion, name).mean(axis=3)
-            _band(axes, errors.reshape(-1, errors.shape[2]), colour, METHODS[name])
+            low, middle, high = np.quantile(errors.reshape(-1, errors.shape[2]), [0.25, 0.5, 0.75], axis=0)
+            axes.plot(middle, color=colour, linewidth=1.3, label=METHODS[name])
+            axes.fill_between(np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0)
         mean = analysis.away(motion, "mean_pose").mean(axis=3)[0, 0]
         axes.plot(mean, color=_DIM, linewidth=1.0, linestyle="--", label="mean training pose, true root")
-        axes.set(ylabel="error, degrees", ylim=(0.0, None), title=LABELS[motion], xlim=(0, len(mean) - 1))
-        _plain(axes)
+        axes.set(ylabel="error, degrees", ylim=(0.0, None), xlim=(0, len(mean) - 1))
+        axes.set_title(LABELS[motion], fontsize=9)
     panels[0].legend(ncols=3, **_LEGEND)
     panels[-1].set_xlabel("frame")
     return figure
 
 
-def _band(axes: Any, rows: Array, colour: str, label: str) -> None:
-    """Draw the median of rows (n, T), and their middle half."""
-    low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75], axis=0)
-    axes.plot(middle, color=colour, linewidth=1.3, label=label)
-    axes.fill_between(np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0)
-
-
-def _plain(axes: Any) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.title.set_fontsize(9)
+def _panels(size: tuple[float, float], rows: int, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
+    """Return a figure of a size in inches and its axes, open at the top and the right."""
+    figure = Figure(figsize=size, layout="constrained")
+    panels: Any = figure.subplots(rows, columns, **shared)
+    for axes in panels:
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure, panels
