@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.fitting.shape import NAMES, REACH, SPREAD, Shape, shaped
+from posefit.fitting.shape import NAMES, PRECISION, REACH, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
@@ -264,9 +264,9 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
         steps, by_factor = solved[..., 0], solved[..., 1:]
         held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
-        known = held / SPREAD**2
-        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, by_factor)
-        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, steps)
+        known = held * PRECISION
+        curve = curve + known - np.einsum("tni,tnj->ij", mixed, by_factor)
+        slope = slope + known @ part.factors - np.einsum("tni,tn->i", mixed, steps)
         changes = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
         changes = part.factors - np.clip(part.factors - changes, -REACH * SPREAD, REACH * SPREAD)
         steps = steps - by_factor @ changes
