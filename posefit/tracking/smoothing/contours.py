@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.fitting.shape import NAMES, PRECISION, REACH, SPREAD, Shape, shaped
+from posefit.fitting.shape import MODEL_SPREAD, NAMES, PRECISION, REACH, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
@@ -201,7 +201,8 @@ def fit_contours(
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
         part = _fitted(scene, motion, visibility, parts[best][0], scene.body, shape, beta)
         if part.body is not scene.body:  # else no build fits better, and only poses are fitted
-            shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=part.spread)
+            spread = np.minimum(np.hypot(part.spread, MODEL_SPREAD), SPREAD)
+            shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=spread)
             fitted[best] = part
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
