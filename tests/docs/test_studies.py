@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import functions
 import gpu
 import proportions
+import seeds
 from make_boxes import learned_from, upright_poses
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
 from posefit.motion.built_in import average_skeleton
@@ -279,3 +280,9 @@ def test_the_density_of_people_is_that_of_a_normal_distribution() -> None:
     people, covariance = rng.normal(size=(6, 4)), root @ root.T + np.eye(4)
     expected = multivariate_normal(np.zeros(4), covariance).logpdf(people).mean()
     assert proportions.likelihood(people, covariance) == pytest.approx(expected)
+
+
+def test_tracks_are_as_far_apart_as_the_median_joint_of_all_pairs() -> None:
+    tracks = [np.zeros((1, 3, 3)), np.full((1, 3, 3), [3.0, 4.0, 0.0]), np.full((1, 3, 3), [0.0, 12.0, 0.0])]
+    assert seeds.median_distance(tracks) == pytest.approx(np.sqrt(73.0))  # of 5, 12 and the square root of 9 + 64
+    assert seeds.median_distance(tracks[:1]) == 0.0
