@@ -9,7 +9,7 @@ import math
 import sys
 import warnings
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -108,19 +108,6 @@ def archived(
             if single and len(there) == 1 and (only := there.pop()).endswith(".npy"):
                 arrays = {names[0]: _stored(path, what, archive, only.removesuffix(".npy"))}
         yield arrays
-
-
-def read_arrays(path: Path, names: Sequence[str], what: str, most: int) -> Mapping[str, NDArray[Any]]:
-    """Return those of `names` that an .npz file has, of `most` bytes together, 8 or more for each value.
-
-    Raises InputError as `archived` does.
-    """
-    with archived(path, names, what, most) as arrays:
-        size = sum(max(one.nbytes, 8 * math.prod(one.shape)) for one in arrays.values())
-        if size > most:
-            came = f"{size / 1e9:.3g} GB when unpacked, where {most / 1e9:g} GB are the most"
-            raise InputError(f"{path}: expected an .npz file with {what}, got {came}")
-        return {name: np.asarray(one) for name, one in arrays.items()}
 
 
 class _ArchiveFile(io.FileIO):

@@ -1,10 +1,8 @@
 """What plugins offer, by kind and name, and how plugins are loaded.
 
 A plugin that cannot be imported, misspells a hook, fails inside one or takes a name that is taken is left out with a
-warning that names its distribution; the others work. Environment variables, as in other plugin hosts:
-POSEFIT_LOAD_PLUGINS names the only ones to load beside the built-ins (none where it is empty), POSEFIT_BLOCK_PLUGINS
-those to leave out, each by plugin or distribution and separated by commas; POSEFIT_STRICT_PLUGINS=1 turns the warning
-into an error.
+warning that names its distribution; the others work. The environment variable POSEFIT_BLOCK_PLUGINS names those to
+leave out, each by plugin or distribution and separated by commas.
 """
 
 import os
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
     from posefit.fitting.optimiser import NextFrame, OptimiserFactory
     from posefit.fitting.prior import PriorFactory
 
-LOAD, BLOCK, STRICT = "POSEFIT_LOAD_PLUGINS", "POSEFIT_BLOCK_PLUGINS", "POSEFIT_STRICT_PLUGINS"
+BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -228,29 +226,27 @@ def load(
     """Return the plugins behind entry points, posefit's own first: loaded, broken or left out.
 
     Only the hooks of `kinds` are called: some of KINDS, or COMMAND. No two offers of one name are loaded; `taken` are
-    the names of posefit's own commands. Raises ValueError where a plugin is broken and POSEFIT_STRICT_PLUGINS is set.
+    the names of posefit's own commands.
     """
     owners = {f"command {name!r}": PROJECT for name in taken}
+    blocked = {word.strip().lower() for word in variables.get(BLOCK, "").split(",")}
     plugins: list[Plugin] = []
     owned = [(*((point.dist.name, point.dist.version) if point.dist else ("unknown", "")), point) for point in points]
     for owner, release, point in sorted(owned, key=lambda one: (one[0] != PROJECT, one[2].name)):
-        plugin = Plugin(point.name, owner, release, "left out", _left_out(point.name, owner, variables))
-        if not plugin.cause:
+        plugin = Plugin(point.name, owner, release, "left out", f"{BLOCK} names it")
+        if not blocked & {point.name.lower(), owner.lower()}:
             try:
                 offers = _offers(point, kinds, owner, release, owners)
                 owners |= dict.fromkeys(offers, owner)
                 methods = tuple(offer for offer in offers.values() if isinstance(offer, Offer))
                 commands = tuple(offer for offer in offers.values() if not isinstance(offer, Offer))
-                plugin = plugin._replace(state="loaded", offers=methods, commands=commands)
+                plugin = plugin._replace(state="loaded", cause="", offers=methods, commands=commands)
             except (Exception, SystemExit) as error:  # whatever a plugin does, the others must work
                 trace = "".join(traceback.format_exception(error))
                 plugin = plugin._replace(state="broken", cause=f"{type(error).__name__}: {error}", traceback=trace)
         plugins.append(plugin)
         if plugin.state == "broken":
-            message = f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}"
-            if variables.get(STRICT, "0") not in ("", "0"):
-                raise InputError(message)
-            warnings.warn(message, stacklevel=2)
+            warnings.warn(f"plugin {plugin.name!r} of {owner} {release} is left out: {plugin.cause}", stacklevel=2)
     return tuple(plugins)
 
 
@@ -303,17 +299,3 @@ def _offers(
 
 def _taken(name: str) -> str:
     return f"{name} is already registered by"
-
-
-def _left_out(name: str, distribution: str, variables: Mapping[str, str]) -> str:
-    """Return why the variables leave a plugin out, or nothing."""
-
-    def chosen(variable: str) -> bool:
-        words = {word.strip().lower() for word in variables[variable].split(",")}
-        return bool(words & {name.lower(), distribution.lower()})
-
-    if BLOCK in variables and chosen(BLOCK):
-        return f"{BLOCK} names it"
-    if LOAD in variables and distribution != PROJECT and not chosen(LOAD):
-        return f"{LOAD} does not name it"
-    return ""

@@ -1,141 +1,78 @@
-"""Baseline agents of FitState-v0 on held-out instances.
+"""Does it pay to look? FitImage-v0 by blind searches, cloning and PPO, on held-out instances.
 
-Chance, constants, a bandit, CMA-ES over settings, and PPO and SAC of Stable-Baselines3 with their defaults.
+    python docs/studies/agents.py --rows agents.jsonl --picture agents.png
+
+A learner's row is one training, of Stable-Baselines3's PPO or of the truths of training instances; a search's row has
+every instance once. A table is printed for each variant of the task.
 """
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
+from time import process_time
 from typing import Any, NamedTuple
 
 import click
 import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers.vector import ResizeObservation, TransformObservation
 
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.errors import InputError
-from posefit.fitting.cma import Strategy, default_population_size
+from posefit.fitting.box import Start
 from posefit.registry import registry
 from posefit.settings import planned
+from posefit_envs import to_sb3_vec_env
 from posefit_envs.fit import MAX_EVALUATIONS
-from posefit_envs.instance import first_episode, world_of
-from posefit_envs.policies import (
-    Policy,
-    gaussian_policy,
-    random_search_policy,
-    rollout,
-    uniform_policy,
-)
 from posefit_reproduce.jobs import each
-from table import WORKERS, earlier, kept, markdown
+from table import LEVEL, RESAMPLES, WORKERS, earlier, kept, markdown
 
+NAME = "posefit_envs:posefit/FitImage-v0"
 HELD_OUT = 10_000  # the first instance of the test split
-INSTANCES, SEEDS, STEPS = 40, 5, 20_000
-QUICK_INSTANCES, QUICK_SEEDS, QUICK_STEPS = 4, 2, 300
-CURVE = 5  # looks at an agent while it learns
-CURVE_INSTANCES = 16  # that each look takes, the first of those held out
-STRONGEST, BEST_KNOWN_EVALUATIONS = "cma", 24_400  # the method and budget of the best known costs
-UNTRAINED = 0  # steps of training of a reference
+VARIANTS: dict[str, dict[str, Any]] = {
+    "walks": {},
+    "runs": {"motion": "run"},
+    "all motions": {"motion": "all"},
+    "held-out people": {"held_out_people": True},
+    "unknown yaw": {"yaw": "unknown"},
+    "two views": {"view_degrees": [45.0, 135.0]},
+    "searched translation": {"translation": "searched"},
+    "damaged masks": {"noise": {"holes": 0.3, "shadow": 0.5}},
+    "another body": {"mismatch_percent": 10.0},
+}
+INSTANCES, SEEDS, STEPS = 200, 3, 270_000
+BUDGETS = (8, 40, 200, 800, 2440)  # evaluations of blind searches
+SEARCHES = ("sapso", "cma")
+CONSTANTS = ("uniform", "the box's middle", "training mean", "the truth, projected")
+LEARNERS = ("PPO, blank", "cloning", "PPO", "cloning, then PPO")
+STARTED, STARTED_BUDGET, STARTED_SPREAD = (
+    "PPO, then cma",
+    200,
+    0.1,
+)  # CMA-ES that starts from the best of PPO's proposals
+ENVIRONMENTS, ROLLOUT, BATCH, EPOCHS = 64, 16, 256, 6
+LEARNING_RATE, LOG_DEVIATION = 1.5e-3, -1.6
+SHOWN = (12, 16)  # height and width of the pictures that networks take
+NETWORKS: dict[str, list[int]] = {"pi": [384, 128], "vf": [128]}  # hidden layers
+CLONING_STEPS, CLONED_LOG_DEVIATION = 30_720, -2.3  # before PPO goes on, from where it draws nearer to the means
+LOOKS = 6  # at the held-out costs while PPO learns
+CURVE_INSTANCES = 100
+WHITE = (255, 255, 255)
 
-
-NAME = "posefit/FitState-v0"
-LENGTH = MAX_EVALUATIONS - 1  # steps of an episode, whose first proposal is the middle of the box
-REFERENCES = ("random search", "random actions", "gaussian", "sapso", "cma")  # not trained
-LEARNERS = ("bandit", "cma over constants", "ppo", "sac")
+Policy = Callable[[Any], Array]  # of small pictures (n, 12, 16, 2 views)
 
 
 class Training(NamedTuple):
-    """One row: an agent, a seed of its training and evaluation, and its steps."""
+    """One row: an agent in a variant, the steps of its training or the evaluations of a search, and a seed."""
 
+    variant: str
     agent: str
+    budget: int
     seed: int
-    steps: int
     instances: int
-
-
-WIDE = 0.5  # the first step size of CMA-ES, of a box from -1 to 1
-EPISODES = 4  # that a setting of CMA-ES is tried in, the same instances for a whole generation
-SETTING_NUMBERS = 2  # the last number of the first action and of the last, with those between on a line
-CURIOSITY = 0.5  # of the bandit: how many deviations of rewards an arm that was never tried is worth
-
-Look = Callable[[int, Policy], None]
-
-
-def arms() -> list[Array]:
-    """Return the settings that the bandit may choose from."""
-    return [np.full(SETTING_NUMBERS, power) for power in np.linspace(-1.0, 1.0, 9)]
-
-
-def setting_policy(setting: Array, rng: np.random.Generator, dimensions: int) -> Policy:
-    """Return the policy of a setting: random targets, and the part of the way to them that it says."""
-
-    def propose(_: Any, step: int) -> Array:
-        power = setting[0] + (setting[1] - setting[0]) * step / LENGTH
-        return np.append(rng.uniform(-1.0, 1.0, dimensions - 1), power)
-
-    return propose
-
-
-def bandit(env: Any, steps: int, seed: int, look: Look) -> Policy:
-    """Return the best arm by UCB1 over the whole episodes that `steps` steps of a training environment are.
-
-    `look` is called with the steps so far and the policy of then.
-    """
-    rng, choices = np.random.default_rng(seed), arms()
-    d = env.action_space.shape[0]
-    policies = [setting_policy(arm, rng, d) for arm in choices]
-    shown = [setting_policy(arm, _apart(seed), d) for arm in choices]
-    sums, squares, counts = np.zeros(len(choices)), np.zeros(len(choices)), np.zeros(len(choices))
-    for episode in range(steps // LENGTH):
-        tried = np.maximum(counts, 1.0)
-        deviation = np.sqrt(max(squares.sum() / max(episode, 1) - (sums.sum() / max(episode, 1)) ** 2, 0.0))
-        bonus = CURIOSITY * deviation * np.sqrt(2.0 * np.log(episode + 1.0) / tried)
-        arm = int(np.where(counts > 0, sums / tried + bonus, np.inf).argmax())
-        gain = rollout(env, policies[arm], int(rng.integers(HELD_OUT)), int(rng.integers(2**31)))["gain"]
-        sums[arm], squares[arm], counts[arm] = sums[arm] + gain, squares[arm] + gain**2, counts[arm] + 1
-        look((episode + 1) * LENGTH, shown[int(np.where(counts > 0, sums / tried, -np.inf).argmax())])
-    return shown[int(np.where(counts > 0, sums / np.maximum(counts, 1.0), -np.inf).argmax())]
-
-
-def _apart(seed: int) -> np.random.Generator:
-    """Return a generator for looks at what was learned, so that looking changes nothing of the training."""
-    return np.random.default_rng([seed, 2])
-
-
-GENERATION = default_population_size(SETTING_NUMBERS) * EPISODES * LENGTH  # steps of one of CMA-ES over settings
-
-
-def evolved(env: Any, steps: int, seed: int, look: Look) -> Policy:
-    """Return the setting at the mean of CMA-ES after the whole generations that `steps` steps of an environment are.
-
-    Without one it is the middle.
-    """
-    rng, other = np.random.default_rng(seed), _apart(seed)
-    d, size = env.action_space.shape[0], SETTING_NUMBERS
-    population = default_population_size(size)
-    strategy = Strategy(np.zeros(size), np.full(size, WIDE), population)
-    for number in range(1, steps // GENERATION + 1):
-        settings = np.clip(strategy.sample(rng, population), -1.0, 1.0)
-        numbers, seeds = rng.integers(HELD_OUT, size=EPISODES), rng.integers(2**31, size=EPISODES)
-        costs = [
-            -np.mean(
-                [
-                    rollout(env, setting_policy(setting, rng, d), int(number), int(one))["gain"]
-                    for number, one in zip(numbers, seeds, strict=True)
-                ]
-            )
-            for setting in settings
-        ]
-        strategy.learn(settings, np.array(costs))
-        look(number * GENERATION, setting_policy(np.clip(strategy.mean, -1.0, 1.0), other, d))
-    return setting_policy(np.clip(strategy.mean, -1.0, 1.0), other, d)
-
-
-DISCOUNT = 0.99  # their default, stated
-ROLLOUT = 2048  # steps that PPO takes before it learns of them; its default, stated
 
 
 def check_learners() -> None:
@@ -144,229 +81,247 @@ def check_learners() -> None:
         raise ImportError("ppo and sac need Stable-Baselines3: pip install posefit[rl]")
 
 
-def trained(agent: str, env: Any, steps: int, seed: int, look: Look) -> Policy:
-    """Return the policy of "ppo" or "sac" after so many steps in an environment, of "ppo" in whole rollouts.
+def made(training: Training, count: int, **arguments: Any) -> Any:
+    """Return a vector environment of a variant with small pictures; the observed ones are blank for a blank agent."""
+    env = ResizeObservation(gym.make_vec(NAME, count, **VARIANTS[training.variant], **arguments), SHOWN)
+    channels = np.arange(env.single_observation_space.shape[-1])
+    mask = (channels % 2 if "blank" in training.agent else np.ones_like(channels)).astype(np.uint8)
+    return TransformObservation(env, lambda pictures: pictures * mask)
 
-    Its actions are drawn, as its noise is what searches. `look` is called with the steps so far and the policy of then.
-    """
+
+def episodes(policy: Policy, training: Training, count: int, proposals: int = MAX_EVALUATIONS) -> tuple[Array, Array]:
+    """Return the actions (k, n, d) and costs (k, n) of an episode on each of the first held-out instances."""
+    env = made(training, count, max_evaluations=proposals)
+    pictures, _ = env.reset(seed=0, options={"instance": list(range(HELD_OUT, HELD_OUT + count))})
+    actions, costs = [], []
+    for _ in range(proposals):
+        actions.append(np.clip(policy(pictures), -1.0, 1.0))
+        pictures, _, _, _, infos = env.step(actions[-1])
+        costs.append(infos["cost"])
+    return np.array(actions), np.array(costs)
+
+
+def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return a row: the best costs on held-out instances, the proposals, and what the training took."""
+    begun, row = process_time(), training._asdict() | {"curve": [], "proposals": None}
+    if training.agent in (*SEARCHES, STARTED):
+        row["costs"] = searched(training, start)
+        return row | {"cpu_seconds": round(process_time() - begun, 1)}
+    learns = training.agent in LEARNERS
+    policy = trained(training, row["curve"]) if learns else constant(training)
+    row["cpu_seconds"] = round(process_time() - begun, 1)
+    count = MAX_EVALUATIONS if learns or training.agent == "uniform" else 1
+    actions, costs = episodes(policy, training, training.instances, count)
+    row["costs"] = costs.min(axis=0).tolist()
+    if learns:
+        row |= {"proposals": actions.round(4).tolist(), "proposal_costs": costs.round(2).tolist()}
+    return row
+
+
+def constant(training: Training) -> Policy:
+    """Return the policy of a reference that does not look."""
+    rng, env = np.random.default_rng(training.seed), made(training, training.instances)
+    d = env.single_action_space.shape[0]
+    if training.agent == "uniform":
+        return lambda pictures: rng.uniform(-1.0, 1.0, (len(pictures), d))
+    if training.agent == "the box's middle":
+        return lambda pictures: np.zeros((len(pictures), d))
+    first = HELD_OUT if training.agent == "the truth, projected" else 0
+    env.reset(options={"instance": list(range(first, first + training.instances))})
+    truths = np.array([episode.truth for episode in env.unwrapped.episodes])
+    return lambda _: truths if first else np.repeat(truths.mean(axis=0, keepdims=True), len(truths), axis=0)
+
+
+def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]:
+    """Return the costs that an optimiser reaches on the held-out instances, blindly or from a row's proposals."""
+    name = "cma" if training.agent == STARTED else training.agent
+    env, factory = made(training, training.instances), registry().optimiser(name)
+    env.reset(options={"instance": list(range(HELD_OUT, HELD_OUT + training.instances))})
+    few = {"population_size": training.budget} if training.budget < 40 else {}  # one population of sapso
+    settings, costs = planned(factory, few, training.budget), []
+    for number, problem in enumerate(env.unwrapped.problems):
+        space = problem.space
+        if start is not None:
+            best = int(np.argmin(np.array(start["proposal_costs"])[:, number]))
+            mean = np.array(start["proposals"])[best, number]
+            space = replace(space, start=Start(mean, np.full(len(mean), STARTED_SPREAD), np.zeros(len(mean))))
+        optimiser = factory(space, np.random.default_rng([training.seed, number]), **settings)
+        costs.append(minimise(problem.evaluate, optimiser, training.budget, budget_known=True).cost)
+    return costs if start is None else np.minimum(costs, start["costs"]).tolist()
+
+
+def trained(training: Training, curve: list[Any]) -> Policy:
+    """Return the policy of a learner, the mean of its distribution; `curve` gets its held-out costs on the way."""
     import torch
-    from stable_baselines3 import PPO, SAC
+    from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
 
     torch.set_num_threads(1)
-    common: dict[str, Any] = {"policy": "MlpPolicy", "env": env, "seed": seed, "device": "cpu", "gamma": DISCOUNT}
-    model = PPO(**common, n_steps=ROLLOUT) if agent == "ppo" else SAC(**common)
+    vector = to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False))
+    policy_settings = {"log_std_init": LOG_DEVIATION, "net_arch": NETWORKS, "activation_fn": torch.nn.ReLU}
+    model = PPO(
+        "MlpPolicy", vector, seed=training.seed, device="cpu", gamma=0.0,
+        learning_rate=lambda left: LEARNING_RATE * left,
+        n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS, policy_kwargs=policy_settings,
+    )  # fmt: skip
 
-    def act(observation: Any, _: int) -> Array:
-        chosen: Array = model.predict(observation, deterministic=False)[0]
-        return chosen
+    def act(pictures: Any) -> Array:
+        return np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
+
+    begun, learning = process_time(), training.budget
+    if "cloning" in training.agent:
+        steps = min(CLONING_STEPS, training.budget)
+        cloned(model, made(training, ENVIRONMENTS), steps)
+        model.policy.log_std.data.fill_(CLONED_LOG_DEVIATION)
+        learning -= steps
 
     class Looking(BaseCallback):  # type: ignore[misc]
+        def _on_rollout_start(self) -> None:
+            if self.num_timesteps >= learning * len(curve) // LOOKS:
+                cost = episodes(act, training, CURVE_INSTANCES)[1].min(axis=0).mean()
+                curve.append([training.budget - learning + self.num_timesteps, cost, process_time() - begun])
+
         def _on_step(self) -> bool:
-            with torch.random.fork_rng(devices=()):  # looking changes nothing of the training
-                look(self.num_timesteps, act)
             return True
 
-    model.learn(steps, callback=Looking())
+    if learning:
+        model.learn(learning, callback=Looking())
     return act
 
 
-BEST = "best known"
+def cloned(model: Any, env: Any, steps: int) -> None:
+    """Teach a model the truth in what its own proposals show (DAgger: Ross, Gordon, Bagnell, AISTATS 2011)."""
+    import torch
+
+    pictures, infos = env.reset(seed=model.seed)
+    truths, length = infos["truth"].copy(), ROLLOUT * ENVIRONMENTS
+    for _ in range(steps // length):
+        shown, targets = [], []
+        for _ in range(ROLLOUT):
+            shown.append(pictures)
+            targets.append(truths.copy())
+            pictures, _, _, _, infos = env.step(np.clip(model.predict(shown[-1])[0], -1.0, 1.0))
+            if "truth" in infos:
+                truths[infos["_truth"]] = infos["truth"][infos["_truth"]]
+        inputs = model.policy.obs_to_tensor(np.concatenate(shown))[0]
+        answers = torch.as_tensor(np.concatenate(targets), dtype=torch.float32)
+        for rows in [part for _ in range(EPOCHS) for part in torch.randperm(length).split(BATCH)]:
+            means = model.policy.get_distribution(inputs[rows]).distribution.mean
+            model.policy.optimizer.zero_grad()
+            (means - answers[rows]).square().sum(dim=1).mean().backward()
+            model.policy.optimizer.step()
 
 
-def agents(instances: int, quick: bool, rows: str | None, workers: int | None) -> list[dict[str, Any]]:
-    """Return the rows of all agents; those in the file `rows` are not measured again, and others are added to it."""
-    check_learners()
-    seeds, steps, instances = (QUICK_SEEDS, QUICK_STEPS, QUICK_INSTANCES) if quick else (SEEDS, STEPS, instances)
-    turns = [Training(BEST, 0, UNTRAINED, instances)]
-    for seed in range(seeds):
-        turns += [Training(agent, seed, UNTRAINED, instances) for agent in REFERENCES]
-        turns += [Training(agent, seed, steps, instances) for agent in LEARNERS]
-    done = earlier(rows, turn_of)
-    jobs = {turn: partial(agent_row, turn) for turn in turns if turn not in done}
-    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
-    return [done[turn] | {"taken": steps_taken(turn)} for turn in turns]
-
-
-def agent_row(turn: Training) -> dict[str, Any]:
-    """Return a row: the best costs that an agent reached on held-out instances, and what it learned on the way."""
-    start = time.perf_counter()
-    numbers = range(HELD_OUT, HELD_OUT + turn.instances)
-    row: dict[str, Any] = turn._asdict() | {"curve": []}
-    if turn.agent == BEST:
-        row["costs"] = _searched(STRONGEST, BEST_KNOWN_EVALUATIONS, numbers, turn.seed)
-    elif turn.agent in ("sapso", "cma"):
-        row["costs"] = _searched(turn.agent, MAX_EVALUATIONS, numbers, turn.seed)
-    else:
-        row["costs"] = _costs(turn, _policy(turn, row["curve"]), numbers)
-        if row["curve"]:
-            last = [steps_taken(turn), row["costs"][:CURVE_INSTANCES]]
-            row["curve"] = [look for look in row["curve"] if look[0] < last[0]] + [last]
-    return row | {"minutes": round((time.perf_counter() - start) / 60.0, 2)}
-
-
-def _policy(turn: Training, curve: list[Any]) -> Policy:
-    env, rng = _made(), np.random.default_rng([turn.seed, 1])
-    plain: dict[str, Callable[[], Policy]] = {
-        "random search": lambda: random_search_policy(env, rng),
-        "random actions": lambda: uniform_policy(env, rng),
-        "gaussian": lambda: gaussian_policy(env, rng),
+def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the table of a variant's rows: mean costs, and the evaluations that blind searches need for the same."""
+    groups: dict[str, dict[int, list[Mapping[str, Any]]]] = {}
+    for row in rows:
+        groups.setdefault(row["agent"], {}).setdefault(row["budget"], []).append(row)
+    blind = {
+        name: {budget: float(np.mean([row["costs"] for row in group])) for budget, group in groups[name].items()}
+        for name in SEARCHES
     }
-    if turn.agent in plain:
-        return plain[turn.agent]()
-    numbers = range(HELD_OUT, HELD_OUT + min(turn.instances, CURVE_INSTANCES))
-
-    def look(steps: int, policy: Policy) -> None:
-        due = turn.steps * len(curve) // CURVE
-        if steps >= due and len(curve) < CURVE:
-            curve.append([steps, _costs(turn, policy, numbers)])
-
-    if turn.agent in ("bandit", "cma over constants"):
-        learn = bandit if turn.agent == "bandit" else evolved
-        return learn(env, steps_taken(turn), turn.seed, look)
-    return trained(turn.agent, env, turn.steps, turn.seed, look)
-
-
-def steps_taken(turn: Training) -> int:
-    """Return how many steps of training an agent takes of those asked for: whole episodes, generations or rollouts."""
-    if turn.agent == "bandit":
-        return max(1, turn.steps // LENGTH) * LENGTH
-    if turn.agent == "cma over constants":
-        return turn.steps // GENERATION * GENERATION
-    if turn.agent == "ppo":
-        return -(-turn.steps // ROLLOUT) * ROLLOUT
-    return turn.steps
+    cells = []
+    for agent, budgets in groups.items():
+        if agent in SEARCHES:
+            proposals, cost = "; ".join(f"{n:,}" for n in budgets), "; ".join(f"{c:.1f}" for c in blind[agent].values())
+            cells.append([agent, proposals, "", "", "", cost, "", "", ""])
+            continue
+        ((budget, group),) = budgets.items()
+        costs = np.array([row["costs"] for row in group])
+        proposals = {STARTED: f"8 + {budget}", "uniform": "8"}.get(agent, "8" if agent in LEARNERS else "1")
+        steps, cpu = f"{budget:,}", f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
+        training = [steps, cpu, str(len(group))] if agent in LEARNERS else ["", "", ""]
+        low, high = interval(costs)
+        equal = [equivalent(blind[name], float(costs.mean())) for name in SEARCHES]
+        cells.append([agent, proposals, *training, f"{costs.mean():.1f}", f"{low:.1f} to {high:.1f}", *equal])
+    heads = ["", "proposals", "steps", "CPU s", "seeds", "cost", "95 % interval", "as SAPSO", "as CMA-ES"]
+    yield from markdown(heads, cells)
 
 
-def _made() -> gym.Env[Any, Any]:
-    return gym.make(NAME, errors=False)
+def equivalent(blind: Mapping[int, float], cost: float) -> str:
+    """Return how many evaluations a blind search needs for a mean cost, by its logarithm between those measured.
+
+    The costs of a search are those after so many evaluations, which rise nowhere.
+    """
+    budgets, costs = np.array(list(blind)), -np.minimum.accumulate(list(blind.values()))
+    if not -costs[-1] <= cost <= -costs[0]:
+        return f"< {budgets[0]}" if cost > -costs[0] else f"> {budgets[-1]:,}"
+    return f"{np.exp(np.interp(-cost, costs, np.log(budgets))):,.0f}"
 
 
-def _costs(turn: Training, policy: Policy, numbers: range) -> list[float]:
-    env = _made()
-    return [rollout(env, policy, number, 1000 * turn.seed + number)["best_cost"] for number in numbers]
+def interval(costs: Array) -> tuple[float, float]:
+    """Return the ends of the 95 % interval of the mean of costs (seeds, instances), by a bootstrap of both."""
+    rng = np.random.default_rng(0)
+    seeds = rng.integers(len(costs), size=(RESAMPLES, len(costs)))
+    columns = rng.integers(costs.shape[1], size=(RESAMPLES, costs.shape[1]))
+    means = [costs[np.ix_(*drawn)].mean() for drawn in zip(seeds, columns, strict=True)]
+    low, high = np.quantile(means, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    return float(low), float(high)
 
 
-def _searched(optimiser: str, evaluations: int, numbers: range, seed: int) -> list[float]:
-    """Return the costs that an optimiser of the library reaches on the same instances, by itself."""
-    world, factory = world_of(), registry().optimiser(optimiser)
-    costs = []
-    for number in numbers:
-        problem = first_episode(world, number, evaluations).problem
-        searching = factory(problem.space, np.random.default_rng([seed, number]), **planned(factory, {}, evaluations))
-        costs.append(minimise(problem.evaluate, searching, evaluations, budget_known=True).cost)
-    return costs
+def picture(row: Mapping[str, Any], path: str) -> None:
+    """Write the picture of a row's eight proposals, with their costs, where their best cost is the median."""
+    import cv2
+
+    instance = int(np.argsort(row["costs"])[row["instances"] // 2])
+    env = gym.make(NAME, **VARIANTS[row["variant"]], render_mode="rgb_array")
+    env.reset(options={"instance": HELD_OUT + instance})
+    panels = []
+    for proposals in row["proposals"]:
+        info = env.step(np.array(proposals[instance]))[-1]
+        panel = np.ascontiguousarray(np.asarray(env.render())[:240, 80:240])
+        cv2.putText(panel, f"{info['cost']:.1f}", (8, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.8, WHITE, 2, cv2.LINE_AA)
+        panels.append(panel)
+    cv2.imwrite(path, np.hstack(panels)[..., ::-1])
+
+
+@click.command(cls=Command, help=__doc__)
+@click.option("--variant", "names", multiple=True, type=click.Choice(list(VARIANTS)), help="By default walks alone.")
+@click.option("--agent", "agents", multiple=True, type=click.Choice(LEARNERS), help="By default all. Again for more.")
+@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings of each.")
+@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
+@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
+@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
+@click.option("--picture", "drawn", metavar="FILE", help="A PNG of the first PPO's eight proposals.")
+@WORKERS
+def main(
+    names: tuple[str, ...], agents: tuple[str, ...], seeds: int, steps: int, instances: int,
+    rows: str | None, drawn: str | None, workers: int | None,
+) -> None:  # fmt: skip
+    check_learners()
+    if drawn is not None and "PPO" not in (agents or LEARNERS):
+        raise InputError("--picture must come with the agent PPO")
+    turns = []
+    for variant in names or ("walks",):
+        turns += [Training(variant, agent, 0, 0, instances) for agent in CONSTANTS]
+        turns += [Training(variant, agent, budget, 0, instances) for agent in SEARCHES for budget in BUDGETS]
+        turns += [
+            Training(variant, name, min(steps, CLONING_STEPS) if name == "cloning" else steps, seed, instances)
+            for seed in range(seeds)
+            for name in agents or LEARNERS
+        ]
+    done = earlier(rows, turn_of)
+    jobs = {turn: partial(row_of, turn) for turn in turns if turn not in done}
+    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
+    started = {
+        Training(turn.variant, STARTED, STARTED_BUDGET, turn.seed, instances): done[turn]
+        for turn in turns
+        if turn.agent == "PPO"
+    }
+    for turn, start in started.items():
+        done.setdefault(turn, row_of(turn, start))
+    for variant in names or ("walks",):
+        click.echo(f"\n{variant}, {instances} held-out instances\n")
+        for line in table([done[turn] for turn in (*turns, *started) if turn.variant == variant]):
+            click.echo(line)
+    if drawn is not None:
+        picture(next(done[turn] for turn in turns if turn.agent == "PPO"), drawn)
 
 
 def turn_of(row: Mapping[str, Any]) -> Training:
     """Return the training of a row."""
     return Training(*(row[name] for name in Training._fields))
-
-
-Row = Mapping[str, Any]
-
-RESAMPLES, LEVEL, RNG_STREAM = 2000, 0.95, 67
-MIN_GAP = 0.1  # of a cost between random search and the best known: instances without it are left out
-
-
-def agent_table(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the scores of an environment's agents: 0 is random search on the instance, 1 the best known cost.
-
-    The best known is the lowest cost in any row. A score is the mean over seeds and instances; its interval is a
-    bootstrap of both. `steps` are those of training, `taken` of a row.
-    """
-    names = dict.fromkeys(row["agent"] for row in rows)
-    costs = {name: np.array([row["costs"] for row in rows if row["agent"] == name]) for name in names}
-    chance = costs["random search"].mean(axis=0)
-    best = np.concatenate(list(costs.values())).min(axis=0)
-    table = []
-    for name, of_agent in costs.items():
-        scores = normalised(of_agent, chance, best)
-        low, high = score_interval(scores)
-        own = [row for row in rows if row["agent"] == name]
-        table.append(
-            {
-                "agent": name,
-                "steps": own[0]["taken"],
-                "seeds": len(of_agent),
-                "cost": float(of_agent.mean()),
-                "median_cost": float(np.median(of_agent)),
-                "score": float(scores.mean()),
-                "low": low,
-                "high": high,
-                "minutes": float(np.mean([row["minutes"] for row in own])),
-                "curve": _curve([row["curve"] for row in own], chance, best),
-            }
-        )
-    return sorted(table, key=lambda row: row["score"])
-
-
-def normalised(costs: Array, chance: Array, best: Array) -> Array:
-    """Return scores (seeds, instances) of costs: 0 is `chance` (instances,), 1 is `best`.
-
-    Instances where both are nearly equal are left out. Raises ValueError where all are.
-    """
-    apart = chance - best >= MIN_GAP
-    if not apart.any():
-        raise InputError(f"best known must lie below random search, got none of {len(best)} instances that do")
-    return ((chance - costs) / np.where(apart, chance - best, 1.0))[:, apart]
-
-
-def score_interval(scores: Array) -> tuple[float, float]:
-    """Return the ends of the 95 % interval of the mean of scores (seeds, instances), by a bootstrap of both."""
-    rng = np.random.default_rng(RNG_STREAM)
-    seeds, instances = scores.shape
-    rows = rng.integers(seeds, size=(RESAMPLES, seeds))
-    columns = rng.integers(instances, size=(RESAMPLES, instances))
-    means = [scores[np.ix_(*drawn)].mean() for drawn in zip(rows, columns, strict=True)]
-    low, high = np.quantile(means, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
-    return float(low), float(high)
-
-
-def _curve(curves: Sequence[Any], chance: Array, best: Array) -> list[dict[str, float]]:
-    """Return the score at each look of all seeds, with its interval."""
-    points = []
-    for looks in zip(*curves, strict=False):
-        costs = np.array([costs for _, costs in looks])
-        few = costs.shape[1]
-        scores = normalised(costs, chance[:few], best[:few])
-        low, high = score_interval(scores)
-        steps = float(np.mean([steps for steps, _ in looks]))
-        points.append({"steps": steps, "score": float(scores.mean()), "low": low, "high": high})
-    return points
-
-
-def agents_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the printed table, and what each agent learns."""
-    table = agent_table(rows)
-    yield f"{NAME}, {MAX_EVALUATIONS} evaluations, {rows[0]['instances']} held-out instances"
-    yield ""
-    lines = []
-    for row in table:
-        interval = f"{row['low']:.3f} to {row['high']:.3f}"
-        cells = [row["agent"], str(row["steps"]), str(row["seeds"]), f"{row['score']:.3f}", interval]
-        cells += [f"{row['cost']:.2f}", f"{row['median_cost']:.2f}", f"{row['minutes']:.1f}"]
-        lines.append(cells)
-    heads = ["agent", "trained steps", "seeds", "score", "95 % interval", "mean cost", "median cost", "minutes"]
-    yield from markdown(heads, lines)
-    yield ""
-    for row in table:
-        if row["curve"]:
-            looks = ", ".join(
-                f"{look['steps']:.0f}: {look['score']:.2f} ({look['low']:.2f} to {look['high']:.2f})"
-                for look in row["curve"]
-            )
-            yield f"{row['agent']} learns: {looks}"
-
-
-@click.command(cls=Command, help=__doc__)
-@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
-@click.option("--quick", is_flag=True, help="Two trainings of 300 steps, four instances: a look, not a measurement.")
-@click.option("--rows", metavar="FILE", help="A file for a row a line: the same command continues there.")
-@WORKERS
-def main(instances: int, quick: bool, rows: str | None, workers: int | None) -> None:
-    for line in agents_lines(agents(instances, quick, rows, workers)):
-        click.echo(line)
 
 
 if __name__ == "__main__":

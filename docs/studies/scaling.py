@@ -16,8 +16,9 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
+from posefit.testing.problem import walking_angles
 from posefit_priors.pca import PCA
-from posefit_reproduce.bench.kernel import bench_problem, fastest, walking_angles
+from posefit_reproduce.bench.kernel import bench_problem, fastest
 
 POSES = 400
 WIDTHS, VIEWS, COMPONENTS, POPULATIONS = (

@@ -1,13 +1,13 @@
-"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/FitState-v0")`.
+"""Gymnasium environments of posefit: `gym.make("posefit_envs:posefit/FitImage-v0")`.
 
     import gymnasium as gym
 
-    env = gym.make("posefit_envs:posefit/FitState-v0", motion="run", instance=17)
+    env = gym.make("posefit_envs:posefit/FitImage-v0", motion="run", instance=17)
     observation, info = env.reset(seed=0)
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
-`FitImage-v0` is a search for the pose in one silhouette whose observation is the picture, `FitState-v0` one whose
-observation is the state of the search; `Track-v0` follows a sequence; `Race-v0` says which of several searches goes on.
+`FitImage-v0` is the pose in one silhouette, by few proposals; `Track-v0` follows a sequence; `Race-v0` says which of
+several searches goes on.
 Their docstrings are their manual. Importing this package registers them; the environments themselves are imported when
 they are made. `drive` runs an optimiser against an environment or a vector of them, `drive_each` one in every
 environment of a vector, `track_reference` returns what a tracker would commit in Track-v0, `to_sb3_vec_env` adapts a
@@ -16,7 +16,7 @@ vector environment to Stable-Baselines3, and `check_vector_env` compares any vec
 
 | looking for | file |
 |---|---|
-| FitImage-v0, FitState-v0, Track-v0 | fit.py, track.py |
+| FitImage-v0, Track-v0 | fit.py, track.py |
 | Race-v0: racing | race.py |
 | single and vector environments, checked actions, scales of actions, costs and rewards | base.py |
 | arguments and numbered instances (as in sweeps: `posefit.motion.instance`) | instance.py |
@@ -49,7 +49,6 @@ __all__ = list(_MODULES)
 
 for _id, _entry in (
     ("FitImage", "fit:FitImage"),
-    ("FitState", "fit:FitState"),
     ("Track", "track:Track"),
     ("Race", "race:Race"),
 ):

@@ -3,7 +3,7 @@
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
+from functools import partial
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from posefit import SearchSpace
+from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.fitting.check import one_of, whole
 from posefit.fitting.exchange import exchanged
@@ -38,7 +38,7 @@ ENDED = "the episode has ended: reset before the next step"
 class Outcome(NamedTuple):
     """The results of one step of n environments; rows of those that reset in this step need not mean anything."""
 
-    observations: Any  # (n, ...), or a dict of them
+    observations: NDArray[Any]  # (n, ...)
     rewards: Array  # (n,)
     terminated: Flags
     infos: Infos  # (n, ...) by name
@@ -128,7 +128,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._ended = np.zeros(num_envs, dtype=bool)
         self._numbers = np.zeros(num_envs, dtype=np.int64)
         self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._episodes: dict[int, Episode] = {}
+        self._episodes: dict[int, Episode | partial[Episode]] = {}  # those that nobody asked for are not made
         self._truths = np.empty((num_envs, ANGLES))
 
     @property  # type: ignore[misc]
@@ -145,14 +145,13 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     @property
     def episodes(self) -> list[Episode]:
         """What each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        if len(self._episodes) < self.num_envs:
-            raise error.ResetNeeded(NOT_BEGUN)
-        return [self._episodes[i] for i in range(self.num_envs)]
+        self._check_begun()
+        return [self._episode(i) for i in range(self.num_envs)]
 
     @property
-    def search_spaces(self) -> list[SearchSpace]:
-        """The space that each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return [episode.problem.space for episode in self.episodes]
+    def problems(self) -> list[PoseProblem]:
+        """The problem of each environment's proposals. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return [episode.problem for episode in self.episodes]
 
     def render(self) -> Any:
         """Return a tuple of pictures (height, width, 3), one an environment, where `render_mode` is "rgb_array"."""
@@ -176,12 +175,12 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
                 self._generators[i] = seeding.np_random(seeds[i])
             self._begin(i, numbers[i])
         observations, infos = self._opened(mask)
-        return observations, _masked_infos(mask, infos, {})
+        return observations, self._with_begun(_masked_infos(mask, infos, {}), mask)
 
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
         """Step each environment; one whose episode has ended resets instead, or at once by SAME_STEP."""
         actions = self._validator.check(actions, self._shape)
-        assert self.episodes
+        self._check_begun()
         stepping = ~self._ended
         for i in np.flatnonzero(self._ended).tolist():
             self._begin(i, None)
@@ -195,7 +194,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         if self._same_step and ended.any():
             going = ~ended
             for i in np.flatnonzero(ended).tolist():
-                last = {"final_obs": deepcopy(row_of(observations, i)), "final_info": outcome.infos_of(i)}
+                last = {"final_obs": observations[i].copy(), "final_info": outcome.infos_of(i)}
                 final = self._add_info(final, last, i)
                 self._begin(i, None)
             fresh, begun_infos = self._opened(ended)
@@ -207,7 +206,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             if going[i]:
                 infos = self._add_info(infos, row, i)
         rewards = np.where(stepping, outcome.rewards, 0.0)
-        return observations, rewards, outcome.terminated, truncated, infos
+        return observations, rewards, outcome.terminated, truncated, self._with_begun(infos, ~going)
 
     def _begin(self, i: int, chosen: int | None) -> None:
         """Begin the next episode of environment i, with a chosen instance or another."""
@@ -220,6 +219,17 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             self._generators[i] = seeding.np_random(None)
         return self._generators[i][0]
 
+    def _check_begun(self) -> None:
+        if len(self._episodes) < self.num_envs:
+            raise error.ResetNeeded(NOT_BEGUN)
+
+    def _episode(self, i: int) -> Episode:
+        """Return what environment i searches."""
+        episode = self._episodes[i]
+        if isinstance(episode, partial):
+            episode = self._episodes[i] = episode()
+        return episode
+
     def _enter(self, i: int, episode: Episode) -> None:
         self._episodes[i] = episode
         self._stage.set_problem(i, episode.problem)
@@ -231,6 +241,16 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         if self.world.errors:
             infos["error_degrees"] = np.degrees(np.abs(wrapped(self._truths - poses))).mean(axis=1)
         return infos
+
+    def _with_begun(self, infos: Infos, begun: Flags) -> Infos:
+        """Return infos with those that only the environments have whose episode has just begun."""
+        for i in np.flatnonzero(begun).tolist():
+            infos = self._add_info(infos, self._begun_infos(i), i)
+        return infos
+
+    def _begun_infos(self, i: int) -> Infos:
+        """Return what only the first infos of an episode of environment i hold."""
+        return {}
 
     @abstractmethod
     def _begin_search(self, i: int, number: int) -> None:
@@ -273,9 +293,9 @@ class SearchEnv(Env[Any, Any]):
         return self._vector.episodes[0].instance
 
     @property
-    def search_space(self) -> SearchSpace:
-        """The space that is searched. Raises gymnasium.error.ResetNeeded before the first reset."""
-        return self._vector.episodes[0].problem.space
+    def problem(self) -> PoseProblem:
+        """The problem that proposals are evaluated on. Raises gymnasium.error.ResetNeeded before the first reset."""
+        return self._vector.episodes[0].problem
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Infos]:
         """Begin with an instance; `options={"instance": 17}` chooses it."""
@@ -285,7 +305,7 @@ class SearchEnv(Env[Any, Any]):
         chosen = options.get("instance") if options else None
         self._vector._begin(0, None if chosen is None else instance_number(chosen))
         observations, infos = self._vector._opened(_ONE)
-        return row_of(observations, 0), _infos_of(infos, 0)
+        return observations[0], _infos_of(infos, 0) | self._vector._begun_infos(0)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Infos]:
         """Make one step. Raises gymnasium.error.ResetNeeded where the episode has ended."""
@@ -300,16 +320,11 @@ class SearchEnv(Env[Any, Any]):
         terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
         vector._ended[0] = terminated or truncated
         reward, infos = float(outcome.rewards[0]), outcome.infos_of(0)
-        return row_of(outcome.observations, 0), reward, terminated, truncated, infos
+        return outcome.observations[0], reward, terminated, truncated, infos
 
     def render(self) -> Any:
         """Return the picture (height, width, 3) where `render_mode` is "rgb_array"."""
         return None if self.render_mode is None else self._vector._render_row(0, self._vector.episodes[0])
-
-
-def row_of(observations: Any, i: int) -> Any:
-    """Return the observation of environment i, of observations (n, ...) or a dict of them."""
-    return {name: one[i] for name, one in observations.items()} if isinstance(observations, dict) else observations[i]
 
 
 def image_spaces(world: World) -> tuple[Box, Box]:
@@ -321,10 +336,8 @@ def image_spaces(world: World) -> tuple[Box, Box]:
     )
 
 
-def mixed(mask: Flags, chosen: Any, others: Any) -> Any:
-    """Return observations (n, ...) or a dict of them: those chosen where the mask (n,) is true, others elsewhere."""
-    if isinstance(chosen, dict):
-        return {name: mixed(mask, value, others[name]) for name, value in chosen.items()}
+def mixed(mask: Flags, chosen: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+    """Return observations (n, ...): those chosen where the mask (n,) is true, others elsewhere."""
     return np.where(mask.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, others)
 
 
@@ -400,11 +413,6 @@ def _reset_mask(options: Mapping[str, Any] | None, count: int, begun: bool) -> F
     if not begun and not mask.all():
         raise error.ResetNeeded("the first reset must be of all environments")
     return mask
-
-
-def scaled(bounds: tuple[float, float], number: Number) -> Number:
-    """Return the value between two bounds at a number from -1, the first bound, to 1, the second."""
-    return bounds[0] + 0.5 * (number + 1.0) * (bounds[1] - bounds[0])
 
 
 def log_cost(cost: Number) -> Number:

@@ -7,8 +7,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
-
-from posefit_envs.base import row_of
+from gymnasium.vector.utils import iterate
 
 FINAL = ("final_obs", "final_info")
 
@@ -31,9 +30,10 @@ def check_vector_env(
         assert expected == own, f"single_{name} must be {expected}, got {own}"
     observations, infos = vector.reset(seed=seed)
     assert observations in vector.observation_space, "reset must return observations of the observation space"
+    rows = list(iterate(vector.observation_space, observations))
     for i, single in enumerate(singles):
         observation, info = single.reset(seed=seed + i)
-        own = {"observation": row_of(observations, i), "info": _info(infos, i)}
+        own = {"observation": rows[i], "info": _info(infos, i)}
         _same(f"environment {i}, reset:", own, {"observation": observation, "info": info})
     ended = np.zeros(n, dtype=bool)
     vector.action_space.seed(seed)
@@ -45,6 +45,7 @@ def check_vector_env(
         _same(f"step {step}: the observations before it", before[0], kept[0])
         for key in [key for key in kept[1] if not key.startswith(("final_", "_final_"))]:  # a reset replaces those
             _same(f"step {step}: the info {key} before it", before[1][key], kept[1][key])
+        rows = list(iterate(vector.observation_space, observations))
         for i, single in enumerate(singles):
             if ended[i]:  # NEXT_STEP: this step resets, and its action is ignored
                 observation, info = single.reset()
@@ -56,7 +57,7 @@ def check_vector_env(
                 own = {"final": infos["final_obs"][i], "final info": _info(infos["final_info"], i)}
                 expected = {"final": observation, "final info": info}
                 observation, info = single.reset()
-            own |= {"observation": row_of(observations, i), "reward": rewards[i]}
+            own |= {"observation": rows[i], "reward": rewards[i]}
             own["info"] = _info(infos, i)
             expected |= {"observation": observation, "reward": reward, "info": info}
             own |= {"terminated": terminated[i], "truncated": truncated[i]}

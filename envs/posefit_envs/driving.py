@@ -17,21 +17,20 @@ from posefit.registry import registry
 from posefit.settings import check, planned
 from posefit.tracking.method import prepare
 from posefit.tracking.options import TrackOptions
-from posefit_envs.fit import FitImageEnv, FitImageVectorEnv, FitStateEnv, FitStateVectorEnv
-from posefit_envs.policies import WHOLE_WAY
+from posefit_envs.fit import FitImageEnv, FitImageVectorEnv
 from posefit_envs.track import TrackEnv, committed_infos
 
 
 class EnvObjective:
-    """The costs of proposals by stepping `posefit/FitImage-v0` or `FitState-v0`, a single one or a vector.
+    """The costs of proposals by stepping `posefit/FitImage-v0`, a single one or a vector.
 
     An episode that ends begins again with the same instance. Raises gymnasium.error.Error for another environment.
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any], dtype: Any) -> None:
         bare = env.unwrapped
-        if not isinstance(bare, FitImageEnv | FitImageVectorEnv | FitStateEnv | FitStateVectorEnv):
-            raise error.Error(f"env must be posefit/FitImage-v0 or FitState-v0, got {type(bare).__name__}")
+        if not isinstance(bare, FitImageEnv | FitImageVectorEnv):
+            raise error.Error(f"env must be posefit/FitImage-v0, got {type(bare).__name__}")
         self._env, self._bare, self._dtype = env, bare, dtype
         self._vector = isinstance(env, VectorEnv)
         self._count = env.num_envs if isinstance(env, VectorEnv) else 1
@@ -41,14 +40,12 @@ class EnvObjective:
         """Reset with an instance for all or each, or with random ones; return what each searches, and their numbers."""
         self._instances = self._env.reset(seed=seed, options={"instance": instance})[1]["instance"]
         bare = self._bare
-        spaces = [bare.search_space] if isinstance(bare, FitImageEnv | FitStateEnv) else bare.search_spaces
-        return spaces, np.atleast_1d(self._instances).tolist()
+        problems = [bare.problem] if isinstance(bare, FitImageEnv) else bare.problems
+        return [problem.space for problem in problems], np.atleast_1d(self._instances).tolist()
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
         actions = proposals.astype(self._dtype)
-        if isinstance(self._bare, FitStateEnv | FitStateVectorEnv):
-            actions = np.append(actions, np.full((len(actions), 1), WHOLE_WAY, dtype=self._dtype), axis=1)
         _, _, terminated, truncated, infos = self._env.step(actions if self._vector else actions[0])
         costs, done = np.array(infos["cost"]), np.logical_or(terminated, truncated)
         if done.any():
@@ -73,14 +70,14 @@ def drive(
     dtype: Any = np.float64,
     **settings: Any,
 ) -> Minimum:
-    """Return the minimum of an optimiser that steps `posefit/FitImage-v0` or `FitState-v0`, single or a vector.
+    """Return the minimum of an optimiser that steps `posefit/FitImage-v0`, a single one or a vector.
 
     A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
-    proposal, which does not count. An episode that ends, at its target or with its budget, begins again with the same
-    instance: only `evaluations` end the search. Actions are float64, so the result is the library's, bit for bit. With
-    `dtype` numpy.float32, that of the action space, a proposal is rounded to 7 digits; a pixel at a silhouette's edge
-    may then change, and with it the rest of the search. Raises gymnasium.error.Error for another environment, where the
-    budget does not hold one population, and where the environments have several instances: `drive_each` is for those.
+    proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the
+    search. Actions are float64, so the result is the library's, bit for bit. With `dtype` numpy.float32, that of the
+    action space, a proposal is rounded to 7 digits; a pixel at a silhouette's edge may then change, and with it the
+    rest of the search. Raises gymnasium.error.Error for another environment, where the budget does not hold one
+    population, and where the environments have several instances: `drive_each` is for those.
     """
     objective = EnvObjective(env, dtype)
     (space, *_), numbers = objective.begin(seed, instance)
@@ -104,7 +101,7 @@ def drive_each(
     dtype: Any = np.float64,
     **settings: Any,
 ) -> list[Minimum]:
-    """Return the minimum of a search of its own in each environment of a vector of `FitImage-v0` or `FitState-v0`.
+    """Return the minimum of a search of its own in each environment of a vector of `FitImage-v0`.
 
     The searches run side by side, a proposal of each in a step, with a population of any size and the seeds `seed`,
     `seed` + 1 and so on. `instances` names an instance for each environment; by default each has a random one. Raises
@@ -144,7 +141,9 @@ def track_reference(
     if not isinstance(bare, TrackEnv):
         raise error.Error(f"env must be posefit/Track-v0, got {type(bare).__name__}")
     instance, world = bare.instance, bare.world
-    motions = training_motions(training_clips(train or world.training, followed=world.motion), instance.task.fps)
+    motions = training_motions(
+        training_clips(train or world.training, followed=world.motion_of(instance.number)), instance.task.fps
+    )
     task = replace(instance.task, training=motions)
     tracker_settings = {f"{tracker.partition(':')[0]}.{name}": value for name, value in settings.items()}
     method = prepare(TrackOptions(method=tracker, settings=tracker_settings), task)

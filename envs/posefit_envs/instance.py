@@ -28,9 +28,12 @@ from posefit.silhouette.corruption import CORRUPTIONS, corrupted
 from posefit.silhouette.cost import project
 
 SPLITS = {"train": (0, 10_000), "test": (10_000, 20_000)}  # instance numbers; those of the test split are held out
-RNG_STREAM = 2012  # part of the seed of noise, yaw and build of an instance
+YAWS = ("guessed", "unknown")
+RNG_STREAM = 2012  # part of the seed of noise, yaw, place and build of an instance
 FPS = 30.0
 YAW_DEGREES = 20.0  # largest difference between the middle of the searched yaw and the truth
+ANY_YAW_DEGREES = (180.0, *ROOT_RANGE_DEGREES[1:])  # how far the root is searched where the yaw is unknown
+MIDDLE_METRES = 0.25  # largest difference between the middle of the searched translation and the truth
 DISTANCE, HEIGHT = 3.5, 0.9  # metres from camera to person; of the camera above the ground
 BODY = 0xFF00 if sys.byteorder == "little" else 0x00FF  # the byte of a pixel's pair that shows the body
 OBSERVED = 0xFFFF ^ BODY
@@ -46,7 +49,9 @@ class ArgumentError(error.Error, ValueError):
 class World:
     """The arguments that all environments share; FitImageEnv documents them. `world_of` checks them."""
 
-    motion: str = "walk"
+    motion: tuple[str, ...] = ("walk",)
+    held_out_people: bool = False
+    yaw: str = "guessed"
     instance: int | None = None
     split: str = "train"
     view_degrees: tuple[float, ...] = (45.0,)
@@ -58,20 +63,34 @@ class World:
     mismatch_percent: float = 0.0
     errors: bool = True
 
-    @property
+    @cached_property
     def learned(self) -> Prior:
         """The prior, fitted to the training motions."""
-        return _learned(self.prior, self.motion, self.training)
+        return _learned(self.prior, self.motion[0], self.training)
 
-    @property
+    @cached_property
     def training(self) -> tuple[str, ...]:
-        """The training motions: by default the other styles of a built-in motion, else the built-in walks."""
-        return self.train or built_in.other_styles(self.motion if self.motion in built_in.names() else "walk")
+        """The training motions: by default other styles of the built-in motions, else the built-in walks."""
+        if self.train:
+            return self.train
+        if self.held_out_people:
+            return tuple(style for kind in self.motion for style in built_in.other_styles(kind)[:-1])
+        names = [motion if motion in built_in.names() else "walk" for motion in self.motion]
+        return tuple(dict.fromkeys(style for name in names for style in built_in.other_styles(name)))
 
     @property
     def dimensions(self) -> int:
         """How many numbers a proposal has."""
         return len(self.learned.low) + (6 if self.translation == "searched" else 3)
+
+    def motion_of(self, number: int) -> str:
+        """Return the motion of an instance: each of several in turn, and of held-out people each style in turn."""
+        turn, which = divmod(number, len(self.motion))
+        motion = self.motion[which]
+        if not self.held_out_people:
+            return motion
+        *others, last = built_in.other_styles(motion)
+        return last if is_held_out(number) else others[turn % len(others)]
 
     def next_instance(self, generator: np.random.Generator) -> int:
         """Return the number of the next instance: the fixed one, or a random one of the split."""
@@ -93,9 +112,10 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
     world = World(**arguments)
     checked(one_of, "split", world.split, SPLITS)
     checked(one_of, "translation", world.translation, TRANSLATIONS)
-    for name in ("motion", "prior"):
-        if not isinstance(value := getattr(world, name), str):
-            raise ArgumentError(f"{name} must be a name, got {quoted(value)}")
+    checked(one_of, "yaw", world.yaw, YAWS)
+    if not isinstance(world.prior, str):
+        raise ArgumentError(f"prior must be a name, got {quoted(world.prior)}")
+    held_out_people = flag("held_out_people", world.held_out_people)
     what = "(width, height) of 36 to 4096 pixels"
     sides = checked(pair, "size", world.size, what)
     if not all(isinstance(side, int | np.integer) and 36 <= side <= 4096 for side in sides):
@@ -106,6 +126,8 @@ def world_of(own: Sequence[str] = (), /, **arguments: Any) -> World:
         raise ArgumentError(f"train must be a list of motions such as ['walk-a'], got {quoted(world.train)}")
     return replace(
         world,
+        motion=_motions(world.motion, held_out_people),
+        held_out_people=held_out_people,
         instance=None if world.instance is None else instance_number(world.instance),
         view_degrees=_views(world.view_degrees),
         train=tuple(world.train or ()),
@@ -129,6 +151,19 @@ def flag(name: str, value: object) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise ArgumentError(f"{name} must be true or false, got {quoted(value)}")
     return bool(value)
+
+
+def _motions(motion: Any, held_out_people: bool) -> tuple[str, ...]:
+    """Return the motions of an argument: one name, several built-in ones, or "all" kinds of these."""
+    kinds = tuple(dict.fromkeys(built_in.activity_of(name) for name in built_in.names()))
+    names = kinds if motion == "all" else (motion,) if isinstance(motion, str) else motion
+    if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
+        raise ArgumentError(f"motion must be a name, several, or 'all', got {quoted(motion)}")
+    known = kinds if held_out_people else built_in.names()
+    if held_out_people or len(names) > 1:
+        for name in names:
+            checked(one_of, "motion", name, known)
+    return tuple(names)
 
 
 def _views(view_degrees: Any) -> tuple[float, ...]:
@@ -162,6 +197,11 @@ def instance_number(number: Any) -> int:
     if not 0 <= number <= last:
         raise ArgumentError(f"instance must lie in 0 to {last}, got {quoted(int(number))}")
     return int(number)
+
+
+def is_held_out(number: int) -> bool:
+    """Return whether an instance is of the test split."""
+    return number >= SPLITS["test"][0]
 
 
 @lru_cache(maxsize=32)
@@ -214,11 +254,14 @@ class Episode:
     frame: int
     problem: PoseProblem
 
-
-def backdrop(silhouettes: Sequence[Silhouette]) -> NDArray[np.uint16]:
-    """Return the picture (height, width, views) of silhouettes into which bodies are drawn."""
-    masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
-    return masks.astype(np.uint16) * np.uint16(OBSERVED)
+    @property
+    def truth(self) -> Array:
+        """The proposal (d,) of the truth, the nearest in the box: what its prior cannot say is lost."""
+        pose, place = self.instance.truth.poses[self.frame], self.instance.truth.translations[self.frame]
+        space = self.problem.space
+        searched = place if space.translation == "searched" else place[:0]
+        latents = space.prior.transform(pose[None, 3:])[0]
+        return space.proposals(np.concatenate([pose[:3], searched, latents]))
 
 
 def first_episode(world: World, number: int, evaluations: int, frames: int = 1) -> Episode:
@@ -226,24 +269,27 @@ def first_episode(world: World, number: int, evaluations: int, frames: int = 1) 
     made = instance(world, number, frames, evaluations)
     task = made.task
     centre = np.array([task.yaw, 0.0, 0.0])
-    space = SearchSpace(world.learned, centre, np.radians(ROOT_RANGE_DEGREES), task.anchor, task.translation)
+    reach = np.radians(ROOT_RANGE_DEGREES if world.yaw == "guessed" else ANY_YAW_DEGREES)
+    space = SearchSpace(world.learned, centre, reach, task.anchor, task.translation)
     return made.episode(0, space)
 
 
 @lru_cache(maxsize=64)
 def instance(world: World, number: int, frames: int, evaluations: int) -> Instance:
     """Return an instance: the same person, pose and silhouettes for the same number and arguments, everywhere."""
-    source = world.motion if world.motion in built_in.names() else _source(world.motion)
+    motion = world.motion_of(number)
+    source = motion if motion in built_in.names() else _source(motion)
     try:
         truth = motion_of_instance(source, number, frames=frames, fps=FPS)
     except ValueError as mistake:  # a file that is too short
         raise error.Error(str(mistake)) from None
     rng = np.random.default_rng([RNG_STREAM, number])  # of noise, yaw and build alone: motion and views are a sweep's
-    body, facing = body_of(world.motion), float(truth.poses[0, 0])
+    body, facing = body_of(motion), float(truth.poses[0, 0])
     middle = truth.translations.mean(axis=0)
     middle[1] = HEIGHT
     reach = DISTANCE + 0.5 * float(np.ptp(truth.translations[:, [0, 2]], axis=0).max())
-    azimuths = [facing + np.radians(view) for view in variation(number).views(world.view_degrees)]
+    turn = rng.uniform(-180.0, 180.0) if world.yaw == "unknown" else 0.0
+    azimuths = [facing + np.radians(view + turn) for view in variation(number).views(world.view_degrees)]
     cameras = [Camera.around(middle, azimuth, reach, world.size) for azimuth in azimuths]
     noise = dict(world.noise)
     observations = []
@@ -251,6 +297,11 @@ def instance(world: World, number: int, frames: int, evaluations: int) -> Instan
         masks = [corrupted(project(body, camera, pose, place), noise, rng) for camera in cameras]
         observations.append(Observation([Silhouette.of(mask) for mask in masks], place.copy()))
     yaw = facing + float(np.radians(rng.uniform(-YAW_DEGREES, YAW_DEGREES)))
+    if world.yaw == "unknown":
+        yaw = azimuths[0]  # facing the camera
     fitted = varied(body, world.mismatch_percent, rng)
-    task = Task(fitted, cameras, evaluations, yaw, truth.translations[0].copy(), world.translation, FPS)
+    anchor = truth.translations[0].copy()
+    if world.translation == "searched":
+        anchor += rng.uniform(-MIDDLE_METRES, MIDDLE_METRES, 3)
+    task = Task(fitted, cameras, evaluations, yaw, anchor, world.translation, FPS)
     return Instance(number, task, truth, observations)

@@ -1,4 +1,4 @@
-"""References as policies: random actions, a step from the best so far, and races.
+"""References as policies: random actions, and races.
 
 A policy is called with an observation and the number of the step, and returns an action.
 """
@@ -10,12 +10,9 @@ import gymnasium as gym
 import numpy as np
 
 from posefit.arrays import Array
-from posefit.fitting.check import positive
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES
 
 Policy = Callable[[Any, int], Array]
-
-WHOLE_WAY = 1.0  # the last number of an action of FitState-v0 whose others are the proposal
 
 
 def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
@@ -24,36 +21,16 @@ def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
     return lambda _, __: rng.uniform(-1.0, 1.0, shape)
 
 
-def random_search_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
-    """Return random search as a policy of FitState-v0: proposals drawn uniformly from the box."""
-    d = (env.action_space.shape or (0,))[0] - 1
-    return lambda _, __: np.append(rng.uniform(-1.0, 1.0, d), WHOLE_WAY)
-
-
-def gaussian_policy(env: gym.Env[Any, Any], rng: np.random.Generator, spread: float = 0.1) -> Policy:
-    """Return the policy of FitState-v0 that proposes a normal draw around the best so far.
-
-    `spread` is its standard deviation in half-ranges. Draws outside the box are clipped. Raises ValueError where
-    `spread` is not above 0.
-    """
-    positive("spread", spread)
-    d = (env.action_space.shape or (0,))[0] - 1
-
-    def propose(observation: Any, _: int) -> Array:
-        state = observation["search"] if isinstance(observation, dict) else observation
-        return np.append(np.clip(state[:d] + spread * rng.standard_normal(d), -1.0, 1.0), WHOLE_WAY)
-
-    return propose
-
-
 def rollout(env: gym.Env[Any, Any], policy: Policy, instance: int, seed: int) -> dict[str, Any]:
-    """Return the last info of an episode of a policy on an instance, with the sum of its rewards as `gain`."""
+    """Return the last info of an episode of a policy on an instance, with its `actions` (k, d) and `rewards` (k,)."""
     observation, info = env.reset(seed=seed, options={"instance": instance})
-    step, gain, ended, cut = 0, 0.0, False, False
+    actions: list[Array] = []
+    rewards, ended, cut = [], False, False
     while not (ended or cut):
-        observation, reward, ended, cut, info = env.step(policy(observation, step))
-        step, gain = step + 1, gain + float(reward)
-    return info | {"gain": gain}
+        actions.append(policy(observation, len(actions)))
+        observation, reward, ended, cut, info = env.step(actions[-1])
+        rewards.append(float(reward))
+    return info | {"actions": np.array(actions), "rewards": np.array(rewards)}
 
 
 def race_features(observation: Any) -> tuple[Array, Array]:

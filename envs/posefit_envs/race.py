@@ -72,7 +72,7 @@ class RaceVectorEnv(SearchVectorEnv):
 
     def _begin_another(self, i: int, search: int) -> None:
         """Begin another search in the place of one of an environment's."""
-        space, rng = self._episodes[i].problem.space, np.random.default_rng(int(self._rngs[i].integers(2**63)))
+        space, rng = self._episode(i).problem.space, np.random.default_rng(int(self._rngs[i].integers(2**63)))
         self._searches[i][search] = checked(lambda: self._factory(space, rng, **self._settings))
         self._best_costs[i, search] = self._costs[i, search] = np.inf
         self._slopes[i, search], self._used[i, search] = MAX_SLOPE, 0
@@ -203,10 +203,13 @@ class RaceEnv(SearchEnv):
     ## Arguments
     As in `FitImage-v0`, with `optimiser="pso"`, any optimiser of posefit or a plugin that takes a `population_size`,
     `searches=8`, 2 or more, `population_size=8` of each, 2 or more, and `generations=(100, 220)`, the least and the
-    largest budget, instead of `target_cost` and `max_evaluations`.
+    largest budget, instead of `max_evaluations`.
 
     ## Searches
     An optimiser has its default settings, and where its schedule follows from a budget, that of the largest.
+
+    ## Version History
+    - v0: not released yet; until then a version changes without a number.
     """
 
     vector = RaceVectorEnv

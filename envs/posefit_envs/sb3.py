@@ -1,14 +1,13 @@
 """An adapter of Gymnasium's vector environments to those of Stable-Baselines3."""
 
 from collections.abc import Sequence
-from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import error
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from posefit_envs.base import mixed, row_of
+from posefit_envs.base import mixed
 
 if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
@@ -56,7 +55,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             done = terminated | truncated
             if done.any():
                 for i in np.flatnonzero(done):
-                    rows[i]["terminal_observation"] = deepcopy(row_of(observations, int(i)))
+                    rows[i]["terminal_observation"] = observations[i].copy()
                     rows[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
                 fresh, fresh_infos = vector.reset(options={"reset_mask": done})
                 observations = mixed(done, fresh, observations)

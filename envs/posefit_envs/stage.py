@@ -1,6 +1,7 @@
 """Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, final
 
@@ -14,11 +15,13 @@ from posefit.silhouette.cost import mean_over_views, mismatch
 from posefit.silhouette.drawn import count_poses
 from posefit.silhouette.mask import pack
 from posefit.silhouette.sharing import LEAST_SHARE, work_through
-from posefit_envs.instance import BODY, Image, World, backdrop, body_of
+from posefit_envs.instance import BODY, OBSERVED, SPLITS, Image, World, body_of, first_episode
 from posefit_envs.kernels import Scenes, align_scenes, draw_scenes, unpack_scenes
 
 Rows = NDArray[np.int64]
 _BODY = np.uint16(BODY)
+CAMERA_VALUES = ("rotation", "translation", "focal", "centre")
+LARGEST_REMEMBERED = 2 * 64 * 64  # pixels of an instance whose values are remembered, in about 5 kB
 _READ_ONLY = ("radii", "rotations", "places", "focals", "centres")
 
 
@@ -30,6 +33,41 @@ class Evaluation(NamedTuple):
     costs: Array  # (n,)
     areas: NDArray[np.int64]  # (n, views, 3), zero where a scene was left out
     pictures: Image  # (n, height, width, 2 views)
+
+
+def box_of(problem: PoseProblem) -> tuple[Array, Array, Array]:
+    """Return the box of a problem's proposals, as a stage stores it: centre (d,), half (d,) and anchor (3,)."""
+    return problem.space.centre, problem.space.half, problem.space.anchor
+
+
+def values_of(problem: PoseProblem) -> tuple[NDArray[Any], ...]:
+    """Return everything of a problem that a stage stores: its masks as bits, its box, and the rest in order."""
+    cameras, silhouettes, body = problem.cameras, problem.silhouettes, problem.body
+    masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
+    return (
+        np.packbits(masks, axis=1),
+        *box_of(problem),
+        body.skeleton.chain.offsets,
+        body.radii,
+        *(np.array([getattr(camera, name) for camera in cameras]) for name in CAMERA_VALUES),
+        *(np.array(bits) for bits in zip(*(silhouette.bits for silhouette in silhouettes), strict=True)),
+        np.count_nonzero(masks, axis=(0, 1)),
+        body.joint_radii(),
+        np.array([silhouette.extent for silhouette in silhouettes]),
+    )
+
+
+def prepared(world: World, number: int, evaluations: int) -> tuple[tuple[NDArray[Any], ...], Array]:
+    """Return the values of an instance's first frame, and the true pose; small ones are remembered."""
+    width, height = world.size
+    remembers = width * height * len(world.view_degrees) <= LARGEST_REMEMBERED
+    return (_prepared if remembers else _prepared.__wrapped__)(world, number, evaluations)
+
+
+@lru_cache(maxsize=SPLITS["train"][1])
+def _prepared(world: World, number: int, evaluations: int) -> tuple[tuple[NDArray[Any], ...], Array]:
+    episode = first_episode(world, number, evaluations)
+    return values_of(episode.problem), episode.instance.truth.poses[0]
 
 
 @final
@@ -44,7 +82,7 @@ class Stage:
         bones, bits = len(BONES), pack(np.zeros((height, width), dtype=bool)).shape
         self._width, self._height, self.threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
-        self._chain = body_of(world.motion).skeleton.chain
+        self._chain = body_of(world.motion[0]).skeleton.chain
         self._silhouettes: list[Sequence[Silhouette]] = [()] * rows
         self._scenes = Scenes(
             np.empty((rows, bones, 3)),
@@ -63,26 +101,28 @@ class Stage:
         self._first = 6 if world.translation == "searched" else 3
         d = self._first + len(self._prior.low)
         self._centres, self._halves, self._anchors = np.empty((rows, d)), np.empty((rows, d)), np.empty((rows, 3))
+        self._boxes = self._centres, self._halves, self._anchors
+        self._columns = *self._boxes, *self._scenes[:-1], self._joint_radii, self._borders
         self.all_rows: Rows = np.arange(rows)
 
     def set_problem(self, row: int, problem: PoseProblem) -> None:
         """Make a row this problem, one of the world's."""
-        space, silhouettes = problem.space, problem.silhouettes
-        self._centres[row], self._halves[row], self._anchors[row] = space.centre, space.half, space.anchor
-        if self._silhouettes[row] is silhouettes:
-            return
-        self._silhouettes[row] = silhouettes
-        body, scenes = problem.body, self._scenes
-        scenes.offsets[row], scenes.radii[row] = body.skeleton.chain.offsets, body.radii
-        scenes.backdrops[row] = backdrop(silhouettes)
-        for view, (camera, silhouette) in enumerate(zip(problem.cameras, silhouettes, strict=True)):
-            scenes.rotations[row, view], scenes.places[row, view] = camera.rotation, camera.translation
-            scenes.focals[row, view], scenes.centres[row, view] = camera.focal, camera.centre
-            scenes.observed[row, view], scenes.valid[row, view] = silhouette.bits
-            scenes.totals[row, view] = np.count_nonzero(silhouette.mask)
-        if self._aligned:
-            self._joint_radii[row] = body.joint_radii()
-            self._borders[row] = [silhouette.extent for silhouette in silhouettes]
+        if self._silhouettes[row] is problem.silhouettes:
+            for array, value in zip(self._boxes, box_of(problem), strict=True):
+                array[row] = value
+        else:
+            self.set_values(row, values_of(problem))
+            self._silhouettes[row] = problem.silhouettes
+
+    def set_values(self, row: int, values: tuple[NDArray[Any], ...]) -> None:
+        """Make a row the problem that these are the values of."""
+        masks, *others = values
+        backdrop = self._scenes.backdrops[row]
+        backdrop[:] = np.unpackbits(masks, axis=1, count=self._width)
+        backdrop *= OBSERVED
+        for array, value in zip(self._columns, others, strict=True):
+            array[row] = value
+        self._silhouettes[row] = ()
 
     def pictures(self) -> Image:
         """Return the pictures (n, height, width, 2 views) before the first proposals."""

@@ -65,7 +65,7 @@ class TrackVectorEnv(SearchVectorEnv):
             committed = self._commit(full.nonzero()[0], last)
         infos["frame"] = self._frames.copy()
         common = {"instance": self._numbers, "frame": infos["frame"]}
-        return Outcome(last.pictures, -last.costs, terminated, infos, common, row_infos=committed)
+        return Outcome(last.pictures, -np.log1p(last.costs), terminated, infos, common, row_infos=committed)
 
     def _commit(self, rows: Rows, last: Evaluation) -> dict[int, Infos]:
         """Commit the best proposals of some environments, begin their next frames, and return their infos by row."""
@@ -73,7 +73,7 @@ class TrackVectorEnv(SearchVectorEnv):
         last.poses[rows], last.translations[rows] = poses[rows, 0], places[rows, 0]
         infos, entered = {}, []
         for i in rows.tolist():
-            made, frame, best = self.episodes[i].instance, int(self._frames[i]), float(self._best[i])
+            made, frame, best = self._episode(i).instance, int(self._frames[i]), float(self._best[i])
             infos[i] = committed_infos(made, frame, poses[i, 0], places[i, 0], best, self.world.errors)
             self._followers[i].commit(self._best_proposals[i])
             if frame + 1 < self._frame_count:
@@ -107,7 +107,7 @@ class TrackEnv(SearchEnv):
     that of the last proposal. The first picture of a frame shows the pose that was committed in the frame before.
 
     ## Rewards
-    Minus the cost of the proposal, 0 to 100; SAPSO (4).
+    -ln(1 + cost) of the proposal, as in `FitImage-v0`.
 
     ## Starting State
     The first frame of an instance, as in `FitImage-v0`.
@@ -122,8 +122,10 @@ class TrackEnv(SearchEnv):
     then the next one. A reset gives `instance` and `frame`.
 
     ## Arguments
-    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `target_cost` and
-    `max_evaluations`.
+    As in `FitImage-v0`, with `frames=20` and `evaluations_per_frame=100` instead of `max_evaluations`.
+
+    ## Version History
+    - v0: not released yet; until then a version changes without a number.
     """
 
     vector = TrackVectorEnv

@@ -10,7 +10,7 @@ from typing import Any
 from posefit.errors import InputError
 from posefit.hooks import PROJECT
 from posefit.reading import quoted, suggestion
-from posefit.registry import BLOCK, COMMAND, KINDS, LOAD, STRICT, Offer, Plugin, Registry
+from posefit.registry import BLOCK, COMMAND, KINDS, Offer, Plugin, Registry
 from posefit.settings import Setting, settings_in, without_settings
 
 
@@ -83,7 +83,7 @@ def diagnosis(plugins: Iterable[Plugin], verbose: bool = False) -> tuple[list[st
 
     Where it is to be `verbose`, the traceback of what could not be loaded follows its line.
     """
-    lines = [f"{name}={os.environ[name]!r}" for name in (LOAD, BLOCK, STRICT) if name in os.environ]
+    lines = [f"{BLOCK}={os.environ[BLOCK]!r}"] if BLOCK in os.environ else []
     states = set[str]()
     for plugin in plugins:
         offers = ", ".join(

@@ -56,7 +56,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.integer):
         return int(value)
     if isinstance(value, float | np.floating):
-        return float(f"{value:.5g}") if np.isfinite(value) else None
+        rounded = float(f"{value:.5g}")
+        return None if not np.isfinite(value) else rounded if np.isfinite(rounded) else float(value)
     return value
 
 
@@ -65,10 +66,11 @@ def _five_digits(values: Array) -> Any:
     finite = np.isfinite(values)
     sizes = np.where(finite & (values != 0.0), np.abs(values), 1.0)
     power = 4.0 - np.floor(np.log10(sizes))
-    scale = 10.0 ** np.abs(power)
     numbers = np.where(finite, values, 0.0)
-    rounded = np.where(power >= 0.0, np.round(numbers * scale) / scale, np.round(numbers / scale) * scale)
-    plain_values = rounded.astype(object)
+    with np.errstate(over="ignore", invalid="ignore"):  # of the largest and the least numbers, which stay as they are
+        scale = 10.0 ** np.abs(power)
+        rounded = np.where(power >= 0.0, np.round(numbers * scale) / scale, np.round(numbers / scale) * scale)
+    plain_values = np.where(np.isfinite(rounded), rounded, numbers).astype(object)
     plain_values[~finite] = None
     return plain_values.tolist()
 

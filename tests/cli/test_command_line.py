@@ -400,7 +400,6 @@ def installed(kind: str, name: str, folder: Path) -> Callable[..., subprocess.Co
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
     subprocess.run([*pip, "--target", str(site), str(made)], check=True, capture_output=True)
     environment = {**os.environ, "PYTHONPATH": str(site)}
-    environment.pop("POSEFIT_LOAD_PLUGINS", None)
 
     def called(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", *words]

@@ -286,3 +286,23 @@ def test_tracks_are_as_far_apart_as_the_median_joint_of_all_pairs() -> None:
     tracks = [np.zeros((1, 3, 3)), np.full((1, 3, 3), [3.0, 4.0, 0.0]), np.full((1, 3, 3), [0.0, 12.0, 0.0])]
     assert seeds.median_distance(tracks) == pytest.approx(np.sqrt(73.0))  # of 5, 12 and the square root of 9 + 64
     assert seeds.median_distance(tracks[:1]) == 0.0
+
+
+def test_blind_equivalents_lie_between_the_budgets_measured_by_their_logarithm() -> None:
+    equivalent = importlib.import_module("agents").equivalent
+    blind = {100: 10.0, 10_000: 2.0}
+    assert [equivalent(blind, cost) for cost in (10.0, 6.0, 2.0)] == ["100", "1,000", "10,000"]
+    assert [equivalent(blind, cost) for cost in (10.1, 1.9)] == ["< 100", "> 10,000"]
+
+
+def test_the_table_of_agents_has_a_search_in_a_line_and_the_mean_of_seeds() -> None:
+    agents = importlib.import_module("agents")
+    rows = [
+        {"agent": name, "budget": budget, "costs": [cost, cost + 2.0], "cpu_seconds": 3.0}
+        for name, budget, cost in (("sapso", 40, 9.0), ("sapso", 4_000, 1.0), ("cma", 40, 9.0), ("cma", 4_000, 5.0))
+    ]
+    rows += [{"agent": "PPO", "budget": 1_000, "costs": [cost, cost], "cpu_seconds": 60.0} for cost in (5.0, 7.0)]
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in agents.table(rows)][2:]
+    assert lines[0][:2] == ["sapso", "40; 4,000"]
+    assert lines[0][5] == "10.0; 2.0"
+    assert lines[2] == ["PPO", "8", "1,000", "60", "2", "6.0", "5.0 to 7.0", "400", "4,000"]

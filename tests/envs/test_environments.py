@@ -1,8 +1,10 @@
 """The environments keep Gymnasium's rules and Stable-Baselines3's, with every warning an error."""
 
 import copy
+import math
 import pickle
 import sys
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -17,18 +19,18 @@ from posefit import SynthesisTracker
 from posefit_envs.instance import instance
 from tests.cases import each
 
-SEARCHES = tuple(f"posefit/{name}-v0" for name in ("FitImage", "FitState", "Track", "Race"))
+SEARCHES = tuple(f"posefit/{name}-v0" for name in ("FitImage", "Track", "Race"))
 WORLDS: list[dict[str, Any]] = [
     {},
     {"instance": 17},
     {"motion": "run", "view_degrees": [0.0, 90.0], "prior": "full", "size": (80, 60)},
-    {"translation": "searched", "noise": {"holes": 0.5, "shadow": 0.5}},
+    {"translation": "searched", "noise": {"holes": 0.5, "shadow": 0.5}, "yaw": "unknown"},
+    {"motion": ["walk", "jump"], "held_out_people": True, "errors": False},
     {"translation": "aligned", "mismatch_percent": 10.0, "split": "test", "train": ["walk-a", "run-a"]},
 ]
-VARIANTS = [(name, {}) for name in SEARCHES] + list(zip(SEARCHES, WORLDS[1:], strict=True))
+VARIANTS = [(name, {}) for name in SEARCHES] + list(zip(2 * SEARCHES, WORLDS[1:], strict=False))
 SHORT: dict[str, dict[str, Any]] = {
     "posefit/FitImage-v0": {"max_evaluations": 7},
-    "posefit/FitState-v0": {"max_evaluations": 7},
     "posefit/Track-v0": {"frames": 3, "evaluations_per_frame": 3},
     "posefit/Race-v0": {"searches": 3, "generations": [4, 6]},
 }
@@ -60,7 +62,7 @@ def trace(env: gym.Env[Any, Any], steps: int = 12) -> list[Any]:
     return results
 
 
-@each(("name", "arguments"), [(SEARCHES[0], {}), *zip(SEARCHES, WORLDS[1:], strict=True)])
+@each(("name", "arguments"), [(SEARCHES[0], {}), *zip(2 * SEARCHES, WORLDS[1:], strict=False)])
 def test_its_description_as_json_makes_an_equal_one(name: str, arguments: dict[str, Any]) -> None:
     env = gym.make(name, **{**arguments, **SHORT[name]})
     assert env.spec is not None
@@ -92,46 +94,26 @@ def test_pictures_are_rgb(name: str) -> None:
     assert (before != after).any()
 
 
-def test_fit_ends_at_the_target_or_with_the_budget() -> None:
-    env = gym.make("posefit/FitImage-v0", instance=3, target_cost=99.0)
-    env.reset(seed=0)
-    assert env.step(np.zeros(9, np.float32))[2:4] == (True, False)
-    env = gym.make("posefit/FitImage-v0", instance=3, target_cost=0.0, max_evaluations=3)
+def test_fit_ends_with_the_budget_and_counts_the_best() -> None:
+    env = gym.make("posefit/FitImage-v0", instance=3, max_evaluations=3)
     env.reset(seed=0)
     ends = [env.step(np.full(9, 0.3 * k, np.float32)) for k in range(3)]
     assert [end[2:4] for end in ends] == [(False, False), (False, False), (False, True)]
     costs = [end[4]["cost"] for end in ends]
-    assert [end[1] for end in ends] == [-cost for cost in costs]
+    assert [end[1] for end in ends] == pytest.approx([-math.log(1.0 + cost) for cost in costs])
     assert [end[4]["best_cost"] for end in ends] == [min(costs[: k + 1]) for k in range(3)]
     assert [end[4]["evaluations"] for end in ends] == [1, 2, 3]
 
 
-def test_the_last_proposal_that_reaches_the_target_terminates_and_does_not_truncate() -> None:
-    proposals = np.array([np.ones(9), np.zeros(9)], dtype=np.float32)
-    env = gym.make("posefit/FitImage-v0", instance=3, target_cost=0.0)
-    env.reset(seed=0)
-    far, near = (env.step(proposal)[4]["cost"] for proposal in proposals)
-    assert near < far
-    limits = {"instance": 3, "target_cost": near, "max_evaluations": 2}
-    env, vector = gym.make("posefit/FitImage-v0", **limits), gym.make_vec("posefit/FitImage-v0", 1, **limits)
-    env.reset(seed=0)
-    vector.reset(seed=0)
-    assert [env.step(proposal)[2:4] for proposal in proposals] == [(False, False), (True, False)]
-    ends = [vector.step(proposal[None])[2:4] for proposal in proposals]
-    assert [(bool(terminated[0]), bool(truncated[0])) for terminated, truncated in ends] == [
-        (False, False),
-        (True, False),
-    ]
-
-
-def test_the_reward_is_the_mismatch_of_the_two_channels() -> None:
+def test_the_cost_is_the_mismatch_of_the_two_channels() -> None:
     env = gym.make("posefit/FitImage-v0", instance=5, size=(160, 120))
     env.reset(seed=0)
     picture, reward, _, _, info = env.step(np.full(9, 0.1, np.float32))
     observed, body = picture[..., 0] > 0, picture[..., 1] > 0
     r, b, y = (observed & ~body).sum(), (body & ~observed).sum(), (observed & body).sum()
     assert info["areas"].tolist() == [[r, b, y]]
-    assert reward == pytest.approx(-100.0 * (0.5 * b / (b + y) + 0.5 * r / (r + y)))
+    assert info["cost"] == pytest.approx(100.0 * (0.5 * b / (b + y) + 0.5 * r / (r + y)))
+    assert reward == pytest.approx(-math.log(1.0 + info["cost"]))
     assert set(np.unique(picture)) == {0, 255}
 
 
@@ -174,9 +156,9 @@ def test_numbers_of_numpy_are_taken_as_arguments() -> None:
     plain = {"instance": 3, "size": (64, 48), "view_degrees": [0.0, 90.0], "mismatch_percent": 2.0}
     plain |= {"noise": {"holes": 0.5}, "errors": True}
     own: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-        "posefit/FitState-v0": (
-            {"image": np.True_, "max_evaluations": np.int64(9)},
-            {"image": True, "max_evaluations": 9},
+        "posefit/FitImage-v0": (
+            {"held_out_people": np.True_, "max_evaluations": np.int64(9)},
+            {"held_out_people": True, "max_evaluations": 9},
         ),
         "posefit/Race-v0": (
             {"generations": np.array([3, 6]), "searches": np.int8(2)},
@@ -203,9 +185,14 @@ WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"train": "walk"}, r"train must be a list of motions such as \['walk-a'\], got 'walk'"),
         ({"errors": "no"}, "errors must be true or false, got 'no'"),
     ],
-    "posefit/FitState-v0": [
-        ({"image": "yes"}, "image must be true or false, got 'yes'"),
-        ({"max_evaluations": 1}, "max_evaluations must be at least 2, got 1"),
+    "posefit/FitImage-v0": [
+        ({"max_evaluations": 0}, "max_evaluations must be at least 1, got 0"),
+        ({"yaw": "any"}, "yaw must be one of guessed, unknown, got 'any'"),
+        ({"motion": []}, r"motion must be a name, several, or 'all', got \[\]"),
+        ({"motion": 3}, "motion must be a name, several, or 'all', got 3"),
+        ({"motion": ["walk", "rnu"]}, "motion must be one of walk, .*, got 'rnu'"),
+        ({"motion": "walk-a", "held_out_people": True}, "motion must be one of walk, .*, got 'walk-a'"),
+        ({"held_out_people": 1}, "held_out_people must be true or false, got 1"),
     ],
     "posefit/Race-v0": [
         ({"searches": 1}, "searches must be at least 2, got 1"),
@@ -274,3 +261,42 @@ def test_an_action_outside_is_clipped_with_one_warning(name: str) -> None:
         clipped = env.step(np.full(size, 3.0))
     assert data_equivalence(clipped, other.step(np.ones(size)))
     env.step(np.full(size, -2.0))  # a second warning would be an error
+
+
+def test_gymnasiums_wrappers_and_a_loop_as_in_cleanrl_run_on_it() -> None:
+    from gymnasium.wrappers.vector import ClipAction, NormalizeReward, RecordEpisodeStatistics
+
+    env = gym.make_vec("posefit/FitImage-v0", 4, max_evaluations=3, autoreset_mode="SameStep")
+    env = NormalizeReward(ClipAction(RecordEpisodeStatistics(env)), gamma=0.0)
+    observations, _ = env.reset(seed=1)
+    stored = np.zeros((6, *observations.shape), dtype=observations.dtype)
+    rng, returns = np.random.default_rng(0), []
+    for step in range(6):
+        stored[step] = observations
+        actions = rng.normal(size=env.action_space.shape or ()).astype(np.float32)
+        observations, _, terminated, truncated, infos = env.step(actions)
+        if (done := terminated | truncated).any():
+            assert infos["final_obs"][0].shape == observations[0].shape
+            returns += infos["episode"]["r"][done].tolist()
+    assert len(returns) == 8  # four environments, two episodes each
+    assert max(returns) < 0.0
+    assert stored[:, :, :, :, 0].any()
+
+
+def test_frames_are_stacked_by_gymnasiums_wrappers() -> None:
+    single = gym.wrappers.FrameStackObservation(gym.make("posefit/Track-v0", frames=2), 4)
+    observation, _ = single.reset(seed=0)
+    assert observation.shape == (4, 48, 64, 2)
+    stacked, *_ = single.step(single.action_space.sample())
+    np.testing.assert_array_equal(stacked[:-1], observation[1:])
+
+
+def test_an_episode_is_recorded_as_a_video(tmp_path: Path) -> None:
+    env: Any = gym.make("posefit/FitImage-v0", render_mode="rgb_array", max_evaluations=3)
+    env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.RecordVideo(env, str(tmp_path / "video")))
+    env.reset(seed=0)
+    for _ in range(3):
+        info = env.step(env.action_space.sample())[-1]
+    env.close()
+    assert info["episode"]["l"] == 3
+    assert [path.suffix for path in (tmp_path / "video").iterdir()] == [".mp4"]

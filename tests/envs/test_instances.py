@@ -10,7 +10,7 @@ from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.silhouette.cost import project
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
-from posefit_envs.instance import SPLITS, Episode, backdrop, first_episode, instance, world_of
+from posefit_envs.instance import SPLITS, Episode, first_episode, instance, world_of
 from posefit_envs.stage import Stage
 from tests.cases import each
 
@@ -112,7 +112,40 @@ def test_rows_that_are_left_out_show_nothing_proposed() -> None:
     stage, episodes = staged((3, 17))
     for rows in (np.array([1]), np.array([], dtype=np.int64)):
         evaluation = stage.evaluate(np.zeros((2, 9)), rows)
-        picture = backdrop(episodes[0].problem.silhouettes).view(np.uint8)
-        np.testing.assert_array_equal(evaluation.pictures[0], picture)
+        mask = episodes[0].problem.silhouettes[0].mask
+        np.testing.assert_array_equal(evaluation.pictures[0], np.stack([255 * mask, 0 * mask], axis=-1))
         assert not evaluation.areas[0].any()
         assert evaluation.areas[1].any() == bool(len(rows))
+
+
+def test_held_out_people_are_in_no_training_instance_and_not_in_the_prior():
+    world = world_of(motion=["walk", "run"], held_out_people=True)
+    assert {world.motion_of(number) for number in range(20)} == {"walk-a", "walk-b", "run-a"}
+    assert {world.motion_of(number) for number in range(10_000, 10_020)} == {"walk-c", "run-b"}
+    assert world.training == ("walk-a", "walk-b", "run-a")
+    kinds = world_of(motion="all").motion
+    assert {"walk", "walk-a"} & set(kinds) == {"walk"}
+    assert [world_of(motion="all").motion_of(number) for number in range(len(kinds))] == list(kinds)
+
+
+def test_the_truth_is_the_proposal_that_decodes_to_the_true_pose():
+    for arguments in ({}, {"yaw": "unknown", "translation": "searched"}):
+        problem = first_episode(world_of(prior="full", **arguments), 17, 10)
+        poses, places = problem.problem.decode(problem.truth[None])
+        truth = problem.instance.truth
+        np.testing.assert_allclose(np.cos(poses[0] - truth.poses[0]), 1.0, atol=1e-6)
+        np.testing.assert_allclose(places[0], truth.translations[0], atol=1e-9)
+
+
+def test_an_unknown_yaw_is_anywhere_about_the_camera_and_a_searched_place_is_not_the_boxs_middle():
+    plain, unknown = world_of(), world_of(yaw="unknown", translation="searched")
+    turns, places = [], []
+    for number in range(40):
+        episode = first_episode(unknown, number, 10)
+        from_camera = episode.problem.space.root_centre[0] - azimuth(episode.problem.cameras[0])
+        assert np.cos(from_camera) == pytest.approx(1.0, abs=1e-9)
+        assert episode.instance.truth.poses.tobytes() == first_episode(plain, number, 10).instance.truth.poses.tobytes()
+        turns.append(episode.truth[0])
+        places.append(episode.truth[3:6])
+    assert min(turns) < -0.7 < 0.7 < max(turns)
+    assert 0.1 < np.abs(places).mean() < 0.4  # half a metre is 1, and guesses are up to a quarter of it off

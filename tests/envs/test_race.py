@@ -107,7 +107,7 @@ def test_the_bests_of_all_particles_are_feasible_and_the_best_is_what_it_costs()
     for _ in range(60):
         _, reward, ended, _, info = env.step(env.action_space.sample())
         total += reward
-        assert env.search_space.feasible(env._vector._bests.reshape(-1, 9)).all()
+        assert env.problem.space.feasible(env._vector._bests.reshape(-1, 9)).all()
     assert ended
     problem = env._vector.episodes[0].problem
     assert info["best_cost"] == problem.evaluate(info["proposal"][None])[0]

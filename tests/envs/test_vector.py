@@ -13,14 +13,14 @@ from gymnasium.vector import AutoresetMode
 
 import posefit_envs
 from posefit_envs import check_vector_env, to_sb3_vec_env
-from posefit_envs.base import row_of
 from posefit_envs.fit import FitImageVectorEnv
 from tests.cases import each
 
 FIT: list[dict[str, Any]] = [
     {},
     {"instance": 3},
-    {"target_cost": 30.0},
+    {"yaw": "unknown", "translation": "searched"},
+    {"motion": "all", "held_out_people": True, "max_evaluations": 1},
     {"view_degrees": [0.0, 90.0], "translation": "aligned", "max_evaluations": 5},
     {"mismatch_percent": 10.0, "view_degrees": [0.0, 90.0, 200.0], "prior": "full", "max_evaluations": 7},
     {"translation": "aligned", "mismatch_percent": 10.0, "noise": {"jitter": 0.8}, "max_evaluations": 6},
@@ -32,10 +32,6 @@ TRACK: list[dict[str, Any]] = [
     {"frames": 3, "evaluations_per_frame": 3, "translation": "searched", "mismatch_percent": 10.0, "prior": "full"},
     {"frames": 2, "evaluations_per_frame": 2, "noise": {"holes": 0.4, "blobs": 0.4}, "errors": False},
 ]
-FIT_STATE: list[dict[str, Any]] = [
-    {},
-    {"max_evaluations": 5, "image": True, "noise": {"holes": 0.4}},
-]
 RACE: list[dict[str, Any]] = [
     {"searches": 3, "generations": (4, 9), "translation": "aligned", "mismatch_percent": 8.0},
     {"population_size": 3, "generations": (1, 6), "prior": "full", "translation": "searched", "errors": False},
@@ -43,17 +39,14 @@ RACE: list[dict[str, Any]] = [
 ]
 CASES = {
     "posefit/FitImage-v0": FIT,
-    "posefit/FitState-v0": FIT_STATE,
     "posefit/Track-v0": TRACK,
     "posefit/Race-v0": RACE,
 }
 SHORT: dict[str, dict[str, Any]] = {
-    "posefit/FitImage-v0": {"max_evaluations": 5, "target_cost": 40.0},  # some end sooner
-    "posefit/FitState-v0": {"max_evaluations": 5},
+    "posefit/FitImage-v0": {"max_evaluations": 5},
     "posefit/Track-v0": {"frames": 2, "evaluations_per_frame": 2},
     "posefit/Race-v0": {"searches": 2, "generations": (2, 6)},
 }
-CHANGING = ("posefit/FitState-v0", "posefit/Race-v0")  # whose reset gives infos of a search
 
 
 @each(("name", "arguments"), [(name, one) for name, many in CASES.items() for one in many])
@@ -101,9 +94,7 @@ def test_the_checker_works_on_any_vector_and_names_what_is_wrong() -> None:
     ("name", "arguments"),
     [
         ("posefit/FitImage-v0", {"max_evaluations": 3}),
-        ("posefit/FitImage-v0", {"target_cost": 99.0}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
-        ("posefit/FitState-v0", {}),
         ("posefit/Race-v0", {"generations": (2, 5)}),
     ],
 )
@@ -132,9 +123,9 @@ def test_neither_threads_nor_neighbours_change_a_row() -> None:
         gym.make_vec("posefit/FitImage-v0", num_envs=2, threads=0)
 
 
-@each(("name", "arguments"), [(name, case) for name in CHANGING for case in CASES[name]])
-def test_a_reset_of_some_gives_what_gymnasiums_own_gives(name: str, arguments: dict[str, Any]) -> None:
-    native, own = (gym.make_vec(name, 3, kind, **arguments) for kind in (None, "sync"))
+@each("arguments", RACE)
+def test_a_reset_of_some_gives_what_gymnasiums_own_gives(arguments: dict[str, Any]) -> None:
+    native, own = (gym.make_vec("posefit/Race-v0", 3, kind, **arguments) for kind in (None, "sync"))
     for vector in (native, own):
         vector.reset(seed=0)
         vector.action_space.seed(0)
@@ -142,7 +133,7 @@ def test_a_reset_of_some_gives_what_gymnasiums_own_gives(name: str, arguments: d
         for vector in (native, own):
             for _ in range(3):  # in some of these an episode ends and another begins
                 vector.step(vector.action_space.sample())
-        # those that go on show the observation from before, the picture too
+        # those that go on show the observation from before
         ours, theirs = (vector.reset(options={"reset_mask": np.array(mask)}) for vector in (native, own))
         assert data_equivalence(ours, theirs)
 
@@ -181,7 +172,7 @@ def test_a_reset_gives_each_environment_its_instance(name: str) -> None:
     assert infos["_instance"].tolist() == mask.tolist()
 
 
-@each("name", [name for name in CASES if "State" not in name])
+@each("name", CASES)
 def test_mistakes_are_named(name: str) -> None:
     vector = gym.make_vec(name, num_envs=3)
     with pytest.raises(error.ResetNeeded, match="reset must come before"):
@@ -220,7 +211,6 @@ def test_mistakes_are_named(name: str) -> None:
     [
         ("posefit/FitImage-v0", {"max_evaluations": 3}),
         ("posefit/Track-v0", {"frames": 1, "evaluations_per_frame": 3}),
-        ("posefit/FitState-v0", {"image": True, "max_evaluations": 4}),
     ],
 )
 def test_stable_baselines3_gets_the_last_observation_of_an_episode(name: str, arguments: dict[str, Any]) -> None:
@@ -240,20 +230,20 @@ def test_stable_baselines3_gets_the_last_observation_of_an_episode(name: str, ar
         assert infos[i]["TimeLimit.truncated"] is (truncated and not terminated)
         assert data_equivalence(infos[i]["terminal_observation"], last)
         # the instance is the same, so that a new episode begins as the first one did
-        assert data_equivalence(row_of(observations, i), first)
+        assert data_equivalence(observations[i], first)
     adapted.close()
 
 
 def test_stable_baselines3_chooses_environments_by_indices() -> None:
     pytest.importorskip("stable_baselines3", reason="needs posefit[rl]")
-    vector = gym.make_vec("posefit/FitState-v0", num_envs=3, render_mode="rgb_array")
+    vector = gym.make_vec("posefit/Race-v0", num_envs=3, render_mode="rgb_array")
     adapted = to_sb3_vec_env(vector)
     adapted.reset()
-    spaces = vector.unwrapped.search_spaces  # type: ignore[attr-defined]
+    problems = vector.unwrapped.problems  # type: ignore[attr-defined]
     assert adapted.get_attr("world", indices=[0, 2]) == [vector.unwrapped.world] * 2  # type: ignore[attr-defined]
     for indices, rows in ((None, [0, 1, 2]), (1, [1]), ([2, 0], [2, 0])):
-        chosen = adapted.get_attr("search_spaces", indices)
-        assert [space.centre.tolist() for space in chosen] == [spaces[row].centre.tolist() for row in rows]
+        chosen = adapted.get_attr("problems", indices)
+        assert chosen == [problems[row] for row in rows]
     np.testing.assert_array_equal(adapted.env_method("render"), np.array(vector.render()))
     adapted.set_attr("note", "common")
     assert adapted.get_attr("note") == ["common"] * 3
@@ -271,3 +261,17 @@ def test_the_package_is_light_to_import() -> None:
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
     assert set(dir(posefit_envs)) >= {"__all__"}
+
+
+def test_the_truth_comes_with_a_training_instance_alone() -> None:
+    vector = gym.make_vec("posefit/FitImage-v0", 3, max_evaluations=2)
+    _, infos = vector.reset(seed=0, options={"instance": [5, 10_005, 6]})
+    assert infos["_truth"].tolist() == [True, False, True]
+    assert not infos["truth"][1].any()
+    single = gym.make("posefit/FitImage-v0", max_evaluations=2)
+    np.testing.assert_array_equal(single.reset(options={"instance": 6})[1]["truth"], infos["truth"][2])
+    assert "truth" not in single.reset(options={"instance": 10_005})[1]
+    cost = single.unwrapped.step(np.zeros(9))[-1]["cost"]
+    for arguments in ({"errors": False}, {"split": "test"}):
+        assert "truth" not in gym.make("posefit/FitImage-v0", **arguments).reset(seed=0)[1]
+    assert vector.step(np.where(infos["_truth"][:, None], infos["truth"], 0.0))[-1]["cost"][1] == cost

@@ -70,7 +70,7 @@ def test_vector_environments_take_any_array_and_give_it_by_gymnasiums_wrapper(na
     gym.register_envs(posefit_envs)
 
     def first_step(wrap: bool) -> Any:
-        env = gym.make_vec("posefit/FitState-v0", num_envs=2)
+        env = gym.make_vec("posefit/FitImage-v0", num_envs=2)
         wrapped = wrappers.ArrayConversion(env, env_xp=np, target_xp=library) if wrap else env
         wrapped.reset(seed=0)
         return wrapped.step(library.zeros(env.action_space.shape))

@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 SECONDS = 10.0  # of CPU time for an input, as a busy machine gives a process little of it
-WAIT = 300.0  # seconds of the clock, for what does not run at all
+WAIT = 900.0  # seconds of the clock, for what does not run at all
 STARTING = 120.0  # seconds for a child to import everything and read the valid files
 MEGABYTES = 1_000  # of a child's memory, with everything that it has imported
 
@@ -64,7 +64,7 @@ def fuzz(seed: int, numbers: range, tally: Tally, kinds: str) -> None:
                     tally.add(number, json.loads(line.partition(" ")[2]), cpu_seconds(child.pid) - since)
             if not ready:
                 child.kill()
-                tally.find(f"{number} hang: more than {SECONDS:g} s")
+                tally.find(f"{number} hang: more than {patience:g} s of CPU time, or {WAIT:g} s without an answer")
             elif status := child.wait():
                 if patience == STARTING:
                     raise RuntimeError("a child could not read the valid files")

@@ -226,6 +226,8 @@ def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
         json_text = embedded({text: [text, float("nan"), float("inf"), 1.23456789]})
         assert not set("<>&\u2028\u2029") & set(json_text)
         assert json.loads(json_text) == {text: [text, None, None, 1.2346]}
+    extreme = [1e-320, -1.7976931348623157e308, 0.5]  # of which five digits are beyond what a float holds
+    assert json.loads(embedded([np.array(extreme), *extreme])) == [extreme, *extreme]
     assert plain({"a": np.arange(2), "b": np.array([0.5, np.nan]), "c": (np.int64(2**60), True, None)}) == {
         "a": [0, 1], "b": [0.5, None], "c": [2**60, True, None],
     }  # fmt: skip

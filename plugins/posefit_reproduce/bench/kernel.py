@@ -17,6 +17,7 @@ from posefit.geometry.skeleton import PARENTS
 from posefit.motion import built_in
 from posefit.silhouette.cost import mismatch, project
 from posefit.silhouette.mask import Silhouette
+from posefit.testing.problem import walking_angles
 from posefit_priors.pca import PCA
 
 ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
@@ -51,12 +52,6 @@ def processor() -> dict[str, str]:
 
 
 SIZE = (320, 240)
-
-
-def walking_angles() -> Array:
-    """Return the joint angles (T, 63) of the other built-in walks, which priors learn from."""
-    styles = [built_in.motion(name, frames=60, fps=30.0) for name in built_in.other_styles("walk")]
-    return np.concatenate([style.poses[:, 3:] for style in styles])
 
 
 def bench_problem(threads: int = 1) -> PoseProblem:

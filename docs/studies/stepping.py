@@ -1,0 +1,65 @@
+"""How many steps does FitImage-v0 make in a second of a processor, natively and in Gymnasium's Sync and Async vectors?
+
+Episodes have eight steps, their resets are in the time, and all training instances were met before. Kinds take turns,
+and the best turn counts. Seconds are those of a processor, the sum over processes, so that other programs
+do not count.
+"""
+
+from collections.abc import Iterator
+from time import process_time
+from typing import Any
+
+import click
+import gymnasium as gym
+import numpy as np
+import psutil
+
+from posefit.cli.output import Command
+from posefit_envs.instance import SPLITS
+from table import markdown
+
+NAME = "posefit_envs:posefit/FitImage-v0"
+COUNTS = (1, 8, 64, 1024)
+MOST_ASYNC = 8  # processes of Async
+CALLS, STEPS, TURNS = 18, 16, 5  # of each environment in a turn: two episodes, each with a reset; turns of each kind
+
+
+def steps_per_second(kind: str, count: int) -> Iterator[float]:
+    """Yield the steps in a second of vector environments, turn by turn, resets included."""
+    env: Any = gym.make_vec(NAME, count, None if kind == "native" else kind, errors=False)
+    env.reset(seed=0)
+    processes = [psutil.Process(worker.pid) for worker in getattr(env, "processes", [])]
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (CALLS, *env.action_space.shape)).astype(np.float32)
+
+    def seconds() -> float:
+        return process_time() + sum(sum(process.cpu_times()[:2]) for process in processes)
+
+    while True:
+        start, repeats = seconds(), max(1, 256 // count)
+        for _ in range(repeats):
+            for action in actions:
+                env.step(action)
+        yield repeats * STEPS * count / (seconds() - start)
+
+
+@click.command(cls=Command, help=__doc__)
+@click.option("--most", type=click.IntRange(0), default=MOST_ASYNC, show_default=True, help="Processes of Async.")
+def main(most: int) -> None:
+    met = gym.make_vec(NAME, 100, errors=False)
+    for first in range(0, SPLITS["train"][1], 100):
+        met.reset(options={"instance": list(range(first, first + 100))})
+    lines = []
+    for count in COUNTS:
+        names = ("native", "sync", "async") if count <= most else ("native", "sync")
+        kinds = {name: steps_per_second(name, count) for name in names}
+        turns = [{kind: next(rates) for kind, rates in kinds.items()} for _ in range(TURNS)]
+        best = {kind: max(turn[kind] for turn in turns) for kind in kinds}
+        rates = [f"{best[kind]:,.0f}" if kind in best else "" for kind in ("native", "sync", "async")]
+        times = [f"{best['native'] / best[kind]:.1f}" if kind in best else "" for kind in ("sync", "async")]
+        lines.append([f"{count:,}", *rates, *times])
+    for line in markdown(["environments", "native", "Sync", "Async", "times Sync", "times Async"], lines, 0):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()
