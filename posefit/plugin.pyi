@@ -37,9 +37,11 @@ from posefit.hooks import RegisterSegmenter as RegisterSegmenter
 from posefit.hooks import RegisterTracker as RegisterTracker
 from posefit.silhouette.cost import areas as areas
 from posefit.silhouette.cost import mismatch as mismatch
+from posefit.silhouette.cost import project as project
 from posefit.silhouette.foreground import Footage as Footage
 from posefit.silhouette.foreground import Segmenter as Segmenter
 from posefit.testing import check_optimiser as check_optimiser
 from posefit.testing import check_prior as check_prior
 from posefit.testing import check_segmenter as check_segmenter
 from posefit.testing import check_tracker as check_tracker
+from posefit.tracking.smoothing.contours import contour_fit as contour_fit

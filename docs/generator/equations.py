@@ -18,6 +18,18 @@ SOURCES = {
     "TOYAMA2001": "Toyama and Blake, Probabilistic tracking in a metric space, 2001",
     "RABINER1989": "Rabiner, A tutorial on hidden Markov models and selected applications in speech recognition, 1989",
     "GODSILL2004": "Godsill, Doucet and West, Monte Carlo smoothing for nonlinear time series, 2004",
+    "JOHN2010": "John, Trucco and Ivekovic, Markerless human articulated tracking using hierarchical particle swarm "
+    "optimisation, 2010",
+    "ZHAO2008": "Zhao and Liu, Generative tracking of 3D human motion by hierarchical annealed genetic algorithm, 2008",
+    "KRZESZOWSKI2010": "Krzeszowski, Kwolek and Wojciechowski, Articulated body motion tracking by combined particle "
+    "swarm optimization and particle filtering, 2010",
+    "GAVRILA1996": "Gavrila and Davis, 3-D model-based tracking of humans in action: a multi-view approach, 1996",
+    "PEURSUM2010": "Peursum, Venkatesh and West, A study on smoothing for particle-filtered 3D human body tracking, "
+    "2010",
+    "WACHTER1999": "Wachter and Nagel, Tracking persons in monocular image sequences, 1999",
+    "AGARWAL2006": "Agarwal and Triggs, Recovering 3D human pose from monocular images, 2006",
+    "WANG2003": "Wang, Xu and Ai, Learning object intrinsic structure for robust visual tracking, 2003",
+    "URTASUN2005": "Urtasun, Fleet, Hertzmann and Fua, Priors for people tracking from small training sets, 2005",
     "GROOD1983": "Grood and Suntay, A joint coordinate system for the clinical description of motions: the knee, 1983",
     "WU2002": "Wu et al., ISB recommendation on definitions of joint coordinate systems: ankle, hip and spine, 2002",
     "WU2005": "Wu et al., ISB recommendation on definitions of joint coordinate systems: upper limb, 2005",

@@ -18,7 +18,7 @@ from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
-from posefit_exemplars.contours import fitted, precisions
+from posefit.tracking.smoothing.contours import fitted, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 

@@ -10,7 +10,6 @@ several hypotheses of each frame are fitted, and the likeliest sequence of them 
 - `beam` has the states that a frame may be in, and the costs of steps between them.
 - `frame_costs` has the costs of poses in a frame.
 - `markov` has the likeliest path through the last frames, the weights of states, and sampled paths.
-- `contours` fits poses to the contours of a frame.
 - `hypotheses` has those of each frame, and the likeliest sequence.
 - `smoothing` filters the estimates over time.
 - `lost_model` makes the posterior's intervals hold, and gives the probability that a frame is lost.

@@ -9,8 +9,7 @@ from posefit.fitting.tracker import Observation, Task
 from posefit.geometry.symmetry import facing, mirrored_poses, reflected_poses
 from posefit.silhouette.cost import Areas, known_views, pose_costs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
-from posefit.tracking.smoothing.contours import MaskContours
-from posefit_exemplars.contours import POINT_SPACING
+from posefit.tracking.smoothing.contours import POINT_SPACING, MaskContours
 
 MIN_SMALL_SIDE = 40  # pixels: no side of a small picture is shorter
 SMALL_FACTORS = (4, 2, 1)

@@ -26,9 +26,9 @@ from posefit.fitting.landmarks import exchanged_given, exchanged_next, landmark_
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
+from posefit.tracking.smoothing.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
-from posefit_exemplars.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars.exemplars import Exemplars, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.smoothing import Estimate

@@ -8,8 +8,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
-from posefit.tracking.smoothing.contours import MaskContours
-from posefit_exemplars.contours import POINT_SPACING, fitted, precisions
+from posefit.tracking.smoothing.contours import POINT_SPACING, MaskContours, fitted, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
 from posefit.fitting.shape import MODEL_SPREAD, NAMES, PRECISION, REACH, SPREAD, Shape, shaped
-from posefit.fitting.tracker import Observation
+from posefit.fitting.tracker import Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import BONES, JOINTS
+from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
 from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
@@ -277,3 +277,53 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     body = shaped(part.body, np.exp(-changes), part.height) if factors else part.body
     fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3])
     return replace(part, fitted=fitted, body=body, factors=part.factors - changes, spread=spread)
+
+
+POINT_SPACING = 0.04  # metres, about, between two points of a mask's border, where one frame is fitted
+STEP_EVALUATIONS = 27.0  # effort of a step of one frame, in costs of poses, which docs/studies/follow.py measures
+
+
+def fitted(
+    body: Body,
+    views: Sequence[MaskContours],
+    start: tuple[Array, Array],
+    means: Array,
+    precisions: Array,
+    scales: Sequence[float],
+) -> tuple[Array, Array]:
+    """Return poses (n, 66) and places (n, 3) after a step to the contours of one frame for each of `scales`.
+
+    Angles are pulled to `means` (n, 66), places to where they `start`, with `precisions` (69,) of places and angles.
+    Contours farther off than a scale, metres, count less.
+    """
+    angles = np.flatnonzero(body.skeleton.free)
+    poses, places, weights = start[0].copy(), start[1].copy(), precisions[np.append([0, 1, 2], 3 + angles)]
+    for scale in scales:
+        curves, slopes, *_ = contour_squares(body, views, poses, places, scale)
+        off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
+        np.einsum("nii->ni", curves)[:] += weights  # on the diagonals
+        steps = np.linalg.solve(curves, (slopes + weights * off)[..., None])[..., 0]
+        places -= steps[:, :3]
+        poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
+    return poses, places
+
+
+def precisions(turn: float, shift: float) -> Array:
+    """Return the precisions (69,) of a place and of angles with standard deviations, metres and radians."""
+    return np.concatenate([np.full(3, shift**-2.0), np.full(ANGLES, turn**-2.0)])
+
+
+def contour_fit(
+    task: Task, observation: Observation, start: tuple[Array, Array], deviations: tuple[float, float], evaluations: int
+) -> tuple[Array, Array, int]:
+    """Return a pose (66,) and a place (3,) moved until the body's contours are those of the masks, and what it costs.
+
+    `start` is the pose and the place to begin with, which angles and place are off by about `deviations`, radians and
+    metres. Up to twelve steps of Gauss and Newton are made, each of which costs as much as 27 evaluations.
+    """
+    pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
+    scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]
+    cameras = enumerate(task.cameras)
+    views = [MaskContours.of(camera, view, [observation], place, POINT_SPACING) for view, camera in cameras]
+    poses, places = fitted(task.body, views, (pose, place), pose, precisions(*deviations), scales)
+    return poses[0], places[0], int(len(scales) * STEP_EVALUATIONS)

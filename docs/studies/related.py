@@ -1,0 +1,176 @@
+"""Write the page of the plan `related` from its ledger: the methods in a table, who wins where, the paper's sentences.
+
+    posefit sweep docs/studies/related.toml --out results
+    python docs/studies/related.py results > page.md
+
+Sentences are those of SAPSO's paper, section 1, about other methods. Each is a comparison of two methods in paired
+cells: the mean difference with its 95 % interval, for other conditions of the same motions, by
+`posefit.statistics.means`. It holds where the whole interval is on its side of 0, fails where it is on the other, and
+is open in between.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+import numpy as np
+
+from posefit.cli.output import Command
+from posefit.errors import InputError
+from posefit.evaluation.measures import MEASURES
+from posefit.statistics.means import mean_interval
+from posefit.sweep.ledger import Ledger
+from table import head_of, markdown, number, percent
+
+Row = Mapping[str, Any]
+Condition = tuple[str, int, bool, bool]  # motion, cameras, whether the first yaw is known, whether masks are clean
+
+
+class Sentence(NamedTuple):
+    """What the paper says of a method, as a difference that would be above 0."""
+
+    says: str
+    method: str
+    reference: str
+    figure: str  # of a row, which has to be higher for the method
+    rows: Callable[[Condition], bool] = lambda _: True
+
+
+WORSE, SLOWER = "mpjpe_mm", "cpu_seconds_per_frame"
+SENTENCES = (
+    Sentence("a learned manifold has no way back in closed form", "sapso@isomap", "sapso@pca", WORSE),
+    Sentence("a GPLVM is not continuous: poses between come out badly", "sapso@gplvm", "sapso@pca", WORSE),
+    Sentence("gradients converge fast", "sapso@pca", "gradient", SLOWER),
+    Sentence("gradients do not assure the global optimum", "gradient", "sapso@pca", "cost"),
+    Sentence("local search in layers is slow", "local@pca", "sapso@pca", SLOWER),
+    Sentence("local search in layers ends in local optima", "local@pca", "sapso@pca", "cost"),
+    Sentence("smoothing makes a particle filter more accurate", "filtered", "smoothing", WORSE),
+    Sentence("particle filters need too many particles in many dimensions", "particle@full", "sapso@full", "cost"),
+    Sentence("a swarm moves a filter's particles to better ones", "particle@pca", "psopf@pca", "cost"),
+    Sentence("hierarchical swarms in all angles converge slowly", "hpso@full", "sapso@full", "cost"),
+    Sentence("hierarchical swarms in all angles do not assure quality", "hpso@full", "sapso@pca", WORSE),
+    Sentence("generative methods are more accurate than regression", "regression", "sapso@pca", WORSE),
+)
+
+
+def name_of(row: Row) -> str:
+    """Return what a row's method is called."""
+    return str(row["spec"].get("name") or row["spec"]["method"])
+
+
+def condition_of(row: Row) -> Condition:
+    """Return the motion, the cameras, and whether yaw and masks are undisturbed."""
+    spec, view = row["spec"], row["spec"].get("view_degrees", 0)
+    cameras = len(view) if isinstance(view, list | tuple) else 1
+    return str(spec["motion"]), cameras, not spec.get("yaw_off_degrees"), not spec.get("corruption")
+
+
+def words_of(condition: Condition) -> str:
+    """Return a condition in words."""
+    motion, cameras, known, clean = condition
+    views = "one camera" if cameras == 1 else f"{cameras} cameras"
+    return f"{motion}, {views}, {'known' if known else 'unknown'} yaw, {'clean' if clean else 'damaged'} masks"
+
+
+def methods(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the table of methods, the most accurate first: medians of their tracks, and those of parts of them."""
+    parts: dict[str, Callable[[Condition], bool]] = {
+        "one camera": lambda at: at[1] == 1,
+        "more": lambda at: at[1] > 1,
+        "known yaw": lambda at: at[2],
+        "unknown": lambda at: not at[2],
+        "clean": lambda at: at[3],
+        "damaged": lambda at: not at[3],
+    }
+    cells = []
+    for name in dict.fromkeys(map(name_of, rows)):
+        mine = [row for row in rows if name_of(row) == name]
+
+        def median(figure: str, some: Sequence[Row]) -> float | None:
+            return float(np.median([row[figure] for row in some])) if some else None
+
+        angles = float(np.median([row["error_degrees"]["mean"] for row in mine]))
+        lost = float(np.mean([row["lost_rate"] for row in mine]))
+        some = [median(WORSE, [row for row in mine if part(condition_of(row))]) for part in parts.values()]
+        figures = [number("error_degrees", angles), number(WORSE, median(WORSE, mine)), percent(lost)]
+        figures += [*(number(WORSE, value) for value in some), number(SLOWER, median(SLOWER, mine))]
+        cells.append([f"`{name}`", str(len(mine)), *figures])
+    cells.sort(key=lambda cell: float(cell[3].replace(",", "")))
+    heads = ["method", "tracks", head_of("error_degrees", "median"), head_of(WORSE, "median"), head_of("lost_rate")]
+    yield from markdown([*heads, *parts, head_of(SLOWER)], cells)
+
+
+def paired(rows: Sequence[Row], method: str, reference: str, figure: str) -> dict[tuple[Condition, int], float]:
+    """Return the differences of a figure, by condition and seed, between the cells of two methods."""
+    values: dict[str, dict[tuple[Condition, int], float]] = {method: {}, reference: {}}
+    for row in rows:
+        if name_of(row) in values:
+            values[name_of(row)][condition_of(row), row["spec"].get("seed", 0)] = float(row[figure])
+    shared = [cell for cell in values[method] if cell in values[reference]]
+    return {cell: values[method][cell] - values[reference][cell] for cell in shared}
+
+
+def winners(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the table of who wins where: the least mean MPJPE, and how far the next one is behind over paired seeds."""
+    lines = []
+    for condition in dict.fromkeys(map(condition_of, rows)):
+        mine = [row for row in rows if condition_of(row) == condition]
+        means = {
+            name: float(np.mean([row[WORSE] for row in mine if name_of(row) == name])) for name in map(name_of, mine)
+        }
+        first, *others = sorted(means, key=lambda name: means[name])
+        second, behind = "-", ["-", "-"]
+        if others and (pairs := paired(mine, others[0], first, WORSE)):
+            second = f"`{others[0]}`"
+            behind = list(difference(list(pairs.values()), [""] * len(pairs), list(pairs))[:2])
+        place = str(1 + [first, *others].index("sapso@pca")) if "sapso@pca" in means else "-"
+        lines.append([words_of(condition), f"`{first}`", number(WORSE, means[first]), second, *behind, place])
+    heads = ["where", "leads", "MPJPE mm", "next", "behind mm", "95 % interval", "place of `sapso@pca`"]
+    yield from markdown(heads, lines, words=2)
+
+
+def difference(values: Sequence[float], strata: Sequence[object], clusters: Sequence[object]) -> tuple[str, str, str]:
+    """Return a mean, its interval and the verdict on a mean above 0, in words; open where there is no interval."""
+    mean = mean_interval(values, list(map(str, strata)), list(map(str, clusters)))
+    if not np.isfinite(mean.low):
+        return f"{mean.value:+.3g}", "-", "open"
+    verdict = "holds" if mean.low > 0.0 else "fails" if mean.high < 0.0 else "open"
+    return f"{mean.value:+.3g}", f"{mean.low:+.3g} to {mean.high:+.3g}", verdict
+
+
+def verdicts(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the table of the paper's sentences."""
+    lines = []
+    for sentence in SENTENCES:
+        pairs = paired(rows, sentence.method, sentence.reference, sentence.figure)
+        what = f"`{sentence.method}` less `{sentence.reference}`, {head_of(sentence.figure)}"
+        cells = ["", "", "open"]
+        if pairs:
+            strata = [condition[0] for condition, _ in pairs]
+            values = [MEASURES[sentence.figure].factor * value for value in pairs.values()]
+            cells = list(difference(values, strata, [condition for condition, _ in pairs]))
+        conditions = len({condition for condition, _ in pairs})
+        lines.append([sentence.says, what, cells[2], f"{len(pairs)} in {conditions}", *cells[:2]])
+    heads = ["the paper says", "compared, above 0 if so", "verdict", "pairs in conditions", "effect", "95 % interval"]
+    yield from markdown(heads, lines, words=3)
+
+
+@click.command(cls=Command, help=__doc__)
+@click.argument("ledger", type=click.Path(exists=True, path_type=Path))
+def main(ledger: Path) -> None:
+    rows = list(Ledger(ledger).rows())
+    if not rows:
+        raise InputError(f"{ledger}: expected finished cells of docs/studies/related.toml, got none")
+    click.echo(
+        f"{len(rows)} tracks, {len(set(map(condition_of, rows)))} conditions, source {Ledger(ledger).version}.\n"
+    )
+    for title, part in (("Methods", methods), ("Who wins where", winners), ("The paper's sentences", verdicts)):
+        click.echo(f"## {title}\n")
+        for line in part(rows):
+            click.echo(line)
+        click.echo("")
+
+
+if __name__ == "__main__":
+    main()

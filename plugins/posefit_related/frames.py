@@ -1,0 +1,73 @@
+"""What the trackers share: the costs of poses in a frame, first poses, and a frame from a pose."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefit.plugin import Array, Frame, Observation, Task, areas, mismatch, project
+
+YAW_REACH = np.radians(45.0)  # ours: of a known first yaw, to either side
+
+
+def costs_of(task: Task, observation: Observation, poses: Array, places: Array) -> Array:
+    """Return the costs (n,) of poses (n, 66) with their root at places (n, 3): the mean over the views. SAPSO (4)."""
+    views = zip(task.cameras, observation.silhouettes, strict=True)
+    return np.asarray(np.mean([mismatch(areas(task.body, *view, poses, places)) for view in views], axis=0))
+
+
+def training_poses(task: Task) -> Array:
+    """Return the poses (T, 66) of all training motions. Raises ValueError where there is none."""
+    if not task.training:
+        raise ValueError("training must hold a motion to learn from, got none")
+    return np.concatenate([motion.poses for motion in task.training])
+
+
+def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
+    """Return poses (count, 66) that a first frame may show: training's, or the known one, and yaws as far as known."""
+    poses = training_poses(task)
+    poses = poses[rng.integers(len(poses), size=count)]
+    if task.first_pose is not None:
+        poses[:, 1:3], poses[:, 3:] = 0.0, task.first_pose
+    middle, reach = (0.0, np.pi) if task.yaw is None else (task.yaw, YAW_REACH)
+    poses[:, 0] = middle + rng.uniform(-reach, reach, count)
+    return poses
+
+
+def squared_distances(first: Array, second: Array) -> Array:
+    """Return the squared distances (n, k) of points (n, D) from others (k, D)."""
+    squares = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1) - 2.0 * first @ second.T
+    return np.asarray(np.maximum(squares, 0.0))
+
+
+def frame_of(task: Task, observation: Observation, pose: Array, place: Array, evaluations: int) -> Frame:
+    """Return the frame of a pose (66,) at a place (3,), whose cost is one evaluation more."""
+    views = zip(task.cameras, observation.silhouettes, strict=True)
+    counts = np.stack([areas(task.body, *view, pose[None], place[None])[0] for view in views])
+    return Frame(pose, place, float(np.mean(mismatch(counts))), counts, evaluations + 1)
+
+
+def place_of(task: Task, observation: Observation, pose: Array, place: Array) -> tuple[Array, int]:
+    """Return where the root is (3,), and the poses drawn to know it: the known place, or where the mask says.
+
+    The mask of the first view that shows something is compared with that of the pose at `place`: it is as much farther
+    as it is lower, and as far to the side as its middle.
+    """
+    if observation.translation is not None:
+        return np.array(observation.translation, dtype=np.float64), 0
+    for camera, silhouette in zip(task.cameras, observation.silhouettes, strict=True):
+        mask, drawn = (_box(mask) for mask in (silhouette.mask, project(task.body, camera, pose, place)))
+        if mask is not None and drawn is not None:
+            at = camera.rotation @ place + camera.translation
+            depth = at[2] * (drawn[1] / mask[1])[1]
+            pixel = mask[0] + (camera.project(place[None])[0][0] - drawn[0]) * at[2] / depth
+            at = np.append((pixel - camera.centre) / camera.focal * depth, depth)
+            return np.asarray(camera.rotation.T @ (at - camera.translation)), 1
+    return place, 1
+
+
+def _box(mask: NDArray[np.bool_]) -> tuple[Array, Array] | None:
+    """Return the middle (2,) and the size (2,), columns and rows, of what a mask shows; None where it shows nothing."""
+    rows, columns = np.nonzero(np.asarray(mask))
+    if not len(rows):
+        return None
+    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1.0
+    return (low + high) / 2.0, high - low

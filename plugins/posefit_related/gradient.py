@@ -1,0 +1,70 @@
+"""Gauss and Newton's steps from the predicted pose to the contours of the masks.
+
+S. Wachter, H.-H. Nagel, Tracking persons in monocular image sequences, Computer Vision and Image Understanding 74(3),
+1999. A body of cones is tracked by an iterated extended Kalman filter: the motion is predicted at constant velocity,
+and the pose that fits the picture's edges best is found from there by iterated linearisation.
+
+Interpretations: the edges are those of the masks, by the fit that posefit smooths footage with, robust against what is
+far off; the covariance of the prediction is diagonal and the same in all frames, and region information is not used. A
+step is paid for as the poses that take as long. The first pose is the best of some training poses.
+"""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from posefit.plugin import Array, Frame, Observation, Task, at_least, contour_fit, positive
+from posefit_related.frames import costs_of, first_poses, frame_of, place_of
+
+FIRST_SHARE = 0.5  # ours: of a first frame's evaluations, for the pose to begin with
+KNOWN_SHIFT, SHIFT = 0.003, 0.05  # ours: metres that a known root, and a predicted one, is off
+
+
+class Gradient:
+    """A prediction at constant velocity, and iterated steps to the contours.
+
+    Settings:
+        turn_degrees: that an angle may be off the prediction, a standard deviation; above 0.
+        damping: share of the velocity that the prediction has, 0 or more.
+    """
+
+    def __init__(self, task: Task, *, turn_degrees: float = 8.0, damping: float = 1.0) -> None:
+        positive("turn_degrees", turn_degrees)
+        at_least("damping", damping, 0.0)
+        self.task, self.turn, self.damping = task, float(np.radians(turn_degrees)), damping
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a frame for each observation."""
+        latest: list[tuple[Array, Array]] = []  # poses and places of the last two frames
+        for observation in observations:
+            if not latest:
+                pose, place, used = self._first(observation, rng)
+            else:
+                (pose, place), used = predicted(latest, self.damping), 0
+            if observation.translation is not None:
+                place = np.array(observation.translation, dtype=np.float64)
+            if observation.usable:
+                deviations = self.turn, SHIFT if observation.translation is None else KNOWN_SHIFT
+                pose, moved, effort = contour_fit(
+                    self.task, observation, (pose, place), deviations, self.task.evaluations - used - 1
+                )
+                place, used = moved if observation.translation is None else place, used + effort
+            elif latest:
+                pose, place = latest[-1][0], latest[-1][1] if observation.translation is None else place
+            latest = [*latest, (pose, place)][-2:]
+            yield frame_of(self.task, observation, pose, place, used)
+
+    def _first(self, observation: Observation, rng: np.random.Generator) -> tuple[Array, Array, int]:
+        """Return a pose, a place, and the evaluations to find them."""
+        count = max(int(FIRST_SHARE * self.task.evaluations), 1)
+        poses = first_poses(self.task, rng, count)
+        place, drawn = place_of(self.task, observation, poses[0], np.array(self.task.anchor, dtype=np.float64))
+        best = costs_of(self.task, observation, poses, np.tile(place, (count, 1))).argmin()
+        return poses[best], place, count + drawn
+
+
+def predicted(latest: list[tuple[Array, Array]], damping: float) -> tuple[Array, Array]:
+    """Return the pose and the place that the last two lead to at constant velocity; one stays where it is."""
+    (pose, place), (before, place_before) = latest[-1], latest[0]
+    turns = (pose - before + np.pi) % (2.0 * np.pi) - np.pi
+    return pose + damping * turns, place + damping * (place - place_before)  # WACHTER1999 (prediction)

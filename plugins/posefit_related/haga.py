@@ -1,0 +1,114 @@
+"""Hierarchical annealed genetic algorithm: a genetic search whose selection sharpens, over ever more coordinates.
+
+X. Zhao, Y. Liu, Generative tracking of 3D human motion by hierarchical annealed genetic algorithm, Pattern Recognition
+41(8), 2008. Its abstract says: principal components of motion capture are naturally hierarchical, and the search uses
+that; an annealed genetic algorithm finds poses.
+
+Interpretations: a layer opens the next share of the coordinates, the root and the leading components first, and the
+others stay at the prediction until then; chances to be a parent are exp(-cost / temperature), and the temperature falls
+geometrically in each layer, and the mutations with it; children lie between their parents, coordinate by coordinate,
+or a little beyond; the best so far survives.
+"""
+
+import math
+
+import numpy as np
+
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    displacement,
+    draw_population,
+    positive,
+    repair,
+    weigh,
+)
+from posefit_related.stages import EVALUATIONS, middle, opened
+
+TEMPERATURES = 5.0, 0.2  # ours: of the first and the last generation of a layer, in units of the cost
+BEYOND = 0.25  # ours: how far beyond its parents a child may lie, as a share of their distance
+
+
+class HAGA:
+    """Generations in layers: each layer searches more coordinates, and anneals from a high temperature to a low one.
+
+    Settings:
+        population_size: 2 or more.
+        layers: of coordinates, 1 or more.
+        evaluations: of a frame, shared among the layers, 1 or more. Ours: as many as SAPSO's.
+        mutation: chance that a coordinate of a child is changed, 0 to 1.
+        spread: standard deviation of a first mutation, in half-ranges of the box, where nothing is predicted; above 0.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        population_size: int = 40,
+        layers: int = 3,
+        evaluations: int = EVALUATIONS,
+        mutation: float = 0.2,
+        spread: float = 0.3,
+    ) -> None:
+        at_least("population_size", population_size, 2)
+        at_least("layers", layers, 1)
+        at_least("evaluations", evaluations, 1)
+        between("mutation", mutation, 0.0, 1.0)
+        positive("spread", spread)
+        self._space, self._rng, self._size = space, rng, min(population_size, evaluations)
+        self._layers, self._mutation = layers, mutation
+        self._generations = max(evaluations // (self._size * layers), 1)
+        self._spread = np.full(space.dimensions, spread) if space.start is None else space.start.spread
+        self._layer = self._generation = self._waiting = 0
+        self._best, self._best_cost = middle(space, rng), np.inf
+        self._x = self._grown(np.tile(self._best, (self._size, 1)), 0)
+
+    def ask(self) -> Array:
+        """Return the individuals (n, d) of this generation; none after the last layer."""
+        self._waiting = self._size if self._layer < self._layers else 0
+        return self._x[: self._waiting].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Let the next generation descend from this one by its costs (n,), and in a new layer open coordinates."""
+        check_tell(self._waiting, proposals, costs)
+        costs = np.where(np.isnan(costs), np.inf, costs)
+        if costs.min() < self._best_cost:
+            self._best, self._best_cost = proposals[costs.argmin()].copy(), float(costs.min())
+        children = self._children(np.array(proposals), costs)
+        self._generation, self._waiting = self._generation + 1, 0
+        if self._generation == self._generations:
+            before, self._generation, self._layer = self._open(), 0, self._layer + 1
+            children = self._grown(children, before) if self._layer < self._layers else children
+        children[0] = self._best  # ZHAO2008 (elite)
+        self._x = children
+
+    def _open(self) -> int:
+        return opened(self._space.dimensions, self._layer, self._layers)
+
+    def _grown(self, x: Array, before: int) -> Array:
+        """Return individuals (n, d) whose coordinates that a layer opens are drawn."""
+        now, drawn = self._open(), draw_population(self._space, self._rng, self._size)
+        grown = x.copy()
+        grown[:, before:now] = drawn[:, before:now]
+        return repair(self._space, grown, self._best)
+
+    def temperature(self) -> float:
+        """Return the temperature of this generation: it falls geometrically in each layer."""
+        first, last = TEMPERATURES
+        share = self._generation / max(self._generations - 1, 1)
+        return first * math.exp(share * math.log(last / first))  # ZHAO2008 (annealing)
+
+    def _children(self, x: Array, costs: Array) -> Array:
+        n, d, count = *x.shape, self._open()
+        fitness = weigh(costs, 1.0 / self.temperature())  # ZHAO2008 (selection)
+        mothers, fathers = x[self._rng.choice(n, n, p=fitness)], x[self._rng.choice(n, n, p=fitness)]
+        share = self._rng.uniform(-BEYOND, 1.0 + BEYOND, (n, d))
+        children = mothers + share * displacement(self._space, mothers, fathers)  # ZHAO2008 (crossover)
+        width = self._spread * self.temperature() / TEMPERATURES[0]
+        mutated = (self._rng.random((n, d)) < self._mutation) & (np.arange(d) < count)
+        children += mutated * width * self._rng.standard_normal((n, d))  # ZHAO2008 (mutation)
+        return repair(self._space, children, mothers)

@@ -1,0 +1,105 @@
+"""Hierarchical particle swarm optimisation: a swarm that searches the kinematic chain part by part.
+
+V. John, E. Trucco, S. Ivekovic, Markerless human articulated tracking using hierarchical particle swarm optimisation,
+Image and Vision Computing 28(11), 2010. The pose is searched in a fixed order along the chain, the whole body's place
+and orientation first; each stage is a swarm over a few coordinates, with all others held.
+
+Interpretations: a stage is a run of neighbouring coordinates, see `stages`, and may cut a limb; among the components of
+a prior, stages go from coarse to fine. Where nothing is predicted, the best of some random poses is the start. The
+inertia is that of SAPSO's paper. What leaves the box or becomes infeasible goes towards the best of the stage before.
+"""
+
+import math
+
+import numpy as np
+
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    between,
+    check_tell,
+    displacement,
+    draw_population,
+    positive,
+    repair,
+)
+from posefit_related.stages import EVALUATIONS, first_population, runs
+
+
+class HPSO:
+    """A swarm for each run of coordinates, one after another; what a stage found is held in those that follow.
+
+    Settings:
+        population_size: of a swarm, 1 or more.
+        run_length: coordinates of a stage after the root's, 1 or more.
+        evaluations: of a frame, shared among the stages, 1 or more. Ours: as many as SAPSO's.
+        inertia (A): factor on the old velocity at first, above 0.1; falls towards 0.1 in each stage.
+        acceleration: of the pulls towards the personal and the swarm's best, 0 or more.
+        alpha: velocities stay within it, in half-ranges of the box, above 0. Ours.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        population_size: int = 10,
+        run_length: int = 6,
+        evaluations: int = EVALUATIONS,
+        inertia: float = 2.0,
+        acceleration: float = 2.0,
+        alpha: float = 0.5,
+    ) -> None:
+        at_least("population_size", population_size, 1)
+        at_least("run_length", run_length, 1)
+        at_least("evaluations", evaluations, 1)
+        between("inertia", inertia, 0.1, math.inf, ends=False)
+        at_least("acceleration", acceleration, 0.0)
+        positive("alpha", alpha)
+        self._space, self._rng, self._size = space, rng, min(population_size, evaluations)
+        self._runs, self._stage, self._waiting = runs(space.dimensions, run_length), -1, 0  # -1: the first poses
+        self._x = first_population(space, rng, evaluations)
+        self._generations = max((evaluations - len(self._x)) // (self._size * len(self._runs)), 1)
+        self._inertia, self._acceleration, self._alpha = inertia, acceleration, alpha
+        self._v, self._generation, self._estimate = np.zeros_like(self._x), 0, self._x[0]
+        self._pbest, self._pbest_cost = self._x, np.full(len(self._x), np.inf)
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) of this stage; none after the last stage."""
+        self._waiting = len(self._x) if self._stage < len(self._runs) else 0
+        return self._x[: self._waiting].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Remember the bests and move on, after the last move of a stage to the next one."""
+        check_tell(self._waiting, proposals, costs)
+        self._waiting = 0
+        if self._stage < 0:
+            self._pbest, self._pbest_cost = np.array(proposals), np.where(np.isnan(costs), np.inf, costs)
+        else:
+            better = costs < self._pbest_cost
+            self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
+            self._generation += 1
+            if self._generation < self._generations:
+                self._move()
+                return
+        self._estimate = self._pbest[self._pbest_cost.argmin()].copy()  # JOHN2010 (handed down)
+        self._stage += 1
+        if self._stage < len(self._runs):
+            self._begin()
+
+    def _begin(self) -> None:
+        """Spread the swarm over the coordinates of its stage, around the estimate of those before."""
+        run, x = self._runs[self._stage], np.tile(self._estimate, (self._size, 1))
+        x[1:, run] = draw_population(self._space, self._rng, self._size)[1:, run]  # JOHN2010 (stage)
+        self._x, self._v, self._generation = repair(self._space, x, self._estimate), np.zeros_like(x), 0
+        self._pbest, self._pbest_cost = self._x.copy(), np.full(self._size, np.inf)
+
+    def _move(self) -> None:
+        run, gbest = self._runs[self._stage], self._pbest[self._pbest_cost.argmin()]
+        omega = self._inertia * (10.0 * self._inertia) ** (-self._generation / self._generations)  # JOHN2010 (inertia)
+        phi1, phi2 = self._acceleration * self._rng.random((2, self._size, len(run)))
+        to_pbest, to_gbest = (displacement(self._space, self._x, best)[:, run] for best in (self._pbest, gbest))
+        v = omega * self._v[:, run] + phi1 * to_pbest + phi2 * to_gbest
+        self._v[:, run] = np.clip(v, -self._alpha, self._alpha)
+        self._x = repair(self._space, self._x + self._v, self._estimate)

@@ -1,0 +1,106 @@
+"""A particle filter with a swarm in it: the particles of each frame fly to where the silhouette fits better.
+
+T. Krzeszowski, B. Kwolek, K. Wojciechowski, Articulated body motion tracking by combined particle swarm optimization
+and particle filtering, ICCVG 2010, LNCS 6374. Particles that survived a frame move as the person may have; then they
+are the swarm of a particle swarm optimisation, which shifts them; from there they are weighted and resampled.
+
+Interpretations: the swarm is Clerc and Kennedy's with its usual constants; the particles that are weighted are the
+personal bests; their weights are exp(-sharpness cost), without a factor for the shift, so they are no fair sample of
+the posterior.
+"""
+
+import numpy as np
+
+from posefit.plugin import (
+    Array,
+    Space,
+    at_least,
+    check_tell,
+    converted,
+    displacement,
+    draw_population,
+    positive,
+    repair,
+    sample_normal,
+    weigh,
+)
+from posefit_related.stages import EVALUATIONS
+
+CHI, PHI = 0.7298, 2.05  # Clerc and Kennedy 2002: the constriction, and the acceleration of either pull
+
+
+def systematic(weights: Array, u: float) -> Array:
+    """Return rows (n,), each about as often as n times its weight; `u` in [0, 1) shifts the evenly spaced points."""
+    n = len(weights)
+    rows = weights.cumsum().searchsorted((np.arange(n) + u) / n, side="right")
+    return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
+
+
+class PSOPF:
+    """Particles that are resampled, moved by noise, and then by a swarm, in every frame.
+
+    Settings:
+        evaluations: of a frame, shared among the moves, 1 or more. Ours: as many as SAPSO's.
+        iterations: moves of the swarm in a frame, 0 or more; at 0 it is a plain particle filter.
+        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
+        noise: standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
+        alpha: velocities stay within it, in half-ranges of the box, above 0. Ours.
+    """
+
+    def __init__(
+        self,
+        space: Space,
+        rng: np.random.Generator,
+        *,
+        evaluations: int = EVALUATIONS,
+        iterations: int = 15,
+        sharpness: float = 1.0,
+        noise: float = 0.1,
+        alpha: float = 0.15,
+    ) -> None:
+        at_least("evaluations", evaluations, 1)
+        at_least("iterations", iterations, 0)
+        positive("sharpness", sharpness)
+        positive("noise", noise)
+        positive("alpha", alpha)
+        self._space, self._rng, self._waiting = space, rng, 0
+        self._x: Array
+        self._v: Array
+        self._pbest: Array
+        self._pbest_cost: Array
+        self._moves: int
+        self._iterations = min(iterations, evaluations - 1)
+        self._sharpness, self._noise, self._alpha = sharpness, noise, alpha
+        self._begin(draw_population(space, rng, evaluations // (self._iterations + 1)))
+
+    def ask(self) -> Array:
+        """Return the particles (n, d) after their move; none after the last one of a frame."""
+        self._waiting = len(self._x) if self._moves <= self._iterations else 0
+        return self._x[: self._waiting].copy()
+
+    def tell(self, proposals: Array, costs: Array) -> None:
+        """Remember the bests, and unless this was the last move, let the swarm move on."""
+        check_tell(self._waiting, proposals, costs)
+        better = costs < self._pbest_cost
+        self._pbest[better], self._pbest_cost[better] = proposals[better], costs[better]
+        self._moves, self._waiting = self._moves + 1, 0
+        if self._moves > self._iterations:
+            return
+        gbest = self._pbest[self._pbest_cost.argmin()]
+        pulls = PHI * self._rng.random((2, *self._x.shape))
+        to_pbest, to_gbest = (displacement(self._space, self._x, best) for best in (self._pbest, gbest))
+        v = CHI * (self._v + pulls[0] * to_pbest + pulls[1] * to_gbest)  # KRZESZOWSKI2010 (shift)
+        self._v = np.clip(v, -self._alpha, self._alpha)
+        self._x = repair(self._space, self._x + self._v, self._pbest)
+
+    def advance(self, space: Space) -> None:
+        """Let the particles survive by the weights of where the swarm brought them, and move into the next frame."""
+        weights = weigh(self._pbest_cost, self._sharpness)  # KRZESZOWSKI2010 (weights)
+        rows = systematic(weights, self._rng.random())
+        moved = converted(space, self._pbest[rows], self._space)
+        self._space = space
+        self._begin(sample_normal(space, self._rng, moved, np.full(space.dimensions, self._noise)))
+
+    def _begin(self, x: Array) -> None:
+        self._x, self._v, self._moves = x, np.zeros_like(x), 0
+        self._pbest, self._pbest_cost = x.copy(), np.full(len(x), np.inf)

@@ -1,0 +1,109 @@
+"""A particle filter whose weights are smoothed backwards, so that later frames tell about earlier ones.
+
+P. Peursum, S. Venkatesh, G. West, A study on smoothing for particle-filtered 3D human body tracking, International
+Journal of Computer Vision 87, 2010. Of its three smoothed inferences this is the first, particle-filtered backwards
+smoothing: a filter goes forwards, and then particles are weighted again from the last frame to the first. Its abstract
+says that smoothing hardly improves the filtered estimate.
+
+Interpretations: the backward weights are those of Doucet, Godsill and Andrieu (2000). The motion is a random walk of
+the pose's principal components, as wide as training moves from frame to frame, and not the publication's
+model. The heaviest particles of a frame stand for all. A frame's pose is the weighted mean, of filtered weights
+where `backwards` is off.
+"""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, weigh
+from posefit_related.frames import costs_of, first_poses, frame_of, training_poses
+from posefit_related.psopf import systematic
+
+HEAVIEST = 600  # ours: particles of a frame that are smoothed
+MIN_STEPS = np.array([np.radians(2.0), 0.005, 0.005, 0.005])  # ours: least deviations a frame of yaw and place
+
+
+class Smoothing:
+    """A bootstrap filter over all frames, and a backward pass over its weights.
+
+    Settings:
+        components: of the pose, 1 or more. Ours.
+        sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
+        spread: of the motion, as a multiple of how training moves from frame to frame, above 0. Ours.
+        backwards: whether weights are smoothed; else they are the filter's.
+    """
+
+    def __init__(
+        self, task: Task, *, components: int = 8, sharpness: float = 1.0, spread: float = 1.5, backwards: bool = True
+    ) -> None:
+        at_least("components", components, 1)
+        positive("sharpness", sharpness)
+        positive("spread", spread)
+        self.task, self.sharpness, self.backwards = task, sharpness, backwards
+        poses = training_poses(task)[:, 1:]
+        self.mean = poses.mean(axis=0)
+        self.axes = np.linalg.svd(poses - self.mean, full_matrices=False)[2][:components]
+        self.steps = spread * self._training_steps()
+
+    def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        """Yield a frame for each observation, once all were filtered."""
+        sequence, states, weights = list(observations), list[Array](), list[Array]()
+        count = max(self.task.evaluations - 1, 1)
+        poses = first_poses(self.task, rng, count)
+        where = np.tile(self.task.anchor, (count, 1))
+        here = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
+        likelihood = np.full(count, 1.0 / count)
+        for observation in sequence:
+            if states:
+                rows = systematic(likelihood, rng.random())
+                here = here[rows] + self.steps * rng.standard_normal((count, len(self.steps)))
+            if observation.translation is not None:
+                here[:, 1:4] = observation.translation
+            costs = np.zeros(count)
+            if observation.usable:
+                costs = costs_of(self.task, observation, self._poses(here), here[:, 1:4])
+            likelihood = weigh(costs, self.sharpness)
+            heaviest = np.argsort(-likelihood, kind="stable")[:HEAVIEST]
+            states.append(here[heaviest])
+            weights.append(likelihood[heaviest] / likelihood[heaviest].sum())
+        if self.backwards:
+            weights = smoothed(states, weights, self.steps)
+        for observation, here, weight in zip(sequence, states, weights, strict=True):
+            leading = here[weight.argmax()]
+            mean = leading + weight @ differences(here, leading)
+            evaluations = count if observation.usable else 0
+            yield frame_of(self.task, observation, self._poses(mean[None])[0], mean[1:4], evaluations)
+
+    def _poses(self, states: Array) -> Array:
+        """Return the poses (n, 66) of states (n, 4 + m): yaw, place and components."""
+        return np.column_stack([states[:, 0], self.mean + states[:, 4:] @ self.axes])
+
+    def _training_steps(self) -> Array:
+        """Return the root mean squares (4 + m,) of how states of training change in a frame of the task."""
+        squares = []
+        for motion in self.task.training:
+            moved = np.column_stack([motion.poses[:, 0], motion.translations, motion.poses[:, 1:] @ self.axes.T])
+            squares.append((differences(moved[1:], moved[:-1]) * motion.fps / self.task.fps) ** 2)
+        steps = np.sqrt(np.concatenate(squares).mean(axis=0))
+        steps[:4] = np.maximum(steps[:4], MIN_STEPS)
+        return np.asarray(np.maximum(steps, 1e-6))
+
+
+def differences(states: Array, origin: Array) -> Array:
+    """Return states (..., 4 + m) less an origin, the short way round in the yaw."""
+    away = states - origin
+    away[..., 0] = (away[..., 0] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.asarray(away)
+
+
+def smoothed(states: list[Array], weights: list[Array], steps: Array) -> list[Array]:
+    """Return the weights (n,) of each frame's states (n, D) given all frames, for normal steps (D,) between frames."""
+    after = weights[-1:]
+    for here, there, weight in reversed(list(zip(states, states[1:], weights, strict=False))):
+        moves = differences(there[None], here[:, None]) / steps
+        logs = -0.5 * (moves**2).sum(axis=2)
+        chances = np.exp(logs - logs.max(axis=0))  # (here, there), each column to a factor that cancels
+        reached = chances / np.maximum(weight @ chances, 1e-300)
+        backward = weight * (reached @ after[0])  # PEURSUM2010 (backward)
+        after.insert(0, backward / backward.sum())
+    return after

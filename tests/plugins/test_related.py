@@ -1,0 +1,97 @@
+"""The related work as plugins: rules of their kinds, a few frames of a made walk, masks without a known place."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.geometry.body import Body
+from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
+from posefit.registry import registry
+from posefit.testing.tracker_rules import scene
+from posefit_related.frames import place_of
+from tests.cases import each
+
+METHODS = ["hpso@pca", "haga@pca", "psopf@pca", "local@pca", "sapso@isomap", "sapso@gplvm"]
+TRACKERS = ["smoothing", "gradient", "regression"]
+
+
+@pytest.mark.slow
+@each(
+    "kind, name",
+    [
+        *(("optimiser", name) for name in ("hpso", "haga", "psopf", "local")),
+        ("prior", "isomap"),
+        ("prior", "gplvm"),
+        *(("tracker", name) for name in TRACKERS),
+    ],
+)
+def test_each_follows_the_rules_of_its_kind(kind: str, name: str) -> None:
+    offer = registry().offer(kind, name)
+    more: dict[str, Any] = {
+        "optimiser": {"next_frame": offer.next_frame},
+        "tracker": {"looks_ahead": offer.looks_ahead},
+    }.get(kind, {})
+    check = {"optimiser": check_optimiser, "prior": check_prior, "tracker": check_tracker}[kind]
+    report = check(offer.factory, **more)
+    assert report, str(report)
+
+
+@each("method", [*METHODS, "smoothing", "gradient", "regression"])
+def test_a_walk_is_followed_better_than_by_its_mean_pose(method: str) -> None:
+    tracks = [
+        posefit.track("walk", method=method, frames=(0, 4), evaluations=800, seed=seed)
+        for seed in range(1 if method == "regression" else 5)
+    ]
+    errors = [track.summary["error_degrees"]["mean"] for track in tracks]
+    assert np.median(errors) < tracks[0].summary["baselines_degrees"]["mean_pose"]
+
+
+@each("method", TRACKERS)
+def test_a_place_that_is_not_known_is_found_in_the_masks(method: str) -> None:
+    settings = {"regression.samples": 300} if method == "regression" else {}
+    track = posefit.track(
+        "walk", method=method, frames=(0, 4), evaluations=800, translation="aligned", settings=settings
+    )
+    assert track.summary["iou"] > 0.3
+    assert np.isfinite(track.motion.translations).all()
+
+
+def test_without_training_there_is_one_line() -> None:
+    task = replace(scene()[0], training=())
+    for name in TRACKERS:
+        with pytest.raises(ValueError, match="training must hold a motion"):
+            list(registry().offer("tracker", name).factory(task).track(scene()[2], np.random.default_rng(0)))
+    for name in ("isomap", "gplvm"):
+        with pytest.raises(ValueError, match="angles must hold at least"):
+            registry().offer("prior", name).factory().fit(np.zeros((3, 63)))
+
+
+def test_a_mask_says_where_the_root_is() -> None:
+    task, motion, observations = scene()
+    pose, place, observation = motion.poses[0], motion.translations[0], observations[0]
+    assert place_of(task, observation, pose, np.zeros(3))[0] == pytest.approx(place)  # known
+    unknown = Observation(observation.silhouettes)
+    moved, drawn = place_of(task, unknown, pose, place + [0.1, 0.05, 0.2])
+    assert np.linalg.norm(moved - place) < 0.08  # a pixel of 120 rows is 3 cm
+    assert drawn == 1
+
+
+def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:
+    task, motion, observations = scene()
+    free = np.flatnonzero(task.body.skeleton.free)
+    pose = motion.poses[0].copy()
+    pose[free] += np.radians(4.0) * np.random.default_rng(0).standard_normal(len(free))
+    after, place, used = contour_fit(task, observations[0], (pose, motion.translations[0]), (0.1, 0.003), 400)
+    body: Body = task.body
+    true = body.skeleton.joints(motion.poses[:1], motion.translations[:1])
+
+    def error(angles: Any) -> float:
+        joints = body.skeleton.joints(angles[None], motion.translations[:1])
+        return float(np.linalg.norm(joints - true, axis=-1).mean())
+
+    assert error(after) < error(pose)
+    assert used == 12 * 27  # never more than twelve steps
+    assert contour_fit(task, observations[0], (pose, place), (0.1, 0.003), 60)[2] == 2 * 27
