@@ -11,7 +11,7 @@ method is needed. So heavy imports belong inside the hooks and what they registe
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from pluggy import HookspecMarker
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 PROJECT = "posefit"
 hookspec = HookspecMarker(PROJECT)
-Factory = TypeVar("Factory", contravariant=True)
 
 # The module a factory imports when it is called, and what to install where it is absent: ("cma", "posefit[pycma]").
 Needs = tuple[str, str]
@@ -52,15 +51,25 @@ class RegisterTracker(Protocol):
         """Register a tracker."""
 
 
-class Register(Protocol[Factory]):
-    """Registers anything else that has a factory: its name, its factory and what it needs."""
+class RegisterPrior(Protocol):
+    """Registers a prior: its name, its factory and what it needs."""
 
-    def __call__(self, name: str, factory: Factory, *, needs: Needs | None = None) -> None:
-        """Register a prior or a segmenter."""
+    def __call__(self, name: str, factory: "PriorFactory", *, needs: Needs | None = None) -> None:
+        """Register a prior."""
 
 
-RegisterPrior: TypeAlias = Register["PriorFactory"]
-RegisterSegmenter: TypeAlias = Register["SegmenterFactory"]
+class RegisterSegmenter(Protocol):
+    """Registers a segmenter: its name, its factory, whether it needs a still background, and what else it needs.
+
+    The masks of one that needs a still background are judged by what moves outside them.
+    """
+
+    def __call__(
+        self, name: str, factory: "SegmenterFactory", *, still_background: bool = True, needs: Needs | None = None
+    ) -> None:
+        """Register a segmenter."""
+
+
 RegisterCommand: TypeAlias = Callable[["click.Command"], None]
 
 

@@ -53,6 +53,7 @@ class Offer:
     version: str
     next_frame: "NextFrame" = "start"  # of an optimiser
     looks_ahead: bool = False  # of a tracker
+    still_background: bool = True  # whether a segmenter needs one
     needs: hooks.Needs | None = None
 
     @property

@@ -19,8 +19,8 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_vsmm import joints
-from posefit_vsmm.joints import BODY, detect
-from posefit_vsmm.measurement import MIN_GATE, head_radius
+from posefit_vsmm.joints import BODY, GATE, detect, rules
+from posefit_vsmm.measurement import head_radius
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import lines_of
 from posefit_vsmm.state import ENDS, POINTS
@@ -36,6 +36,7 @@ CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried a
 
 def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
     """Return the errors (2,) in legs of each point where it was detected."""
+    unbiased = rules()._replace(bias=np.zeros((len(POINTS), 2)))
     errors_of: dict[str, list[Array]] = {name: [] for name in POINTS}
     for name, azimuth in product(MOTIONS, AZIMUTHS):
         motion = built_in.motion(name)
@@ -48,10 +49,8 @@ def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
             true, _ = camera.project(motion.skeleton.joints(pose, place)[ENDS].mean(axis=1))
             expected = true + rng.normal(0.0, OFF * leg * scale, true.shape)
             assert lines is not None
-            gates = np.full(len(POINTS), MIN_GATE * leg * scale)
-            points, confidence, _ = detect(
-                lines, expected, gates, leg * scale, head_radius(body) * scale, np.zeros((len(POINTS), 2))
-            )
+            gates = np.full(len(POINTS), GATE[0] * leg * scale)
+            points, confidence, _ = detect(lines, expected, gates, leg * scale, head_radius(body) * scale, unbiased)
             for k, point in enumerate(POINTS):
                 if confidence[k] > 0.0:
                     errors_of[point].append((points[k] - true[k]) / (leg * scale))

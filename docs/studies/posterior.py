@@ -30,7 +30,7 @@ from posefit.sweep.check import cell_of
 from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import APART, Posterior, modes_of, nearer_mirrored, poses_apart, second_side
-from posefit_exemplars.lost_model import Calibration, evidence, none_features
+from posefit_exemplars.calibration import Calibration, evidence, none_features
 from posefit_exemplars.tracker import POSTERIOR_TEMPERATURE
 from posefit_reproduce.jobs import Progress, each
 from scores import auroc, calibration_error, conformal_factor

@@ -7,7 +7,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.check import whole
 from posefit.fitting.metrics import mpjpe_mm, pose_error_degrees
-from posefit.fitting.tracker import Follower, Prediction
+from posefit.fitting.tracker import Prediction, Predictor
 from posefit_envs.base import Flags, Infos, Outcome, SearchEnv, SearchVectorEnv, image_spaces
 from posefit_envs.instance import Episode, Image, Instance, checked, instance
 from posefit_envs.rendering import Picture, render_frame
@@ -34,18 +34,18 @@ class TrackVectorEnv(SearchVectorEnv):
         checked(whole, "frames", frames, 1)
         super().__init__(num_envs, image_spaces, **arguments)
         self._frame_count, self._budget = int(frames), int(evaluations_per_frame)
-        self._followers: dict[int, Follower] = {}
+        self._predictors: dict[int, Predictor] = {}
         self._frames, self._used = np.zeros((2, num_envs), dtype=np.int64)  # used: of the current frame
         self._best, self._best_proposals = np.empty(num_envs), np.empty(self._shape)
         self._last: Evaluation | None = None
 
     def _begin_search(self, i: int, number: int) -> None:
         made = instance(self.world, number, self._frame_count, self._budget)
-        self._followers[i] = Follower(made.task, self.world.learned, Prediction(tilt="box"))
+        self._predictors[i] = Predictor(made.task, self.world.learned, Prediction(tilt="box"))
         self._begin_frame(i, made, 0)
 
     def _begin_frame(self, i: int, made: Instance, frame: int) -> None:
-        self._enter(i, made.episode(frame, self._followers[i].space(made.observations[frame])))
+        self._enter(i, made.episode(frame, self._predictors[i].space(made.observations[frame])))
         self._frames[i], self._used[i], self._best[i] = frame, 0, np.inf
 
     def _opened(self, begun: Flags) -> tuple[Image, Infos]:
@@ -75,7 +75,7 @@ class TrackVectorEnv(SearchVectorEnv):
         for i in rows.tolist():
             made, frame, best = self._episode(i).instance, int(self._frames[i]), float(self._best[i])
             infos[i] = committed_infos(made, frame, poses[i, 0], places[i, 0], best, self.world.errors)
-            self._followers[i].commit(self._best_proposals[i])
+            self._predictors[i].commit(self._best_proposals[i])
             if frame + 1 < self._frame_count:
                 self._begin_frame(i, made, frame + 1)
                 entered.append(i)

@@ -22,4 +22,4 @@ def posefit_register_segmenters(register: RegisterSegmenter) -> None:
     register("mixture", learned_mixture)
     register("median", learned_median)
     register("mean", given_mean)
-    register("masks", given_masks)
+    register("masks", given_masks, still_background=False)

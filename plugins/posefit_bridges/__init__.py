@@ -2,7 +2,7 @@
 
 | looking for | file |
 |---|---|
-| optimisers of Nevergrad, Optuna, pycma, pymoo, pyribs and SciPy, by ask and tell | nevergrad.py, optuna.py, ... |
+| optimisers of Nevergrad, Optuna, pycma, pymoo and SciPy, by ask and tell | nevergrad.py, optuna.py, ... |
 | problems for IOHexperimenter, Nevergrad, OptunaHub and pymoo | problems.py |
 
 A library is imported where it is used; `pip install posefit[NAME]` brings it along.
@@ -14,17 +14,15 @@ from posefit.hooks import RegisterOptimiser
 
 @hookimpl
 def posefit_register_optimisers(register: RegisterOptimiser) -> None:
-    """Register the optimisers of each library: `pycma`, `ribs`, and those of a family such as `optuna:SAMPLER`."""
+    """Register the optimisers of each library: `pycma`, and those of a family such as `optuna:SAMPLER`."""
     from posefit_bridges.nevergrad import Nevergrad
     from posefit_bridges.optuna import Optuna
     from posefit_bridges.pycma import PyCMA
     from posefit_bridges.pymoo import Pymoo
-    from posefit_bridges.ribs import Ribs
     from posefit_bridges.scipy import scipy
 
     register("nevergrad", Nevergrad, needs=("nevergrad", "posefit[nevergrad]"))
     register("optuna", Optuna, needs=("optuna", "posefit[optuna]"))
     register("pycma", PyCMA, needs=("cma", "posefit[pycma]"))
     register("pymoo", Pymoo, needs=("pymoo", "posefit[pymoo]"))
-    register("ribs", Ribs, needs=("ribs", "posefit[ribs]"))
     register("scipy", scipy)

@@ -12,7 +12,8 @@ several hypotheses of each frame are fitted, and the likeliest sequence of them 
 - `markov` has the likeliest path through the last frames, the weights of states, and sampled paths.
 - `hypotheses` has those of each frame, and the likeliest sequence.
 - `smoothing` filters the estimates over time.
-- `lost_model` makes the posterior's intervals hold, and gives the probability that a frame is lost.
+- `calibration` reports a frame with a posterior whose intervals hold.
+- `lost_model` gives the probability that a frame is lost.
 - `kernels` has the compiled loops.
 - `tracker` has the settings, and processes one frame after the other.
 

@@ -98,8 +98,6 @@ class Counts(NamedTuple):
 
 
 class _FittedFrame(NamedTuple):
-    """The hypotheses of a frame, and their weights."""
-
     estimate: Estimate  # on the path of the beam
     hypotheses: Hypotheses
     states: markov.FrameStates
@@ -183,30 +181,27 @@ class HypothesisFilter:
 
     def _fitted(self, estimate: Estimate, before: _FittedFrame | None) -> tuple[Hypotheses, float, float]:
         """Return the hypotheses of a frame, how imprecise its masks are, and the evaluations of the fits."""
-        frame_costs, task, evaluations = estimate.frame_costs, self._task, 0.0
-        rows = None if before is None else self._continuing(before, frame_costs.camera_count)
-        contours = frame_costs.contours(estimate.place) if frame_costs.usable else None
-        poses, places = self._fresh(estimate, before, rows)
-        noise = self._noise(frame_costs, poses, places)
-        weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
-        if contours is not None:
-            poses, places = fitted(task.body, contours, (poses, places), poses, weights, FRESH_REACHES)
-            evaluations += len(poses) * FRESH_EVALUATIONS
-        parents = np.full(len(poses), -1)
-        if before is not None and rows is not None:
-            moved, shifted = before.hypotheses.poses[rows], before.hypotheses.places[rows]
-            if contours is not None:
-                moved, shifted = before.hypotheses.continued(rows)
+        frame_costs, task, usable = estimate.frame_costs, self._task, estimate.frame_costs.usable
+        latest, rows = None, np.empty(0, dtype=np.int64)
+        if before is not None:
+            latest, rows = before.hypotheses, self._continuing(before, frame_costs.camera_count)
+        fresh = self._fresh(estimate, latest, rows)
+        noise = self._noise(frame_costs, *fresh)
+        continued = (fresh[0][:0], fresh[1][:0]) if latest is None else (latest.poses[rows], latest.places[rows])
+        if usable:
+            contours = frame_costs.contours(estimate.place)
+            weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
+            fresh = fitted(task.body, contours, fresh, fresh[0], weights, FRESH_REACHES)
+            if latest is not None:
+                moved, shifted = latest.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)
                 means, pulls = self._pulled(moved, weights, noise)
-                moved, shifted = fitted(task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
-                evaluations += len(rows) * CONTINUED_EVALUATIONS
-            poses, places = np.concatenate([poses, moved]), np.concatenate([places, shifted])
-            parents = np.concatenate([parents, rows])
-        hypotheses = Hypotheses.of(
-            task, poses, frame_costs.at_root(places), parents, None if before is None else before.hypotheses
-        )
-        return hypotheses, noise, evaluations
+                continued = fitted(task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
+        poses, places = (np.concatenate(arrays) for arrays in zip(fresh, continued, strict=True))
+        parents = np.concatenate([np.full(len(fresh[0]), -1), rows])
+        hypotheses = Hypotheses.of(task, poses, frame_costs.at_root(places), parents, latest)
+        evaluations = len(fresh[0]) * FRESH_EVALUATIONS + len(rows) * CONTINUED_EVALUATIONS
+        return hypotheses, noise, evaluations if usable else 0.0
 
     def _joined(
         self, frame_costs: FrameCosts, hypotheses: Hypotheses, before: _FittedFrame | None, noise: float
@@ -245,7 +240,7 @@ class HypothesisFilter:
             self._costs.append(FITTED_COST_SHARE * float(frame_costs.full(poses, places).min()))
         return max(float(np.quantile(self._costs or [0.0], BEST_SHARE)) / CLEAN_COST, 1.0)
 
-    def _fresh(self, estimate: Estimate, before: _FittedFrame | None, rows: Rows | None) -> tuple[Array, Array]:
+    def _fresh(self, estimate: Estimate, latest: Hypotheses | None, rows: Rows) -> tuple[Array, Array]:
         """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest."""
         poses, places = estimate.pose[None], estimate.place[None]
         if estimate.alternatives is not None:
@@ -255,7 +250,7 @@ class HypothesisFilter:
         count = self.counts(frame_costs.camera_count).fresh - len(poses)  # of reflections
         if not frame_costs.usable or count <= 0:
             return poses, places
-        likeliest = (poses, places) if before is None or rows is None else before.hypotheses.continued(rows)
+        likeliest = (poses, places) if latest is None else latest.continued(rows)
         reflectable, place = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
         reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
         return np.concatenate([poses, reflected]), np.concatenate([places, np.resize(place, (len(reflected), 3))])

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from posefit.geometry.rotation import wrapped
 from posefit_exemplars import beam as beams
 from posefit_exemplars import hypotheses, markov
 from posefit_exemplars.beam import JUMP_COST, Beam
+from posefit_exemplars.calibration import reported
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.lost_model import reported, stored_classifier, with_failure_probabilities
+from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
 MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
@@ -44,6 +45,21 @@ class _BeamFrame(NamedTuple):
     states: markov.FrameStates
     frame_costs: FrameCosts
     evaluations: float
+
+
+class _Delays(NamedTuple):
+    """How many later frames each stage uses; together they are the lag."""
+
+    path: int
+    fits: int
+    smoothing: int
+
+    @classmethod
+    def of(cls, lag: int, smoothing: float, fitted: bool) -> Self:
+        """Return the delays of a smoothing over so many frames; what it leaves of the lag is halved with the fits."""
+        ahead = min(math.ceil(FILTER_REACH * smoothing), lag)
+        fits = (lag - ahead) // 2 if fitted else 0
+        return cls(lag - ahead - fits, fits, ahead)
 
 
 class ExemplarTracker:
@@ -84,31 +100,29 @@ class ExemplarTracker:
         self.step = beams.Step.of(task, spread)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
-        self.lag, self.ahead = lag, min(math.ceil(FILTER_REACH * self.smoothing), lag)  # the latter for smoothing alone
-        self.delay, self.evaluations = lag - self.ahead, float(task.evaluations)  # of the beam
         self.sampling = markov.Sampling(samples, temperature / POSTERIOR_TEMPERATURE)
         self.hypotheses: hypotheses.HypothesisFilter | None = None
-        share = FIT_SHARE * task.evaluations
-        if fitted and share >= hypotheses.MIN_EVALUATIONS:
-            self.evaluations -= share
-            delay = self.delay // 2
-            self.delay -= delay
-            self.hypotheses = hypotheses.HypothesisFilter(
-                task, self.exemplars, self.step, self.temperature, share, delay, self.sampling
-            )
+        fit_evaluations = FIT_SHARE * task.evaluations if fitted else 0.0
+        if fit_evaluations < hypotheses.MIN_EVALUATIONS:
+            fit_evaluations = 0.0
+        self.evaluations = task.evaluations - fit_evaluations  # of the beam
+        self.delays = _Delays.of(lag, self.smoothing, fit_evaluations > 0.0)
+        if fit_evaluations:
+            known = task, self.exemplars, self.step, self.temperature
+            self.hypotheses = hypotheses.HypothesisFilter(*known, fit_evaluations, self.delays.fits, self.sampling)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
         estimates = self._path(observations, rng)
         if self.hypotheses is not None:
             estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
-        frames = map(reported, smoothed(estimates, self.smoothing, self.ahead))
+        frames = map(reported, smoothed(estimates, self.smoothing, self.delays.smoothing))
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame on the likeliest path of the beam."""
         rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else None
-        for window in markov.windows(self._beams(observations, rng), self.delay):
+        for window in markov.windows(self._beams(observations, rng), self.delays.path):
             frame, states = window[0], [frame.states for frame in window]
             estimate = self._estimated(frame, markov.viterbi_state(states), markov.state_weights(states))
             if sampler is not None and self.sampling.paths:
@@ -119,7 +133,6 @@ class ExemplarTracker:
             yield estimate
 
     def _beams(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[_BeamFrame]:
-        """Yield the beam of each frame."""
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
         latest: _BeamFrame | None = None
         for number, observation in enumerate(observations):

@@ -1,7 +1,7 @@
 """The annealed particle filter of Deutscher and Reid.
 
 J. Deutscher, I. Reid, Articulated body motion capture by stochastic search, International Journal of Computer Vision
-61(2), 2005. Our own choices are marked `ours`.
+61(2), 2005, without its crossover of particles. Our own choices are marked `ours`.
 """
 
 import numpy as np
@@ -42,7 +42,6 @@ class Annealed:
         survival (alpha): share of the particles that survives a layer, between 0 and 1.
         diffusion: noise of a layer as a multiple of the particles' own standard deviations, above 0. Ours.
         noise (P0): standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
-        crossover: whether survivors first trade a run of neighbouring coordinates in pairs.
     """
 
     def __init__(
@@ -55,7 +54,6 @@ class Annealed:
         survival: float = SURVIVAL,
         diffusion: float = DIFFUSION,
         noise: float = NOISE,
-        crossover: bool = False,
     ) -> None:
         at_least("evaluations", evaluations, 1)
         at_least("layers", layers, 1)
@@ -63,7 +61,7 @@ class Annealed:
         positive("diffusion", diffusion)
         positive("noise", noise)
         self._space, self._rng = space, rng
-        self._layers, self._survival, self._crossover = min(layers, evaluations), survival, crossover
+        self._layers, self._survival = min(layers, evaluations), survival
         self._diffusion, self._noise = diffusion, noise
         self._particles = draw_population(space, rng, evaluations // self._layers)
         self._costs = np.zeros(len(self._particles))
@@ -100,17 +98,5 @@ class Annealed:
         around = displacement(self._space, self._particles[weights.argmax()], self._particles)
         mean = weights @ around
         spread = np.sqrt(weights @ (around - mean) ** 2)
-        survivors = self._particles[rows]
-        if self._crossover:
-            survivors = self._traded(survivors)
         noise = self._diffusion * spread  # DEUTSCHER2005 (diffusion)
-        self._particles = sample_normal(self._space, self._rng, survivors, noise)
-
-    def _traded(self, survivors: Array) -> Array:
-        """Return survivors that have traded a run of coordinates with a partner, where both remain feasible."""
-        n, d = survivors.shape
-        partners = survivors[self._rng.permutation(n)]
-        first, last = np.sort(self._rng.integers(0, d + 1, (2, n)), axis=0)
-        run = (np.arange(d) >= first[:, None]) & (np.arange(d) < last[:, None])
-        children = np.where(run, partners, survivors)  # DEUTSCHER2005 (crossover)
-        return np.where(self._space.feasible(children)[:, None], children, survivors)
+        self._particles = sample_normal(self._space, self._rng, self._particles[rows], noise)

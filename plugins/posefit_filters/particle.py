@@ -14,7 +14,6 @@ from posefit.plugin import (
     converted,
     draw_population,
     positive,
-    repair,
     sample_normal,
     weigh,
 )
@@ -36,7 +35,6 @@ class Particle:
         evaluations (N): particles, which are all evaluations of a frame, 1 or more. Ours: as many as SAPSO's.
         sharpness: how fast the likelihood exp(-sharpness cost) falls, above 0. Ours.
         noise: standard deviation of the motion from frame to frame, in half-ranges of the box, above 0. Ours.
-        drift: share of the predicted velocity that particles move by before the noise, 0 or more. Ours.
     """
 
     def __init__(
@@ -47,14 +45,12 @@ class Particle:
         evaluations: int = EVALUATIONS,
         sharpness: float = SHARPNESS,
         noise: float = NOISE,
-        drift: float = 0.0,
     ) -> None:
         at_least("evaluations", evaluations, 1)
         positive("sharpness", sharpness)
         positive("noise", noise)
-        at_least("drift", drift, 0.0)
         self._space, self._rng = space, rng
-        self._sharpness, self._noise, self._drift = sharpness, noise, drift
+        self._sharpness, self._noise = sharpness, noise
         self._particles = draw_population(space, rng, evaluations)
         self._weights = np.full(evaluations, 1.0 / evaluations)
         self._due, self._waiting = True, 0
@@ -75,8 +71,6 @@ class Particle:
         """Let the particles survive by their weights, and move into the next frame."""
         rows = systematic_rows(self._weights, self._rng.random(), len(self._weights))  # GORDON1993 (resampling)
         moved = converted(space, self._particles[rows], self._space)
-        if self._drift and space.start is not None:
-            moved = repair(space, moved + self._drift * space.start.velocity, moved[0])
         spread = np.full(space.dimensions, self._noise)
         self._particles = sample_normal(space, self._rng, moved, spread)  # GORDON1993 (motion)
         self._space, self._due = space, True

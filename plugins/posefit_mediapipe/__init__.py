@@ -20,4 +20,4 @@ def posefit_register_segmenters(register: RegisterSegmenter) -> None:
     """Register `mediapipe`."""
     from posefit_mediapipe.segmenter import MediaPipe
 
-    register("mediapipe", MediaPipe, needs=("mediapipe", "posefit[mediapipe]"))
+    register("mediapipe", MediaPipe, still_background=False, needs=("mediapipe", "posefit[mediapipe]"))

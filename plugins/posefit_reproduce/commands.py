@@ -7,6 +7,7 @@ it runs.
 import json
 from collections.abc import Iterator, Mapping
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -100,15 +101,12 @@ def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
     from posefit_reproduce.sapso.experiment import loaded, perform
     from posefit_reproduce.sapso.tables import Analysis, paper_tables
 
-    motions = loaded(clips, scale.frames)
-
-    def figures(results: Any) -> Any:
-        from posefit_reproduce.sapso.figures import paper_figures
-
-        return paper_figures(Analysis(results, motions))
-
+    analysis = partial(Analysis, motions=loaded(clips, scale.frames))
     return Experiment(
-        list(scale.runs), partial(perform, clips, scale), lambda results: paper_tables(results, motions), figures
+        [*scale.runs],
+        partial(perform, clips, scale),
+        lambda results: paper_tables(analysis(results)),
+        lambda results: import_module("posefit_reproduce.sapso.figures").paper_figures(analysis(results)),
     )
 
 
@@ -119,8 +117,6 @@ def patent_experiment(scale: Any) -> "Experiment":
     from posefit_reproduce.vsmm.tables import patent_tables
 
     def figures(results: Any) -> Any:
-        from posefit_reproduce.vsmm.figures import patent_figures
+        return import_module("posefit_reproduce.vsmm.figures").patent_figures(results)  # matplotlib may be missing
 
-        return patent_figures(results)
-
-    return Experiment(list(scale.runs), perform, patent_tables, figures)
+    return Experiment([*scale.runs], perform, patent_tables, figures)

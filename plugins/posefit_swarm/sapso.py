@@ -82,21 +82,30 @@ class SAPSO:
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the moves by their costs (N,), remember the bests, cool, and move on."""
         check_tell(self.waiting, proposals, costs)
-        with np.errstate(invalid="ignore"):  # infinity less infinity; nan is never accepted
-            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))  # Metropolis' criterion
-        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))  # SAPSO A1.2d
-        self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
-        better = self.cost < self.pbest_cost  # SAPSO A1.2b
-        self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
+        self.accept(costs)
         if self.c > 0:  # the first evaluation is no move
             self.T *= self.gamma  # SAPSO A1.2e
         if self.c < self.C:
             self.v, self.moved = redrawn(self.x, self.step, lambda _, x: self.space.feasible(x), REDRAWS)
         self.c, self.waiting = self.c + 1, 0
 
+    def accept(self, costs: Array) -> int:
+        """Accept or refuse the moves by their costs (N,), remember the bests, and return how many are accepted."""
+        with np.errstate(invalid="ignore", over="ignore"):  # infinity less infinity; nan is never accepted
+            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))  # Metropolis' criterion
+        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))  # SAPSO A1.2d
+        self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
+        better = self.cost < self.pbest_cost  # SAPSO A1.2b
+        self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
+        return int(accepted.sum())
+
+    def inertia(self) -> float:
+        """Return omega of this iteration."""
+        return inertia_at(self.c, self.C, self.A)
+
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move."""
-        x, gbest, omega = self.x[rows], self.pbest[self.pbest_cost.argmin()], inertia_at(self.c, self.C, self.A)
+        x, gbest, omega = self.x[rows], self.pbest[self.pbest_cost.argmin()], self.inertia()
         phi1, phi2 = self.acceleration * self.rng.random((2, *x.shape))  # Interpretation S8
         to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
         v = omega * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest  # SAPSO (1)

@@ -1,4 +1,4 @@
-"""Groups of models, which change into each other, and the most probable one. VSMM steps 4 and 5.
+"""Groups of models, which switch between each other, and the most probable one. VSMM steps 4 and 5.
 
 A TOML file (Interpretation V1) holds `stay`, a table `groups` of names and their models, and a table `neighbours` of
 models and those that they change into. It may hold a table `activities` of names and their models: the labels of

@@ -4,8 +4,10 @@ Errors and gates are in legs (hip to ankle, projected at the person's depth), wh
 """
 
 import json
+from collections.abc import Callable
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,30 +21,47 @@ _TORSO = np.array([AT[name] for name in BODY])
 _TIPS = np.array([AT[name] for name in ("head", "left hand", "right hand", "left foot", "right foot")])
 _RINGS = np.array([0.8, 1.0, 1.2])  # radii of the head
 ONE_CROSSING = 2.0  # pixels: what is nearer together is one crossing of the skeleton line
+GATE, NO_GATE = (0.35, 1.2), (1e3, 1e3)  # legs: the limits of a point's gate, and a gate that is none
+
+Indices = NDArray[np.intp]
+Pairs = Callable[[Array], tuple[Indices, Indices]]  # rows and columns, by distances (n, m)
+Crossings = Callable[[Array, Array], Indices]  # of two knees, by distances (2, n) and places along the line (n,)
+
+
+class Rules(NamedTuple):
+    """How points are detected, and how far a detection is trusted. Interpretations V8 and V15."""
+
+    bias: Array  # (17, 2) legs, detected less true
+    deviation: Array  # (17, 2) legs, around the bias
+    pairs: Pairs  # of limbs and end points
+    crossings: Crossings
+    gate: tuple[float, float]  # legs: a point's gate is between these
+    max_distance: float  # squared standard deviations in the image: a detection farther off is rejected
+    min_confidence: float  # a lower one counts as this one where variances are divided by it
 
 
 @cache
-def rule_errors(plain: bool = False) -> tuple[Array, Array]:
-    """Return the bias (17, 2) of the rules, detected less true, and the deviation (17, 2) around it, both in legs.
+def rules(patent: bool = False) -> Rules:
+    """Return the rules by default or to the patent's letter, with the errors that make_joint_errors.py measured.
 
-    docs/studies/make_joint_errors.py measured them. Plain ones are unbiased, and those of the torso are the root's.
+    The patent's are unbiased, those of the torso are the root's, and neither gate nor confidence counts.
     """
     stored = json.loads((files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
-    if plain:  # Interpretation V8
-        deviation[_TORSO], bias = deviation[AT["root"]], np.zeros_like(bias)
-    return bias, deviation
+    if not patent:
+        return Rules(bias, deviation, optimal_pairs, nearest_crossings, GATE, 16.0, 0.05)
+    deviation[_TORSO] = deviation[AT["root"]]
+    return Rules(np.zeros_like(bias), deviation, nearest_pairs, two_crossings, NO_GATE, np.inf, 1.0)
 
 
 def detect(
-    lines: Lines, expected: Array, gates: Array, leg: float, head: float, bias: Array, nearest: bool = False
+    lines: Lines, expected: Array, gates: Array, leg: float, head: float, rules: Rules
 ) -> tuple[Array, Array, int]:
     """Return the points (17, 2) of a silhouette, the confidence (17,), 0 to 1, and how many end points are unassigned.
 
     They are pixels near where they are expected (17, 2); one that is not detected is there, with a confidence of 0.
     What is farther away than a point's gate (17,) in pixels is another one. `leg` and `head` are the lengths of a leg
-    and of the head's radius in pixels; `bias` (17, 2) in legs is taken out; `nearest` is the patent's assignment of
-    end points and crossings.
+    and of the head's radius in pixels.
     """
     points, confidence = expected.copy(), np.zeros(len(POINTS))
 
@@ -54,18 +73,19 @@ def detect(
     centre = _head(lines, expected[AT["head"]], head, gates[AT["head"]])
     if centre is not None:
         points[AT["head"]], confidence[AT["head"]] = centre
-    tips, unassigned = _tips(lines.ends, expected[_TIPS], gates[_TIPS], nearest)
+    tips, unassigned = _tips(lines.ends, expected[_TIPS], gates[_TIPS], rules.pairs)
     for name, end in tips.items():  # VSMM 2.4
         place(name, end)
-    points -= bias * leg * (confidence > 0.0)[:, None]
+    bias = rules.bias * leg
+    points -= bias * (confidence > 0.0)[:, None]
     points[_TORSO] = expected[_TORSO] + points[AT["root"]] - expected[AT["root"]]  # VSMM 2.3
     confidence[_TORSO] = 1.0
     elbows = {f"{side} elbow": _elbow(lines, points, confidence, expected, side, gates) for side in ("left", "right")}
-    knees = _knees(lines, points, confidence, expected, gates, nearest)
+    knees = _knees(lines, points, confidence, expected, gates, rules.crossings)
     for name, point in {**elbows, **knees}.items():
         if point is not None:
             place(name, point)
-            points[AT[name]] -= bias[AT[name]] * leg
+            points[AT[name]] -= bias[AT[name]]
     return points, confidence, unassigned
 
 
@@ -87,31 +107,36 @@ def _head(lines: Lines, expected: Array, radius: float, gate: float) -> tuple[Ar
     return centre, float(min(1.0, counts.max() / (np.pi * radius)))
 
 
-def _tips(ends: Array, expected: Array, gates: Array, nearest: bool) -> tuple[dict[str, Array], int]:
-    """Return which end points (n, 2) are hands and feet, and how many are unassigned. Interpretation V15.
+def _tips(ends: Array, expected: Array, gates: Array, pairs_of: Pairs) -> tuple[dict[str, Array], int]:
+    """Return which end points (n, 2) are hands and feet, and how many are unassigned.
 
-    Each belongs to one: so that all are near together, or the nearest pair first. The head takes part, since the
-    skeleton line ends in it too.
+    The head takes part, since the skeleton line ends in it too.
     """
-    from scipy.optimize import linear_sum_assignment  # half a second to import
-
     if not len(ends):
         return {}, 0
     distances = _distances(expected, ends) / gates[:, None]
-    rows, columns = _nearest_pairs(distances) if nearest else linear_sum_assignment(np.minimum(distances, 1.0))
-    pairs = [(row, column) for row, column in zip(rows, columns, strict=True) if distances[row, column] < 1.0]
+    pairs = [pair for pair in zip(*pairs_of(distances), strict=True) if distances[pair] < 1.0]
     tips = {POINTS[_TIPS[row]]: ends[column] for row, column in pairs if _TIPS[row] != AT["head"]}
     return tips, len(ends) - len(pairs)
 
 
-def _nearest_pairs(distances: Array) -> NDArray[np.intp]:
-    """Return rows and columns (2, k) of pairs by distances (n, m), the nearest first, none of them twice."""
+def optimal_pairs(distances: Array) -> tuple[Indices, Indices]:
+    """Return rows and columns of pairs by distances (n, m), so that the sum is smallest; above 1 all are as far."""
+    from scipy.optimize import linear_sum_assignment  # half a second to import
+
+    rows, columns = linear_sum_assignment(np.minimum(distances, 1.0))
+    return rows, columns
+
+
+def nearest_pairs(distances: Array) -> tuple[Indices, Indices]:
+    """Return rows and columns of pairs by distances (n, m), the nearest first, none of them twice."""
     pairs: list[tuple[int, int]] = []
     for place in distances.argsort(axis=None, kind="stable"):
         row, column = divmod(int(place), distances.shape[1])
         if not any(row == first or column == second for first, second in pairs):
             pairs.append((row, column))
-    return np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    rows, columns = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    return rows, columns
 
 
 def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side: str, gates: Array) -> Array | None:
@@ -128,13 +153,9 @@ def _elbow(lines: Lines, points: Array, confidence: Array, expected: Array, side
 
 
 def _knees(
-    lines: Lines, points: Array, confidence: Array, expected: Array, gates: Array, nearest: bool = False
+    lines: Lines, points: Array, confidence: Array, expected: Array, gates: Array, crossings_of: Crossings
 ) -> dict[str, Array]:
-    """Return where the parallel to the line between the feet, through the middle of the legs, crosses the skeleton.
-
-    Each knee is the crossing that is nearest to it; with `nearest` they are two crossings, also where both knees are
-    expected near one.
-    """
+    """Return where the parallel to the line between the feet, through the middle of the legs, crosses the skeleton."""
     left, right = AT["left foot"], AT["right foot"]
     along = points[right] - points[left]
     length = float(np.linalg.norm(along))
@@ -147,19 +168,26 @@ def _knees(
         return {}
     names = ("left knee", "right knee")
     distances = _distances(expected[[AT[name] for name in names]], crossings)
-    chosen = distances.argmin(axis=1)
-    if nearest:
-        together = distances[0][:, None] + distances[1]
-        order, along = (crossings @ along).argsort(), crossings @ along / length
-        groups = np.empty(len(order))
-        groups[order] = np.append(0.0, (np.diff(along[order]) > ONE_CROSSING).cumsum())
-        together[groups[:, None] == groups] = np.inf
-        chosen = np.array(np.unravel_index(together.argmin(), together.shape))
+    chosen = crossings_of(distances, crossings @ along / length)
     reached = distances[[0, 1], chosen] < gates[[AT[name] for name in names]]
     knees = {name: crossings[k] for name, k, near in zip(names, chosen, reached, strict=True) if near}
     if len(knees) == 2 and np.linalg.norm(knees["left knee"] - knees["right knee"]) < ONE_CROSSING:
         return {}  # one crossing is not two knees
     return knees
+
+
+def nearest_crossings(distances: Array, _places: Array) -> Indices:
+    """Return the crossing that is nearest to each knee (2,)."""
+    return np.asarray(distances.argmin(axis=1))
+
+
+def two_crossings(distances: Array, places: Array) -> Indices:
+    """Return two different crossings (2,) that are nearest together, also where both knees are expected near one."""
+    together, order = distances[0][:, None] + distances[1], places.argsort()
+    groups = np.empty(len(order))
+    groups[order] = np.append(0.0, (np.diff(places[order]) > ONE_CROSSING).cumsum())
+    together[groups[:, None] == groups] = np.inf
+    return np.array(np.unravel_index(together.argmin(), together.shape))
 
 
 ACCELERATION = 2.0  # pixels a frame squared: the deviation of a joint's acceleration

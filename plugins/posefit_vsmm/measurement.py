@@ -4,7 +4,7 @@ A validation gate on the squared Mahalanobis distance decides which detections a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -15,17 +15,13 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES
 from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import detect, rule_errors
+from posefit_vsmm.joints import Rules, detect, rules
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import Lines
 from posefit_vsmm.state import ENDS, ERROR, DependentJoints, decode, differentiate
 
 MIN_DEPTH = 0.05  # metres: a smaller distance to the camera counts as this one
 GATE_DEVIATIONS = 3.0  # the gate around where a point is expected, in standard deviations
-MIN_GATE, MAX_GATE = 0.35, 1.2  # legs: between these
-NO_GATE = 1e3  # legs: a gate that is none
-MAX_DISTANCE = 16.0  # squared standard deviations in the image: a detection farther off is rejected
-MIN_CONFIDENCE = 0.05  # a lower one counts as this one
 KNOWN_VARIANCE = 0.002**2  # square metres: of a translation that is known
 
 
@@ -73,7 +69,7 @@ class JointCameras:
     body: Body
     cameras: Sequence[Camera]
     dependent: DependentJoints
-    patent: bool = False
+    rules: Rules = field(default_factory=rules)
     joint_noise: float = 1.0
 
     def project(self, camera: Camera, states: Array) -> tuple[Array, Array]:
@@ -108,13 +104,11 @@ class JointCameras:
         leg = leg_of(self.body.skeleton) * metre
         covariances = jacobian @ spread @ jacobian.swapaxes(1, 2)
         gates = GATE_DEVIATIONS * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).max(axis=1))
-        gates = np.full_like(gates, NO_GATE * leg) if self.patent else np.clip(gates, MIN_GATE * leg, MAX_GATE * leg)
-        bias, deviation = rule_errors(self.patent)
-        head = head_radius(self.body) * metre
-        points, confidence, unassigned = detect(lines, pixels, gates, leg, head, bias, nearest=self.patent)
-        variances = self.joint_noise * (deviation * leg) ** 2
-        if not self.patent:  # Interpretation V8
-            variances = variances / np.maximum(confidence, MIN_CONFIDENCE)[:, None]
+        low, high = self.rules.gate
+        gates, head = np.clip(gates, low * leg, high * leg), head_radius(self.body) * metre
+        points, confidence, unassigned = detect(lines, pixels, gates, leg, head, self.rules)
+        variances = self.joint_noise * (self.rules.deviation * leg) ** 2
+        variances = variances / np.maximum(confidence, self.rules.min_confidence)[:, None]  # Interpretation V8
         if landmarks is not None and landmarks.any():
             placed, trust = with_sides(landmarks, pixels)
             rules = (confidence > 0.0)[:, None] / variances
@@ -125,7 +119,7 @@ class JointCameras:
         residuals = points - pixels
         innovations = covariances + variances[:, :, None] * np.eye(2)
         distances = (residuals * np.linalg.solve(innovations, residuals[..., None])[..., 0]).sum(axis=1)
-        rejected = (distances >= MAX_DISTANCE) & (confidence > 0.0) & (not self.patent)
+        rejected = (distances >= self.rules.max_distance) & (confidence > 0.0)
         confidence = np.where(rejected, 0.0, confidence)
         return JointMeasurement(points, confidence, variances, unassigned + int(np.count_nonzero(rejected)))
 

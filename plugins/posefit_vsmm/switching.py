@@ -69,37 +69,121 @@ def normalised(belief: Belief) -> Belief:
     return replace(belief, log_probabilities=probabilities - np.logaddexp.reduce(probabilities))
 
 
+class DefaultForm:
+    """The default: the filter holds covariances (33, 33) of errors. Interpretations V4 and V11."""
+
+    def first_cycles(self, models: MotionModels) -> int:
+        """Return after how many cycles over all models a group is chosen."""
+        return max(FIRST_CYCLES, round(FIRST_SECONDS * FPS / models.share))
+
+    def imm(self, models: MotionModels, transition: Array) -> IMM:
+        """Return the filter over some models."""
+        return IMM(models.predict, transition, QUATERNIONS)
+
+    def covariances(self, states: Array, covariance: Array) -> Array:
+        """Return the covariances of states (r, 43), each (33, 33) of its error, as the filter holds them."""
+        return np.tile(covariance, (len(states), 1, 1))
+
+    def fused(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return the filter's state as a state (43,) with the covariance (33, 33) of its error."""
+        return state, covariance
+
+    def measure(self, measure: Measure) -> Measure:
+        """Return a measurement whose Jacobians are by what the filter's covariances are of."""
+        return measure
+
+    def cycle_over_both(self, switching: "Switching", before: Belief, candidate_group: str, measure: Measure) -> Belief:
+        """Return the belief after the cycle, run again over both groups; new models had a probability of 0."""
+        old, fused = switching.active, switching.imm.fused(before)
+        switching.bring_in(candidate_group)
+        new = dict.fromkeys(switching.active, (*fused, -np.inf))
+        return switching.imm.cycle(regrouped(before, old, switching.active, new), measure)
+
+
+class PatentForm:
+    """To the patent's letter: the filter holds covariances (43, 43) of numbers, and starts new models by step 8."""
+
+    def first_cycles(self, models: MotionModels) -> int:
+        """Return ten, whatever the models."""
+        return FIRST_CYCLES
+
+    def imm(self, models: MotionModels, transition: Array) -> IMM:
+        """Return the filter over some models, with residuals at their mixed states."""
+        return IMM(models.predict_numbers, transition, at_mixed=True)
+
+    def covariances(self, states: Array, covariance: Array) -> Array:
+        """Return those of the numbers (r, 43, 43)."""
+        return lifted(states, covariance)
+
+    def fused(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """Return the unit state, and what its covariance is of errors."""
+        change = inverse_tangents(unit(state)[None])[0]
+        return unit(state), change @ covariance @ change.T
+
+    def measure(self, measure: Measure) -> Measure:
+        """Return a measurement with Jacobians by numbers."""
+
+        def by_numbers(states: Array) -> Measurement:
+            measurement = measure(unit(states))
+            return measurement._replace(jacobians=measurement.jacobians @ inverse_tangents(unit(states)))
+
+        return by_numbers
+
+    def cycle_over_both(self, switching: "Switching", before: Belief, candidate_group: str, measure: Measure) -> Belief:
+        """Return the belief after the cycle, run again over both groups and judged."""
+        old = switching.active
+        both = self.joined(switching, before, candidate_group)
+        return switching.decided(self.beside(switching, old).cycle(both, measure))
+
+    def joined(self, switching: "Switching", belief: Belief, candidate_group: str) -> Belief:
+        """Return a belief with another group's models beside those in force. VSMM 8."""
+        old, models, (state, _) = switching.active, switching.models, switching.fused(belief)
+        switching.bring_in(candidate_group)
+        top = belief.log_probabilities.max()  # VSMM 8.1
+        noises = dict(zip(models.names, models.noises, strict=True))
+        poses = {name: models.captured_nearest(name, state) for name in switching.active if name not in old}  # VSMM 8.3
+        new = {name: (pose, lifted(pose[None], noises[name])[0], top) for name, pose in poses.items()}
+        return normalised(regrouped(belief, old, switching.active, new))
+
+    def beside(self, switching: "Switching", old: Sequence[str]) -> IMM:
+        """Return the filter in which the prediction of models that are not `old` has their noise as its covariance."""
+        imm, rows = switching.imm, [k for k, name in enumerate(switching.active) if name not in old]
+        noises = switching.models.of(switching.active).noises
+
+        def predict(states: Array, covariances: Array) -> tuple[Array, Array]:
+            states, covariances = imm.predict(states, covariances)
+            covariances[rows] = lifted(states[rows], noises[rows])  # VSMM 8.2
+            return states, covariances
+
+        return replace(imm, predict=predict)
+
+
+Form = DefaultForm | PatentForm
+
+
 @final
 class Switching:
-    """The models in force; at first all of them.
-
-    The default's filter holds covariances (33, 33) of errors, the patent's (43, 43) of numbers. Interpretation V4.
-    """
+    """The models in force; at first all of them."""
 
     def __init__(
-        self, models: MotionModels, topology: Topology, *, patent: bool = False, structure: Structure = "variable"
+        self, models: MotionModels, topology: Topology, form: Form | None = None, structure: Structure = "variable"
     ) -> None:
         self.topology, self.groups = topology, topology.groups
         self.models = models.of(topology.union(topology.groups))
-        self._patent, self._structure, self._filter = patent, structure, lru_cache(self._filter_of)
-        second = round(FIRST_SECONDS * FPS / self.models.share)
-        self._first_cycles = FIRST_CYCLES if patent else max(FIRST_CYCLES, second)
+        self.form, self._structure, self._filter = form or DefaultForm(), structure, lru_cache(self._filter_of)
         self.restart()
 
     def restart(self) -> None:
         """Bring all models into force; a group will be chosen among them."""
         self.active = self.models.names
         self.group: str | None = None
-        self.newcomer: str | None = None
-        self._log_ratio = 0.0  # of the likelihoods since the newcomer came, new to old
+        self.candidate_group: str | None = None
+        self._log_ratio = 0.0  # of the likelihoods since the candidate_group came, new to old
         self._cycles = 0
         self._points: list[Array] = []
 
     def _filter_of(self, names: tuple[str, ...]) -> IMM:
-        models, transition = self.models.of(names), self.topology.transition(names)
-        if self._patent:
-            return IMM(models.predict_numbers, transition, at_mixed=True)
-        return IMM(models.predict, transition, QUATERNIONS)
+        return self.form.imm(self.models.of(names), self.topology.transition(names))
 
     @property
     def imm(self) -> IMM:
@@ -108,19 +192,11 @@ class Switching:
 
     def start(self, state: Array, covariance: Array) -> Belief:
         """Return the belief in one state (43,) with a covariance (33, 33)."""
-        return start(state, self._lifted(state[None], covariance)[0], len(self.active))
-
-    def _lifted(self, states: Array, covariance: Array) -> Array:
-        """Return the covariances of states (r, 43), each (33, 33) of its error, as the filter holds them."""
-        return lifted(states, covariance) if self._patent else np.tile(covariance, (len(states), 1, 1))
+        return start(state, self.form.covariances(state[None], covariance)[0], len(self.active))
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state (43,), and the covariance (33, 33) of its error, that stand for all models."""
-        state, covariance = self.imm.fused(belief)
-        if not self._patent:
-            return state, covariance
-        change = inverse_tangents(unit(state)[None])[0]
-        return unit(state), change @ covariance @ change.T
+        return self.form.fused(*self.imm.fused(belief))
 
     def predicted(self, belief: Belief) -> tuple[Array, Array]:
         """Return the state (43,) and covariance (33, 33) a frame later, by the most probable model."""
@@ -131,25 +207,16 @@ class Switching:
 
     def widened(self, belief: Belief, variances: Array) -> Belief:
         """Return a belief whose errors have larger variances, by (33,)."""
-        extra = self._lifted(unit(belief.states), np.diag(variances))
+        extra = self.form.covariances(unit(belief.states), np.diag(variances))
         return replace(belief, covariances=belief.covariances + extra)
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief after one more measurement of the same frame; the models' probabilities stay."""
-        return self.imm.updated(belief, self._lifting(measure))
-
-    def _lifting(self, measure: Measure) -> Measure:
-        """Return a measurement whose Jacobians are by what the filter's covariances are of."""
-
-        def by_numbers(states: Array) -> Measurement:
-            measurement = measure(unit(states))
-            return measurement._replace(jacobians=measurement.jacobians @ inverse_tangents(unit(states)))
-
-        return by_numbers if self._patent else measure
+        return self.imm.updated(belief, self.form.measure(measure))
 
     def cycle(self, before: Belief, measure: Measure, points: Array) -> Belief:
         """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame."""
-        self._points, measure = [*self._points, points][-3:], self._lifting(measure)
+        self._points, measure = [*self._points, points][-3:], self.form.measure(measure)
         after = self.imm.cycle(before, measure)
         self._cycles += 1
         likely = most_probable(self.groups, self.active, after.probabilities)  # VSMM 5
@@ -157,59 +224,33 @@ class Switching:
             self.group = likely
             return after
         if self.group is None:
-            return after if self._cycles < self._first_cycles else self._only(likely, after)
-        if self.newcomer is not None:
+            return after if self._cycles < self.form.first_cycles(self.models) else self._only(likely, after)
+        if self.candidate_group is not None:
             return self.decided(after)
         number = requested_group(self._points)
-        if number is None or number >= len(self.groups) or (newcomer := tuple(self.groups)[number]) == self.group:
+        if (
+            number is None
+            or number >= len(self.groups)
+            or (candidate_group := tuple(self.groups)[number]) == self.group
+        ):
             return after
-        if self._patent:
-            old = self.active
-            both = self.joined(before, newcomer)
-            return self.decided(self._beside(old).cycle(both, measure))  # run again, and judged
-        # Interpretation V11: the cycle is run again over both groups; new models had a probability of 0
-        old, fused = self.active, self.imm.fused(before)
-        self.bring_in(newcomer)
-        return self.imm.cycle(
-            regrouped(before, old, self.active, dict.fromkeys(self.active, (*fused, -np.inf))), measure
-        )
+        return self.form.cycle_over_both(self, before, candidate_group, measure)
 
-    def _beside(self, old: Sequence[str]) -> IMM:
-        """Return the filter in which the prediction of models that are not `old` has their noise as its covariance."""
-        imm, rows = self.imm, [k for k, name in enumerate(self.active) if name not in old]
-        noises = self.models.of(self.active).noises
-
-        def predict(states: Array, covariances: Array) -> tuple[Array, Array]:
-            states, covariances = imm.predict(states, covariances)
-            for k in rows:
-                covariances[k] = self._lifted(states[k : k + 1], noises[k])[0]  # VSMM 8.2
-            return states, covariances
-
-        return replace(imm, predict=predict)
-
-    def joined(self, belief: Belief, newcomer: str) -> Belief:
-        """Return a belief with another group's models beside those in force, as the patent starts them. VSMM 8."""
-        old, (state, _) = self.active, self.fused(belief)
-        self.bring_in(newcomer)
-        top = belief.log_probabilities.max()  # VSMM 8.1
-        noises = dict(zip(self.models.names, self.models.noises, strict=True))
-        poses = {name: self.models.captured_nearest(name, state) for name in self.active if name not in old}  # VSMM 8.3
-        new = {name: (pose, self._lifted(pose[None], noises[name])[0], top) for name, pose in poses.items()}
-        return normalised(regrouped(belief, old, self.active, new))
-
-    def bring_in(self, newcomer: str) -> None:
+    def bring_in(self, candidate_group: str) -> None:
         """Bring another group into force beside the present one."""
-        self.newcomer, self._log_ratio = newcomer, 0.0
-        self.active = self.topology.union([self.group or newcomer, newcomer])  # VSMM 8.4
+        self.candidate_group, self._log_ratio = candidate_group, 0.0
+        self.active = self.topology.union([self.group or candidate_group, candidate_group])  # VSMM 8.4
 
     def decided(self, after: Belief) -> Belief:
         """Return the belief after a cycle over both groups: over one of them as soon as the other has to end.
 
         The likelihoods' ratio is that of all cycles since the new group came. Interpretation V12.
         """
-        assert self.newcomer is not None
+        assert self.candidate_group is not None
         assert self.group is not None
-        old, new = ([self.active.index(name) for name in self.groups[group]] for group in (self.group, self.newcomer))
+        old, new = (
+            [self.active.index(name) for name in self.groups[group]] for group in (self.group, self.candidate_group)
+        )
 
         def log_ratio(logarithms: Array) -> float:
             return float(np.logaddexp.reduce(logarithms[new]) - np.logaddexp.reduce(logarithms[old]))
@@ -218,10 +259,10 @@ class Switching:
         smaller = min(log_ratio(after.log_probabilities), self._log_ratio)
         if smaller < np.log(ENDED):
             return self._only(self.group, after)
-        return self._only(self.newcomer, after) if smaller > 0.0 else after
+        return self._only(self.candidate_group, after) if smaller > 0.0 else after
 
     def _only(self, group: str, belief: Belief) -> Belief:
         """Return the belief over one group, which alone stays in force."""
         old, self.active = self.active, self.groups[group]
-        self.group, self.newcomer = group, None
+        self.group, self.candidate_group = group, None
         return normalised(regrouped(belief, old, self.active, {}))

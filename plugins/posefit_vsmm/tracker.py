@@ -15,13 +15,13 @@ from posefit.registry import registry
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter
+from posefit_vsmm.joints import JointFilter, rules
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
-from posefit_vsmm.preprocess import lines_of
+from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.search import Search, aligned_costs
 from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, decode, encode, free_errors, minus, plus
-from posefit_vsmm.switching import Structure, Switching
+from posefit_vsmm.switching import DefaultForm, PatentForm, Structure, Switching
 
 # The first pose: typical poses at several yaws, then draws around the best so far
 YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # where the yaw is about known
@@ -47,13 +47,16 @@ class TrackFilter:
 
     def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
         task, library = tracker.task, tracker.library
-        self._task, self._search, self._rng, self._patent = task, tracker.search, rng, tracker.variant == "patent"
-        fps = CLIP_FPS if self._patent else task.fps  # Interpretation V6
+        self._task, self._search, self._rng = task, tracker.search, rng
+        patent = tracker.variant == "patent"
+        fps = CLIP_FPS if patent else task.fps  # Interpretation V6
         models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
-        self.switching = Switching(models, tracker.topology, patent=self._patent, structure=tracker.structure)
+        form = PatentForm() if patent else DefaultForm()
+        self.switching = Switching(models, tracker.topology, form, tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
-        self._cameras = JointCameras(task.body, task.cameras, self._dependent, self._patent, tracker.joint_noise)
-        self._recovers = not self._patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
+        self._cameras = JointCameras(task.body, task.cameras, self._dependent, rules(patent), tracker.joint_noise)
+        self._imputes = patent  # Interpretation V9
+        self._recovers = not patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
         self._belief: Belief | None = None
@@ -61,8 +64,8 @@ class TrackFilter:
 
     def frame(self, observation: Observation) -> Frame:
         """Return the next frame."""
-        start = time.perf_counter()
-        switching, usable = self.switching, observation.usable
+        start, self._evaluations = time.perf_counter(), 0
+        usable = observation.usable
         views = [lines_of(silhouette.mask) if usable else None for silhouette in observation.silhouettes]
         blind = all(lines is None for lines in views)
         self._blind_frames = self._blind_frames + 1 if blind else 0
@@ -72,51 +75,53 @@ class TrackFilter:
             pose, place = np.append(self._task.yaw or 0.0, np.zeros(65)), self._task.anchor
             if self._latest is not None:
                 pose, place = self._latest.pose, self._latest.translation
-            return self._frame(pose, place, observation, 0, {})
-        evaluations = self._start(observation) if self._belief is None else 0
-        belief = self._belief
-        assert belief is not None
-        expected, spread = switching.predicted(belief)
+            return self._frame(pose, place, observation, {})
+        belief, measured, details = self._detected(self._belief or self._start(observation), views, observation)
+        details["detection_seconds"] = time.perf_counter() - start
+        search = None if blind else self._search
+
+        def measure(states: Array) -> Measurement:
+            measurement = self._cameras.measure(states, measured, observation.translation)
+            if search is None:
+                return measurement
+            self._evaluations += len(states)
+            return measurement._replace(log_likelihoods=search.log_likelihoods(states, observation))
+
+        start = time.perf_counter()
+        self._belief = belief = self.switching.cycle(belief, measure, details["joints"][0])
+        state, spread = self.switching.fused(belief)
+        details["filter_seconds"] = time.perf_counter() - start
+        (pose,), (place,) = decode(state[None], self._dependent)
+        self._evaluations += 1  # that of the frame's own cost
+        if search is not None:
+            budget = self._task.evaluations - self._evaluations
+            result = search.best(state, spread, observation, budget, self._rng)
+            if result is not None:
+                pose, self._evaluations = result.pose, self._evaluations + result.evaluations
+                self._belief = self.switching.updated(belief, result.measure)
+                place = self.switching.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
+        return self._frame(pose, place, observation, details)
+
+    def _detected(
+        self, belief: Belief, views: Sequence[Lines | None], observation: Observation
+    ) -> tuple[Belief, list[JointMeasurement], dict[str, Any]]:
+        """Return the belief, wider where limbs are sought, what each camera measured, and the joints as details."""
+        expected, spread = self.switching.predicted(belief)
         measured = self._cameras.detect(views, expected, spread, observation.landmarks)
         if self._recovers and (extra := self._missing_variances(measured)).any():
-            belief = switching.widened(belief, extra)
+            belief = self.switching.widened(belief, extra)
             measured = self._cameras.detect(views, expected, spread + np.diag(extra), observation.landmarks)
         self._joint_filters = self._joint_filters or [JointFilter(view.points) for view in measured]
-        measured_or_predicted = [
+        imputed = [
             view.imputed(joint_filter.follow(view.points, view.confidence, view.variances))
             for view, joint_filter in zip(measured, self._joint_filters, strict=True)
         ]
-        joints = np.array([view.points for view in measured_or_predicted])
-        details: dict[str, Any] = {"joints": joints, "confidence": np.array([view.confidence for view in measured])}
-        details["detection_seconds"] = time.perf_counter() - start
-        if self._patent:  # Interpretation V9
-            measured = measured_or_predicted
+        joints, confidence = [view.points for view in imputed], [view.confidence for view in measured]
+        details = {"joints": np.array(joints), "confidence": np.array(confidence)}
+        return belief, imputed if self._imputes else measured, details
 
-        def measure(states: Array) -> Measurement:
-            nonlocal evaluations
-            measurement = self._cameras.measure(states, measured, observation.translation)
-            if self._search is None or blind:
-                return measurement
-            evaluations += len(states)
-            return measurement._replace(log_likelihoods=self._search.log_likelihoods(states, observation))
-
-        filter_start = time.perf_counter()
-        belief = switching.cycle(belief, measure, joints[0])
-        state, spread = switching.fused(belief)
-        details["filter_seconds"] = time.perf_counter() - filter_start
-        (pose,), (place,) = decode(state[None], self._dependent)
-        if self._search is not None and not blind:
-            budget = self._task.evaluations - evaluations - 1
-            result = self._search.best(state, spread, observation, budget, self._rng)
-            if result is not None:
-                pose, evaluations = result.pose, evaluations + result.evaluations
-                belief = switching.updated(belief, result.measure)
-                place = switching.fused(belief)[0][:3]  # one frame alone hardly shows the depth
-        self._belief = belief
-        return self._frame(pose, place, observation, evaluations + 1, details)
-
-    def _start(self, observation: Observation) -> int:
-        """Take the state (43,) that fits this frame best, with all models equally probable; return its evaluations.
+    def _start(self, observation: Observation) -> Belief:
+        """Return the belief in the state (43,) that fits this frame best, with all models equally probable.
 
         Typical poses of the models are tried at several yaws, and then draws around the best so far.
         """
@@ -147,9 +152,9 @@ class TrackFilter:
             evaluations += DRAWS
         self.switching.restart()
         deviations = INITIAL_DEVIATIONS * np.maximum(self._free, STIFF)
-        self._belief = self.switching.start(best, np.diag(deviations**2))
         self._bad_frames, self._missing = 0, dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0)
-        return evaluations
+        self._evaluations = evaluations
+        return self.switching.start(best, np.diag(deviations**2))
 
     def _missing_variances(self, measured: Sequence[JointMeasurement]) -> Array:
         """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
@@ -163,9 +168,7 @@ class TrackFilter:
                 extra[FIRST_BONE:].reshape(-1, 3)[BONES.index(side[0] + bone)] = MISSING_DEVIATION**2
         return np.asarray(extra * np.maximum(self._free, STIFF) ** 2)
 
-    def _frame(
-        self, pose: Array, place: Array, observation: Observation, evaluations: int, details: Mapping[str, Any]
-    ) -> Frame:
+    def _frame(self, pose: Array, place: Array, observation: Observation, details: Mapping[str, Any]) -> Frame:
         """Return a frame with its cost, the label of its activity, and the models in its details."""
         task, belief, switching = self._task, self._belief, self.switching
         if observation.translation is not None:
@@ -175,14 +178,14 @@ class TrackFilter:
         if not self._blind_frames:
             iou = metrics.iou(np.array(known_views(list(counts[:, 0]), observation.silhouettes))).mean()
             self._bad_frames = self._bad_frames + 1 if iou < LOST_IOU else 0
-        models = {name: getattr(switching, name) for name in ("group", "newcomer", "groups")}
+        models = {name: getattr(switching, name) for name in ("group", "candidate_group", "groups")}
         models |= {"lost": belief is None, "models": switching.active}
         activity = None
         if belief is not None:
             models |= {"probabilities": belief.probabilities}
             activity = most_probable(switching.topology.activities, switching.active, belief.probabilities)
         cost = float(costs[0])
-        figures = pose, place, cost, counts[:, 0], evaluations, np.array([[evaluations, cost]])
+        figures = pose, place, cost, counts[:, 0], self._evaluations, np.array([[self._evaluations, cost]])
         self._latest = Frame(*figures, details={**details, **models}, activity=activity)
         return self._latest
 

@@ -54,7 +54,10 @@ class _Results(_Messages):
 
 
 def open_streams() -> None:
-    """Open the standard streams that are closed, on nothing, and let no full one end the work."""
+    """Open the standard streams that are closed, on nothing, and let no full one end the work.
+
+    An open stream is opened again on the same buffer, as the class of a stream cannot be changed.
+    """
     for number, (name, kind) in enumerate((("stdin", None), ("stdout", _Results), ("stderr", _Messages))):
         stream = getattr(sys, name)
         if stream is None and os.open(os.devnull, os.O_RDWR) == number:  # the lowest one that is free

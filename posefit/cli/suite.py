@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
-    from posefit.suites.running import SuiteRun
+    from posefit.suites.running import SuiteRun, SuiteScore
 
 
 @click.group(cls=Group, invoke_without_command=True)
@@ -125,10 +125,32 @@ def _numbers(start: int | None, stop: int | None) -> range:
 def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
     from posefit.report.export import write_iohprofiler
-    from posefit.suites.running import score_lines, suite_scores
+    from posefit.suites.running import suite_scores
 
     scores = suite_scores(runs)
     if out is not None:
         write_iohprofiler(runs, out)
         say(f"written to {out}: IOHprofiler's files")
-    print_result(score_lines(scores), [asdict(one) for one in scores], as_json)
+    print_result(_score_lines(scores), [asdict(one) for one in scores], as_json)
+
+
+def _score_lines(scores: "Sequence[SuiteScore]") -> list[str]:
+    """Return the lines of a table of scores, for a terminal: where runs end, and how soon they reach targets."""
+    from posefit.suites.running import ALL, SHOWN, budgets_differ
+
+    budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
+    labels = [
+        one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
+    ]
+    wide, heads = max(24, *map(len, labels)), [f"ERT +{above:g}" for above in SHOWN]
+    lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
+    for one, label in zip(scores, labels, strict=True):
+        function = one.name if one.function == ALL else f"{one.function} {one.name}"
+        times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
+        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
+        lines.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}".rstrip())
+    return lines
+
+
+def _cells(texts: Sequence[str]) -> str:
+    return "".join(f" {text:>10}" for text in texts)

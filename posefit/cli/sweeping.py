@@ -23,7 +23,6 @@ LINES = 1000  # that are printed at a time
     is_flag=True,
     help="Print what cells there are, and run none; with --json each cell.",
 )
-@click.option("--keep-old", is_flag=True, help="Rows of another version of posefit or a plugin count, too.")
 @click.option("--retry-quarantined", is_flag=True, help="Try cells again that were quarantined.")
 @QUIET
 @JSON
@@ -33,7 +32,6 @@ def sweep(
     shard: str | None,
     dry_run: bool,
     retry_quarantined: bool,
-    keep_old: bool,
     quiet: bool,
     as_json: bool,
     **places: Any,
@@ -61,7 +59,7 @@ def sweep(
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
-        how = {"retry_quarantined": retry_quarantined, "keep_old": keep_old, "quiet": quiet}
+        how = {"retry_quarantined": retry_quarantined, "quiet": quiet}
         command.file_of(shard)
         cells, tell = Plan.read(plan), (lambda _: None) if quiet else say
         tally = command.swept(cells, out, start(), tell, shard=shard, **how)  # without an engine there is no folder

@@ -5,7 +5,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +13,9 @@ from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, o
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
+
+if TYPE_CHECKING:
+    from posefit.footage.source import Kind
 
 COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
 
@@ -75,7 +78,7 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progre
         raise InputError(f"SOURCE must be left out with --live, got {' '.join(options['source'])}")
     if useless := [name for name in ("force", "resume", "without_subject") if options[name]]:
         raise InputError(f"--{useless[0].replace('_', '-')} must be left out with --live")
-    given = _arguments({**options, "source": ("live.mp4",)})  # for the options of a segmenter
+    given = _arguments(options, "video")
     kept = {name: given[name] for name in given if name not in ("source", "out", "force", "resume")}
     frames, out = track_live(live, progress=shown, **kept), options["out"]
     summary = write_live(frames, out, (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None)
@@ -113,8 +116,9 @@ def _print(
 def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence[str], **options: Any) -> None:
     """Take the masks of one person out of a VIDEO before a still background."""
     from posefit.footage.extract import extract as run
+    from posefit.footage.source import kind_of
 
-    how = extraction_of(options, video, settings)
+    how = extraction_of(options, kind_of(video), settings)
     result = run(video, out, how, frames=frames, progress=progress)
     if result["guesses"]:
         say(f"guessed: {'; '.join(result['guesses'])}")
@@ -129,35 +133,36 @@ def extract(video: str, out: str, as_json: bool, frames: Any, settings: Sequence
     )
 
 
-def _arguments(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the keywords of `posefit.track` that the command's options stand for."""
+def _arguments(options: dict[str, Any], kind: "Kind | None" = None) -> dict[str, Any]:
+    """Return the keywords of `posefit.track` that the command's options stand for, for a source of a kind."""
     from posefit.footage.source import kind_of
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
     source = options["source"] = options["source"] or ("walk",)
-    options["extraction"] = extraction_of(options, source[0])
+    kind = kind or kind_of(source[0])
+    options["extraction"] = extraction_of(options, kind)
     if left_out := options.pop("without_subject"):
         chosen = TrackOptions(**{name: options[name] for name in ("method", "settings", "train")})
-        motion = source[0] if kind_of(source[0]) == "motion" else None
+        motion = source[0] if kind == "motion" else None
         options["train"] = without_subjects(completed(chosen, motion).train, left_out)
     return options
 
 
-def extraction_of(options: dict[str, Any], source: str, settings: Sequence[str] | None = None) -> Any:
+def extraction_of(options: dict[str, Any], kind: "Kind", settings: Sequence[str] | None = None) -> Any:
     """Return how the person is taken out of a video, by options that are taken out of them; None by default.
 
     `settings` are texts of the segmenter's settings; without them, those of `options` that begin with its name. Raises
     InputError where the options are given for another kind of source.
     """
     from posefit.footage.segmentation import Extraction, segmenter_name
-    from posefit.footage.source import kind_of, useless_for
+    from posefit.footage.source import useless_for
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
     given = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
     given = {name: value for name, value in given.items() if value is not None}
-    if (kind := kind_of(source)) not in ("video", "pictures"):
+    if kind not in ("video", "pictures"):
         for name, value in given.items():
             raise useless_for(kind, name, value, "video")
         return None

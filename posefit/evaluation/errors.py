@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array
-from posefit.evaluation.measures import Measure, Measures, Spread
+from posefit.evaluation.measures import MEASURES, Measure, Measures, Spread
 from posefit.fitting import metrics
 from posefit.fitting.prior import Prior
 from posefit.fitting.tracker import Frame, Observation
@@ -36,20 +36,20 @@ FRAME = {
     for measure in (
         Measure("frame", "frame", "", 0, "number of the frame in the footage, from 0"),
         Measure("seconds", "seconds", "s", 2, "time of the frame in the footage, from 0"),
-        Measure("cost", "cost", "", 2, "silhouette mismatch of the estimated pose, 0 to 100. SAPSO (4)"),
-        Measure("iou", "IoU", "", 3, "intersection over union of body and mask, the mean over the views"),
+        MEASURES["cost"],
+        MEASURES["iou"],
         Measure("usable", "usable", "", 0, "1 where the frame was searched, 0 where the pose was held"),
-        Measure("error_degrees", "error", "degrees", 2, "mean absolute difference of the 66 angles. SAPSO (8)"),
-        Measure("geodesic_degrees", "geodesic", "degrees", 2, "mean angle between true and estimated rotations"),
-        Measure("mpjpe_mm", "MPJPE", "mm", 0, "mean distance of the 27 joints, both roots at one point"),
-        Measure("pa_mpjpe_mm", "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation"),
+        MEASURES["error_degrees"],
+        MEASURES["geodesic_degrees"],
+        MEASURES["mpjpe_mm"],
+        MEASURES["pa_mpjpe_mm"],
         Measure("swapped", "swapped", "", 0, "1 where the frame is nearer to the truth when mirrored"),
         Measure(
             "unknown_sides", "sides unknown", "", 0, "1 where left and right are unknown; blank where not estimated"
         ),
         Measure("lost", "lost", "", 2, "probability that the frame is lost; blank where not estimated"),
         Measure("interval_mm", "80 % interval", "mm", 0, "its radius, the mean over joints; blank where not estimated"),
-        Measure("evaluations", "evaluations", "", 0, "poses whose cost was computed"),
+        MEASURES["evaluations"],
         Measure("wall_seconds", "time", "ms", 1, "that the estimate took, since that of the frame before", 1e3),
         Measure("activity", "activity", "", 0, "what the person does, a word; blank where not estimated"),
     )
@@ -117,7 +117,6 @@ def _iou(scene: Scene, frames: Sequence[Frame]) -> Array:
 def _errors(
     scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float
 ) -> tuple[Table, dict[str, Any]]:
-    """Return the columns and the measures that need a truth; none where it is unknown."""
     if scene.truth is None:
         return {}, {}
     truth, places, skeleton = scene.truth.poses, scene.truth.translations, scene.body.skeleton
@@ -196,7 +195,6 @@ def _by_level(frames: Sequence[NDArray[Any]]) -> dict[str, float] | None:
 
 
 def _steadiness(scene: Scene, frames: Sequence[Frame]) -> dict[str, Any]:
-    """Return the measures of how joints accelerate and standing feet slide."""
     joints, fps = scene.motion(frames).joints, scene.fps
     mean, true_joints = mean_known(acceleration(joints, fps)), None if scene.truth is None else scene.truth.joints
     true_mean = None if true_joints is None else mean_known(acceleration(true_joints, fps))

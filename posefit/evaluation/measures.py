@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-# Trivial methods that a track is held against, and how a table calls them. All have the true root and translation.
+# Trivial methods that a track is held against, and what a table calls them. All have the true root and translation.
 BASELINES = {
     "mean_pose": "mean training pose",
     "persistence": "first true pose, held",
@@ -18,7 +18,7 @@ BASELINES = {
 
 @dataclass(frozen=True)
 class Measure:
-    """What a figure is: how it is called, how it is shown, and what it means."""
+    """What a figure is: what it is called, how it is shown, and what it means."""
 
     name: str
     label: str
@@ -42,7 +42,6 @@ def _figure(*figure: Any) -> Any:
 
 
 def _share(label: str, meaning: str) -> Any:
-    """Return the field of a share, shown in percent."""
     return _figure(label, "%", 0, meaning, 100.0)
 
 

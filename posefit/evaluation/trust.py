@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.evaluation.errors import LOST, Table, mean_known
-from posefit.fitting.tracker import Frame
-from posefit.footage.quality import AROUND, LAG, changed_pixels
+from posefit.fitting.tracker import Frame, Observation
+from posefit.footage.quality import LAG, changed_pixels, moved_pixels
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import facing, mirrored_poses
@@ -121,20 +121,13 @@ def covered_pixels(image: Image, then: Image, body: Mask, observed: Mask, reach:
     """Return how many pixels that moved since another picture lie at the body, and how many there are.
 
     Only pixels as near as half of `reach`, the person's longer side in pixels, to the body or to what was
-    observed mask count; both masks are those of the two pictures together.
+    observed count; both masks are those of the two pictures together.
     """
-    left, top, width, height = cv2.boundingRect((body | observed).astype(np.uint8))
-    if not width:
+    region = body | observed
+    if not region.any():
         return 0, 0
-    far = round(AROUND * reach)
-    window = np.s_[max(0, top - far) : top + height + far, max(0, left - far) : left + width + far]
-    changed = changed_pixels(image, then)[window]
-    count = int(changed.sum())
-    if count <= MIN_MOVED * body.sum():
-        return 0, 0
-    width = 2 * max(1, round(CLOTHES * reach)) + 1
-    near = cv2.dilate(body[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
-    return int((changed & near).sum()), count
+    moved, inside = moved_pixels(changed_pixels(image, then), region, body, reach, CLOTHES)
+    return (inside, moved) if moved > MIN_MOVED * body.sum() else (0, 0)
 
 
 Grade = Literal["good", "doubtful", "useless"]
@@ -208,6 +201,11 @@ class Trust:
     held: float = _sign(
         (0.0, 0.25, 0.6), "the person is gone, or nearly, in {held:.0%} of the frames in between", "held {held:.0%}"
     )
+    cropped: float | None = _sign(
+        (0.0, 0.25, 0.6),
+        "the picture's border cuts the mask above and below in {cropped:.0%} of the frames: masks cropped to the "
+        "person do not show where they are",
+    )
     frontal: float | None = _sign(
         (0.0, 0.5, 1.0),
         "one camera sees the front or the back in {frontal:.0%} of the frames, where steps and lean do not show",
@@ -269,10 +267,10 @@ FRONTAL = np.sin(np.radians(20.0))  # within 20 degrees of the line of sight a p
 ONE_CAMERA = "one camera cannot tell a small person from a distant one"
 SEVERAL = "several cameras see the depth"
 NOT_REPORTED = "the method does not say"
-MASKS_ALONE, STILL = "there are masks alone", "nothing moves enough"
+MASKS_ALONE, STILL, MOVES = "there are masks alone", "nothing moves enough", "the camera moves"
 TOO_FEW = "too few frames show the person"
 IN_PLACE = "the person stays in one place, as on a treadmill, whose belt moves the feet"
-STAYS = 1.0  # metres along the ground's axes: who stays within walks nowhere
+MAX_STATIONARY_METRES = 1.0  # along the ground's axes: who stays within walks nowhere
 
 
 def trust_of(
@@ -289,11 +287,11 @@ def trust_of(
     the masks, and `training` what the method learned from. Shares are of the frames that show enough of the person.
     """
     usable = table["usable"] == 1.0
-    cut = np.array([any(touches_border(view.mask) for view in each.silhouettes) for each in scene.observations])
+    cut, cropped = np.array([_borders(each) for each in scene.observations]).T
     few, several, fps = usable.sum() < MIN_FRAMES, len(scene.cameras) > 1, scene.fps
     joints, camera, stature = scene.motion(frames).joints, scene.cameras[0], scene.body.stature
     stands = standing(joints, fps) & usable[:, None]
-    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= STAYS
+    in_place = few or np.ptp(joints[usable, 0][:, [0, 2]], axis=0).max() <= MAX_STATIONARY_METRES
     depths = np.array([frame.translation for frame in tracked]) @ camera.rotation[2] + camera.translation[2]
     turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
     lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
@@ -302,12 +300,17 @@ def trust_of(
         "depth_scatter": TOO_FEW if few else _or(depth_scatter(depths, usable, fps), TOO_FEW),
         "foot_share": TOO_FEW if few else IN_PLACE if in_place else float(stands.any(axis=1)[usable].mean()),
         "stance_spread_m": TOO_FEW if few else _or(stance_spread(joints, stands), "no foot stands twice"),
-        "explained": MASKS_ALONE if scene.pictures is None else _or(explained_share(scene, frames, usable), STILL),
+        "explained": MASKS_ALONE
+        if scene.pictures is None
+        else MOVES
+        if scene.camera_moves
+        else _or(explained_share(scene, frames, usable), STILL),
         "interval_mm": _or(mean_known(radii), NOT_REPORTED),
         "training_mm": SEVERAL if several else TOO_FEW if few else _training_mm(scene, frames, usable, training),
         "lost": _or(mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
         "unknown": _or(mean_known(unknown), NOT_REPORTED),
         "held": held_share(usable, cut),
+        "cropped": TOO_FEW if few else float(cropped[usable].mean()),
         "frontal": SEVERAL if several else _or(mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW),
         "iou": iou,
         "acceleration": TOO_FEW if few else _or(mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
@@ -328,6 +331,12 @@ def trust_of(
         unknown_signs=reasons,
         **figures,
     )
+
+
+def _borders(observation: Observation) -> tuple[bool, bool]:
+    """Return whether the picture's border cuts the person in some view, and whether above and below in all."""
+    masks = [silhouette.mask for silhouette in observation.silhouettes]
+    return any(map(touches_border, masks)), all(mask[0].any() and mask[-1].any() for mask in masks)
 
 
 def _or(value: float | None, why: str) -> float | str:

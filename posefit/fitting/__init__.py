@@ -6,12 +6,13 @@
 | proposals as poses: root angles, translation, a prior's coordinates | space.py |
 | what a prior is: poses as fewer numbers, and which of them are feasible; the tilt of the root with them | prior.py |
 | where a body stands; the cost of proposals for one observation, and at smaller sizes. SAPSO (5) | problem.py |
-| what an optimiser is, the base of adapters of other libraries, and the loop that drives them | optimiser.py |
+| what an optimiser is, the base of adapters of other libraries, the loop that drives one | optimiser.py |
 | what a tracker is; the search a frame around a prediction. SAPSO section 4 | tracker.py |
 | weights of costs, how many samples they are worth | weights.py |
 | errors against a truth. SAPSO (8)-(10) | metrics.py |
 | how likely a detector's landmarks are | landmarks.py |
-| checks of what plugins return; the audit of their frames | validation.py |
+| checks of what optimisers and priors return | validation.py |
+| the loop that drives a tracker, and the audit of its frames | driving.py |
 | the build of one person, fitted with the poses | shape.py |
 | CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |

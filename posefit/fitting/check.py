@@ -12,13 +12,13 @@ MAX_BITS = 1_024  # of a whole number, so that it can be written down
 
 
 def at_least(name: str, value: float, least: float) -> None:
-    """Return nothing. Raises ValueError where a number is below the least it may be, or is not finite."""
+    """Raise ValueError where a number is below the least it may be, or is not finite."""
     if not (math.isfinite(value) and value >= least):
         raise InputError(f"{name} must be at least {least:g}, got {value}")
 
 
 def between(name: str, value: float, low: float, high: float, *, ends: bool = True) -> None:
-    """Return nothing. Raises ValueError where a number is not in low to high, with or without the ends."""
+    """Raise ValueError where a number is not in low to high, with or without the ends."""
     inside = low <= value <= high if ends else low < value < high
     if not inside:
         way = f"lie in {low:g} to {high:g}" if ends else f"lie between {low:g} and {high:g}"
@@ -26,7 +26,7 @@ def between(name: str, value: float, low: float, high: float, *, ends: bool = Tr
 
 
 def positive(name: str, value: float) -> None:
-    """Return nothing. Raises ValueError where a number is not finite and above 0."""
+    """Raise ValueError where a number is not finite and above 0."""
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(f"{name} must be above 0, got {value}")
 
@@ -60,7 +60,7 @@ def pair(name: str, value: object, what: str) -> tuple[Any, Any]:
 
 
 def one_of(name: str, value: object, known: Iterable[object]) -> None:
-    """Return nothing. Raises ValueError listing the choices where a value is none of them."""
+    """Raise ValueError listing the choices where a value is none of them."""
     known = tuple(known)
     if value not in known:
         hint = suggestion(value, map(str, known)) if isinstance(value, str) else ""
@@ -68,7 +68,7 @@ def one_of(name: str, value: object, known: Iterable[object]) -> None:
 
 
 def choices(settings: object, values: Mapping[str, object]) -> None:
-    """Return nothing. Raises ValueError where a value is none of those that its annotation, a `Literal`, lists.
+    """Raise ValueError where a value is none of those that its annotation, a `Literal`, lists.
 
     `settings` is a function with such parameters, or a class with such attributes; `values` may hold others too.
     """

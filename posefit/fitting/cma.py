@@ -174,7 +174,6 @@ class CMAES:
         self.asked = self._drawn()
 
     def _drawn(self) -> Array:
-        """Return feasible proposals (n, d)."""
         n = self.population_size
         drawn = wrap(self.space, self.strategy.sample(self.rng, math.ceil(SURPLUS * n / self.share)))
         feasible = self.space.feasible(drawn)

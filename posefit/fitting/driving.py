@@ -61,58 +61,64 @@ def drive(
     Poses are counted where they are drawn, see `posefit.silhouette.drawn`; areas and cost are computed again from the
     pose. An honest frame stays as it is. Raises BrokenRuleError where a frame is missing or wrong.
     """
-    waiting: deque[Observation] = deque()  # those whose frames are still to come
-    unreadable: Exception | None = None  # why an observation could not be read
-    read = reported = yielded = 0
-    reading = np.zeros(2)  # seconds, and CPU seconds, which observations took
-
-    def stream() -> Iterator[Observation]:
-        nonlocal read, reading, unreadable
-        rest = iter(observations)
-        while True:
-            start = clocks()
-            try:
-                with uncounted():  # to render a motion is no evaluation
-                    observation = next(rest, None)
-            except Exception as error:
-                unreadable = error
-                raise
-            finally:
-                reading += clocks() - start
-            if observation is None:
-                return
-            read += 1
-            waiting.append(observation)
-            yield observation
-
-    drawn, source = PoseCount(), stream()
+    reader, drawn = _Reader(observations), PoseCount()
     frames: Iterator[Frame] | None = None
+    yielded = evaluations = 0
     while True:
-        start = clocks() - reading
+        start = clocks() - reader.clocks
         try:
             with drawn.counting(), plugin_errors(audit.name, "it", passed=(InputError, ImportError, GeneratorExit)):
-                frames = iter(tracker.track(source, rng)) if frames is None else frames
+                frames = iter(tracker.track(reader, rng)) if frames is None else frames
                 frame = next(frames, None)
         except BrokenRuleError as broken:
-            if unreadable is not None and broken.__cause__ is unreadable:
-                raise unreadable from None  # what could not be read is not the tracker's fault
+            if reader.error is not None and broken.__cause__ is reader.error:
+                raise reader.error from None  # what could not be read is not the tracker's fault
             raise
         if frame is None:
             break
-        seconds, cpu_seconds = (clocks() - reading - start).tolist()
-        yielded += 1
-        if yielded > read:
-            raise audit.broken(f"track must yield a frame for each observation, got {yielded} for {yielded - 1}")
+        seconds, cpu_seconds = (clocks() - reader.clocks - start).tolist()
+        if not reader.waiting:
+            raise audit.broken(f"track must yield a frame for each observation, got {yielded + 1} for {yielded}")
+        observation = reader.waiting.popleft()
         _check(frame, audit)
         # it may have drawn poses for observations that it looks at ahead
-        ahead = task.evaluations * (read - yielded)
-        counted = math.ceil(drawn.poses / len(task.cameras)) - reported - ahead
-        frame = _counted(frame, yielded - 1, counted, UNCOUNTED_POSES * read, task.evaluations, audit)
-        frame = _computed(frame, yielded - 1, task, waiting.popleft(), audit)
-        reported += frame.evaluations
+        ahead = task.evaluations * len(reader.waiting)
+        counted = math.ceil(drawn.poses / len(task.cameras)) - evaluations - ahead
+        leeway = UNCOUNTED_POSES * (yielded + 1 + len(reader.waiting))
+        frame = _counted(frame, yielded, counted, leeway, task.evaluations, audit)
+        frame = _computed(frame, yielded, task, observation, audit)
+        yielded, evaluations = yielded + 1, evaluations + frame.evaluations
         yield replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
-    if yielded < read or next(source, None) is not None:
+    if reader.waiting or next(reader, None) is not None:
         raise audit.broken(f"track must yield a frame for each observation, got {yielded} and then no more")
+
+
+class _Reader:
+    """Observations as a tracker takes them: they wait for their frames, and the time that reading takes is its own."""
+
+    def __init__(self, observations: Iterable[Observation]) -> None:
+        self._rest = iter(observations)
+        self.waiting: deque[Observation] = deque()
+        self.clocks = np.zeros(2)  # seconds, and CPU seconds, see `clocks`
+        self.error: Exception | None = None  # why an observation could not be read
+
+    def __iter__(self) -> Iterator[Observation]:
+        return self
+
+    def __next__(self) -> Observation:
+        start = clocks()
+        try:
+            with uncounted():  # to render a motion is no evaluation
+                observation = next(self._rest)
+        except StopIteration:
+            raise
+        except Exception as error:
+            self.error = error
+            raise
+        finally:
+            self.clocks += clocks() - start
+        self.waiting.append(observation)
+        return observation
 
 
 def clocks() -> Array:
@@ -132,7 +138,6 @@ def _check(frame: Frame, audit: Audit) -> None:
 
 
 def _counted(frame: Frame, number: int, counted: int, leeway: int, budget: int, audit: Audit) -> Frame:
-    """Return the frame with the evaluations that were counted, where it reports fewer, and note it."""
     if counted > frame.evaluations + leeway:
         audit.note("evaluations", number, f"say how many poses it drew, {counted:,}, got {frame.evaluations:,}")
         frame = with_evaluations(frame, counted)

@@ -55,7 +55,7 @@ def finite_costs(costs: Array) -> Array:
 
 
 def check_tell(waiting: int, proposals: Array, costs: Array) -> None:
-    """Return nothing. Raises InputError where `tell` gets anything else than a cost for each proposal of `ask`.
+    """Raise InputError where `tell` gets anything else than a cost for each proposal of `ask`.
 
     So many proposals wait for their costs; 0 before `ask` and after `tell`.
     """

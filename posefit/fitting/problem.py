@@ -124,8 +124,7 @@ class PoseProblem:
 
     def cost_and_areas(self, poses: Array, translations: Array) -> tuple[Array, Areas]:
         """Return the cost (n,) and R, B, Y (views, n, 3) of poses (n, 66) with their root at translations (n, 3)."""
-        scene = self.body, self.cameras, self.silhouettes
-        return pose_costs(*scene, poses, translations, self.beta, self.threads)
+        return pose_costs(self.body, self.cameras, self.silhouettes, poses, translations, self.beta, self.threads)
 
     @cached_property
     def on_device(self) -> bool:
@@ -134,7 +133,6 @@ class PoseProblem:
 
     @cached_property
     def _drawings(self) -> Sequence[tuple[tuple[Any, ...], Silhouette]]:
-        """The views of which something is known, as the kernel needs them."""
         views = [
             (drawing_of(self.body, camera, silhouette), silhouette)
             for camera, silhouette in zip(self.cameras, self.silhouettes, strict=True)

@@ -22,7 +22,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.modes import Mode, Posterior
 
 SPREAD = 1.0  # k of Interpretation S5: Sigma's standard deviations, as multiples of the predicted step
-KEPT = 3  # frames: how far back a prediction looks
+HISTORY_FRAMES = 3  # how far back a prediction looks
 TILT_SHARE = 0.99  # ours: of the training poses, whose tilt is searched
 TILT_MARGIN_DEGREES = 5.0  # ours: people's own ways to stand differ by about as much
 RELOCALISE_GAP = 5  # frames without the person, about a sixth of a second. Ours
@@ -155,7 +155,7 @@ class Prediction:
         return Tilt.of(prior, training, TILT_SHARE, float(np.radians(TILT_MARGIN_DEGREES)))
 
 
-class Follower:
+class Predictor:
     """Goes from frame to frame: gives the space of the next one, and takes the best proposal in it.
 
     A `tilt` that was learned from the task's training before is not learned again.
@@ -180,7 +180,7 @@ class Follower:
             root_order="xyz" if prediction.variant == "paper" else "yaw_first",
         )
         earlier = [frame.details[COORDINATES] for frame in task.before if COORDINATES in frame.details]
-        self._latest: list[Array] = earlier[-KEPT:]  # coordinates of the latest gbest, the newest last
+        self._latest: list[Array] = earlier[-HISTORY_FRAMES:]  # coordinates of the latest gbest, the newest last
 
     def space(self, observation: Observation) -> SearchSpace:
         """Return the box of the next frame, centred on the last result, and where to start in it. SAPSO (6), (7)."""
@@ -189,7 +189,7 @@ class Follower:
             if anchor is not None:
                 space = space.around(space.centre, anchor=anchor)
             if self._task.first_pose is not None:
-                space = replace(space, start=self._given(space, self._task.first_pose))
+                space = replace(space, start=self._start_at_known_pose(space, self._task.first_pose))
             self._space = space
             return space
         if self._task.yaw is None or self._tilt is not None:  # only the first frame looks all around
@@ -211,14 +211,14 @@ class Follower:
 
     def commit(self, proposal: Array) -> None:
         """Take the best proposal (d,) of the space that was given last."""
-        self._latest = [*self._latest, self._space.coordinates(proposal)][-KEPT:]
+        self._latest = [*self._latest, self._space.coordinates(proposal)][-HISTORY_FRAMES:]
 
-    def _given(self, space: SearchSpace, angles: Array) -> Start:
+    def _start_at_known_pose(self, space: SearchSpace, angles: Array) -> Start:
         """Return the start of a first frame whose joint angles are about known; its root need not be."""
         latents = self._prior.transform(np.asarray(angles, dtype=np.float64)[None])[0]
         first = space.dimensions - len(latents)
         root = space.centre[:first].copy()
-        root[1:3] = 0.0  # upright, or as the pose lets expect
+        root[1:3] = 0.0  # upright, or tilted as the pose predicts
         away = space.proposals(np.concatenate([root, latents]))
         spread = np.full(space.dimensions, self._how.floor)
         if self._task.yaw is None:
@@ -242,11 +242,11 @@ class SynthesisTracker:
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation; at any time only a few frames are held in memory."""
-        task, follower = self.task, Follower(self.task, self.prior, self.prediction, self.tilt)
+        task, predictor = self.task, Predictor(self.task, self.prior, self.prediction, self.tilt)
         optimiser: Optimiser | None = None
         latest: Frame | None = task.before[-1] if task.before else None
         for observation in observations:
-            space = follower.space(observation)
+            space = predictor.space(observation)
             if not observation.usable:
                 latest = self._held(latest, space, observation)
                 yield latest
@@ -254,7 +254,7 @@ class SynthesisTracker:
             optimiser = self._ready(optimiser, space, rng)
             problem = self.problem(space, observation)
             best = minimise(problem.evaluate, optimiser, task.evaluations, budget_known=True)
-            follower.commit(best.proposal)
+            predictor.commit(best.proposal)
             latest = _frame(problem, best)
             yield latest
 
@@ -276,7 +276,6 @@ class SynthesisTracker:
         return PoseProblem(task.body, task.cameras, silhouettes, space, beta=beta, threads=task.threads, blank=True)
 
     def _ready(self, optimiser: Optimiser | None, space: SearchSpace, rng: np.random.Generator) -> Optimiser:
-        """Return the optimiser of the next frame, as `next_frame` asks."""
         if self.next_frame == "carry" and optimiser is not None:
             cast(Filter, optimiser).advance(space)
             return optimiser

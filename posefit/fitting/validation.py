@@ -71,7 +71,7 @@ class CheckedOptimiser:
 
 
 def check_population(proposals: Any, space: Space, name: str) -> None:
-    """Return nothing. Raises BrokenRuleError, which begins with `name`, where proposals are not (n, d) in the box."""
+    """Raise BrokenRuleError, which begins with `name`, where proposals are not (n, d) in the box."""
     plain = type(proposals) is np.ndarray  # neither a matrix nor a masked array, which calculate otherwise
     rule = ""
     if not plain or proposals.shape[1:] != (space.dimensions,):
@@ -106,7 +106,6 @@ def plugin_errors(name: str, what: str, passed: tuple[type[BaseException], ...] 
 
 
 def _broken_by(name: str, what: str, error: BaseException) -> BrokenRuleError:
-    """Return the error that names the plugin which raised another."""
     if isinstance(error, SystemExit):
         return BrokenRuleError(f"{name}: {what} must not end the program, got SystemExit: {error.code}")
     # where the plugin raised it, or passed it on from a library
@@ -148,7 +147,7 @@ class CheckedPrior:
 
 
 def check_prior(prior: Prior, training: Array, name: str) -> None:
-    """Return nothing. Raises BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
+    """Raise BrokenRuleError, which begins with `name`, where a prior's range or answers are wrong.
 
     `training` (T, 63) are the joint angles that it has learned from.
     """

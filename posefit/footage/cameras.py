@@ -41,6 +41,7 @@ class CameraView:
     filmed: tuple[int, int] | None = None  # size of the video, where the masks were taken from one
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     facings: Array | Sequence[float] = ()  # of each frame, as `Segmenter.facing`; NaN where unknown
+    moves: bool = False  # whether the camera seems to
 
 
 def combined(
@@ -105,6 +106,7 @@ def combined(
         [*guesses, *of_cameras.values()],
         views[0].pictures,
         views[0].masks.first,
+        camera_moves=views[0].moves,
     )
 
 

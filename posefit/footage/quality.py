@@ -30,7 +30,7 @@ MIN_SIDE = 12  # pixels of the longer side below which a person cannot be distin
 LAG = 0.1  # seconds between two pictures that are compared for motion
 MOVING_LEVELS = 25  # grey levels by which a pixel that moved has changed
 MIN_MOVING = 0.1  # of the mask's area: fewer pixels that moved outside the mask are no evidence
-AROUND = 0.5  # of the person's longer side: motion is searched as far as that from the mask
+MOTION_REACH = 0.5  # of the person's longer side: motion is searched as far as that from the mask
 SLACK = 0.02  # of the same: motion as near as that to the mask is the mask's own
 MAX_OUTSIDE = 0.5  # a frame is not usable where a larger share of what moves lies outside the mask
 EDGE_RATIO, EDGE_LEVELS = 1.5, 6.0  # an edge is in one picture only where it is stronger there by both
@@ -53,7 +53,9 @@ SHORT, TALL = 0.45, 1.9  # times their height: what a person may seem, from abov
 class FrameQuality:
     """Compares the mask of one frame after the other with the pictures; its rows become quality.csv."""
 
-    def __init__(self, fps: float, background: Image | None = None) -> None:
+    def __init__(self, fps: float, background: Image | None = None, *, still: bool = True) -> None:
+        """Where the background need not be `still`, what moves outside a mask does not count."""
+        self._still = still
         self._edges = None if background is None else _edges(background)
         self._before: deque[tuple[Image, Mask]] = deque(maxlen=max(1, round(LAG * fps)))
         self._areas: deque[int] = deque(maxlen=AREA_FRAMES)
@@ -98,18 +100,15 @@ class FrameQuality:
 
     def _outside(self, image: Image, person: Person, side: int) -> float:
         """Return which share of the pixels that moved, at the person and around, lies outside the mask."""
-        if not self._before or not person.area:
+        if not self._still or not self._before or not person.area:
             return 0.0
         earlier, mask = self._before[0]
         covered = person.mask | mask
         reach = max(side, *self._sides) if self._sides else side
-        (left, top, right, bottom), far = box_of(covered), round(AROUND * reach)
-        window = np.s_[max(0, top - far) : bottom + far, max(0, left - far) : right + far]
-        changed = changed_pixels(image, earlier)[window] & person.valid[window]
-        width = 2 * max(1, round(SLACK * reach)) + 1
-        near = cv2.dilate(covered[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
-        outside = int((changed & ~near).sum())
-        return float(outside / changed.sum()) if outside > MIN_MOVING * person.area else 0.0
+        changed = changed_pixels(image, earlier) & person.valid
+        moved, inside = moved_pixels(changed, covered, covered, reach, SLACK)
+        outside = moved - inside
+        return outside / moved if outside > MIN_MOVING * person.area else 0.0
 
     def _is_ghost(self, image: Image, mask: Mask) -> bool:
         """Return whether the outline of a mask is an edge of the background rather than of the picture.
@@ -130,6 +129,18 @@ def changed_pixels(image: Image, earlier: Image) -> Mask:
     levels = cv2.split(cv2.absdiff(image, earlier))
     changed = np.asarray(cv2.max(cv2.max(levels[0], levels[1]), levels[2]) > MOVING_LEVELS, dtype=np.uint8)
     return np.asarray(cv2.medianBlur(changed, 5) > 0)
+
+
+def moved_pixels(changed: Mask, region: Mask, body: Mask, reach: float, slack: float) -> tuple[int, int]:
+    """Return how many pixels changed in a region and around, and how many of them lie at the body.
+
+    Around is as near as half of `reach`, the person's longer side in pixels, and at the body as near as `slack` of it.
+    """
+    (left, top, right, bottom), far = box_of(region), round(MOTION_REACH * reach)
+    window = np.s_[max(0, top - far) : bottom + far, max(0, left - far) : right + far]
+    width = 2 * max(1, round(slack * reach)) + 1
+    near = cv2.dilate(body[window].astype(np.uint8), np.ones((width, width), dtype=np.uint8)) > 0
+    return int(changed[window].sum()), int((changed[window] & near).sum())
 
 
 def _edges(image: Image) -> NDArray[np.float32]:

@@ -44,6 +44,7 @@ class Scene:
     # yields the first camera's video frames, of its size; None where there is no video
     pictures: Callable[[], Iterator[Image]] | None = field(default=None, repr=False)
     first: int = 0  # the number of the first frame in the footage, or in the whole motion
+    camera_moves: bool = False  # whether the first camera seems to
     reading_seconds: tuple[float, float] = (0.0, 0.0)  # wall and CPU time that it took to read
 
     def motion(self, frames: Sequence[Frame]) -> Motion:

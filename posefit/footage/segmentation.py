@@ -93,6 +93,11 @@ class Extraction:
         """The segmenter's name."""
         return segmenter_name(self.method, self.background)
 
+    @property
+    def still_background(self) -> bool:
+        """Whether the segmenter needs a still background."""
+        return registry().offer("segmenter", self.name).still_background
+
     def ways(self, cameras: int) -> "list[Extraction]":
         """Return this extraction, and for the default of a track, where "mediapipe" is installed, that beside it.
 
@@ -174,7 +179,8 @@ class PersonSegmenter:
         """Return the person in the next frame, which is of the working size."""
         segmenter = self._segmenter = self._segmenter or self._how.segmenter(self._film)
         if self._quality is None:
-            self._quality = FrameQuality(self._film.video.fps, getattr(segmenter, "background", None))
+            still, background = self._how.still_background, getattr(segmenter, "background", None)
+            self._quality = FrameQuality(self._film.video.fps, background, still=still)
         result = person(*self._segmented(segmenter, image), self._roi, self._ignored)
         part = replace(result, mask=self._film.cut(result.mask), valid=self._film.cut(result.valid))
         row = self._quality.row(self._film.cut(image), part, number)
@@ -292,6 +298,11 @@ class Segmentation:
         return result and replace(result, text=f"{self.video.path}: {result.text}")
 
     @property
+    def camera_moves(self) -> bool:
+        """Whether the camera seems to move."""
+        return sum(shift > MOVED * SMALL for shift in self._shifts) > OFTEN * len(self._shifts)
+
+    @property
     def _damage(self) -> str:
         return f"the file says that it has {self._missing} frames more than can be read: it seems to be damaged"
 
@@ -310,8 +321,7 @@ class Segmentation:
                 f"{name}: another person seems to be in {rivals} of {len(filled)} frames; the largest is followed, "
                 "--roi chooses where to search"
             )
-        moved = sum(shift > MOVED * SMALL for shift in self._shifts)
-        if moved > OFTEN * len(self._shifts):
+        if self.camera_moves:
             texts.append(f"{name}: the camera seems to move, and silhouettes need a still one; expect poor masks")
         return texts
 

@@ -199,7 +199,8 @@ def _taken_out(
 
     def view(part: Segmentation) -> CameraView:
         pictures = partial(part.video.frames, part.start, part.stop, part.size)
-        return CameraView(part.packed(), part.warnings, str(part.video.path), part.video.size, pictures, part.facings)
+        name, filmed = str(part.video.path), part.video.size
+        return CameraView(part.packed(), part.warnings, name, filmed, pictures, part.facings, part.camera_moves)
 
     if len(videos) > 1:
         for part in segmentations:

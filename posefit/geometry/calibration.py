@@ -293,7 +293,6 @@ def _first(known: Mapping[str, Any], names: Sequence[str]) -> Any:
 
 
 def _counts(value: Any) -> bool:
-    """Return whether a value has a number other than 0."""
     try:
         return bool(_matrix_of(value).any())
     except (ValueError, TypeError, KeyError):

@@ -145,7 +145,7 @@ def is_focal(focal: Array, size: Sequence[float] | Array) -> bool:
 
 
 def check_focal(focal: Array, size: Sequence[float] | Array) -> None:
-    """Return nothing. Raises InputError where no lens has such focal lengths (2,) for pictures of a size."""
+    """Raise InputError where no lens has such focal lengths (2,) for pictures of a size."""
     if not is_focal(focal, size):
         low, high = (share * max(size) for share in FOCALS)
         came = " and ".join(f"{length:g}" for length in focal)

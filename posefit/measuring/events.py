@@ -60,8 +60,8 @@ def gait_events(motion: Motion) -> GaitEvents:
 def low_pass(series: Array, cutoff: float, fps: float) -> Array:
     """Return series (T, ...) without what is faster than `cutoff` hertz, which keeps 0.71 of its size.
 
-    The filter is a Gaussian, so that nothing is shifted in time; beyond the ends it sees what mirrors them in a point,
-    so that who walks on at an even pace goes on doing so.
+    The filter is a Gaussian, which shifts nothing in time. The ends are extended by odd reflection, which keeps an even
+    pace.
     """
     width = np.sqrt(np.log(2.0)) / (2.0 * np.pi * cutoff) * fps  # frames
     reach = min(int(4.0 * width) + 1, len(series) - 1)

@@ -1,11 +1,12 @@
-"""What a walk is like: cadence, steps and strides, speed, stance and the width of steps; and who walks backwards.
+"""What a walk is like, left and right: cadence, steps and strides, speed, stance and width; and who walks backwards.
 
 A step of a foot lasts from the other foot's strike to its own, a stride from one of its strikes to its next. Only those
-count whose feet strike in turn, in which the person moves the way they face, and of which every frame is known.
+count whose feet strike in turn, in which the person moves the way they face, and of which every frame is known. Of a
+person who walks and stays in one place, as on a treadmill or before a camera that turns with them, times alone count.
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.geometry.skeleton import BONES, both
+from posefit.measuring.angles import clinical_angles
 from posefit.measuring.events import MIN_FPS, GaitEvents, gait_events
 from posefit.measuring.segments import SIDES
 from posefit.motion.motion import Motion, at_frames
@@ -25,6 +27,10 @@ MIN_STEPS_SHARE = 1.0 / 3.0  # of the known time, which the steps last at least
 MAX_STEP_WIDTH = 0.35  # metres between the lines that the feet of a walk keep to; who dances or dodges goes wider
 RUNNING_FROUDE = 0.5  # the Froude number from which people run rather than walk
 MIN_STANCE_SHARE = 0.57  # share of a stride; a runner's foot stands shorter, judged by the rearmost toes
+MAX_UNEVEN = 0.1  # ours: of strides in one place, the standard deviation over the mean; those of a dance differ more
+MIN_STEPS_SHARE_IN_PLACE = 0.5  # ours: more than of a walk, as other motions stay in one place, too
+IN_PLACE = "the person stays in one place: on the spot, on a treadmill, or before a camera that turns with them"
+CYCLE = 101  # moments of a stride, of which the last is the first of the next
 GRAVITY = 9.81  # metres a second squared
 TRAVEL_SECONDS = 0.5  # ours: over which the direction is measured
 MIN_TRAVEL_SPEED = 0.3  # metres a second, ours: below it a person goes nowhere
@@ -50,14 +56,28 @@ class Step:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FootGait:
+    """The means over a foot's steps, which end in its strikes, and over its strides; None where there is none."""
+
+    steps: int = 0
+    step_seconds: float | None = None
+    step_length: float | None = None  # metres
+    stride_length: float | None = None  # metres
+    stance_share: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Gait:
     """The gait of a motion, with every step; None where it is no walk, with the reason in `why`.
 
-    Strides and stance are None, too, where no stride is whole.
+    Strides and stance are None, too, where no stride is whole, and lengths and speed with a reason in `why_no_lengths`.
     """
 
     steps: list[Step] = field(default_factory=list, repr=False)
     why: str = ""  # empty where it is a walk
+    why_no_lengths: str = ""
+    left: FootGait = FootGait()
+    right: FootGait = FootGait()
     cadence: float | None = None  # steps a minute
     speed: float | None = None  # metres a second
     step_length: float | None = None  # metres
@@ -67,10 +87,9 @@ class Gait:
 
     def as_dict(self) -> dict[str, object]:
         """Return the gait as summary.json holds it."""
-        counted = len(_values(self.steps, "step_seconds"))
-        names = [field.name for field in fields(self) if field.name not in ("steps", "why")]
-        measures = {name: getattr(self, name) for name in names}
-        return {"walk": not self.why, "why": self.why or None, "steps": counted, **measures}
+        counted, reasons = len(_values(self.steps, "step_seconds")), (self.why or None, self.why_no_lengths or None)
+        values = {**asdict(self), "steps": counted}
+        return {"walk": not self.why, **values, **dict(zip(("why", "why_no_lengths"), reasons, strict=True))}
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
@@ -78,26 +97,45 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
     if motion.fps < MIN_FPS:
         return Gait(why=f"fewer than {MIN_FPS:g} frames a second")
     events = gait_events(motion)
-    steps = list(_steps(events, motion.fps, motion.first, set(unknown)))
-    if why := _why_not(motion, events, steps, (len(motion) - len(unknown)) / motion.fps):
+    speed = float(
+        ((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum() / max(len(motion) - 1, 1) * motion.fps
+    )
+    in_place = abs(speed) < MIN_SPEED
+    steps = list(_steps(events, motion.fps, motion.first, set(unknown), in_place))
+    if why := _why_not(motion, events, steps, speed, (len(motion) - len(unknown)) / motion.fps):
         return Gait(steps=steps, why=why)
-    seconds, length = _mean(steps, "step_seconds"), _mean(steps, "step_length")
+    left, right = (_of_foot([step for step in steps if step.foot == side]) for side in SIDES)
+
+    def mean(name: str) -> float | None:
+        """Return the mean of the feet's means: the steps of one may be more, and of a limp are longer or shorter."""
+        values = [value for foot in (left, right) if (value := getattr(foot, name)) is not None]
+        return float(np.mean(values)) if values else None
+
+    seconds, length = mean("step_seconds"), mean("step_length")
     assert seconds is not None
-    assert length is not None
     cadence = 60.0 / seconds  # WHITTLE2007 (cadence)
     return Gait(
         steps=steps,
+        why_no_lengths=IN_PLACE if in_place else "",
+        left=left,
+        right=right,
         cadence=cadence,
-        speed=length * cadence / 60.0,  # WHITTLE2007 (speed)
+        speed=None if length is None else length * cadence / 60.0,  # WHITTLE2007 (speed)
         step_length=length,
-        stride_length=_mean(steps, "stride_length"),
+        stride_length=mean("stride_length"),
         step_width=_mean(steps, "step_width"),
-        stance_share=_mean(steps, "stance_share"),
+        stance_share=mean("stance_share"),
     )
 
 
-def _steps(events: GaitEvents, fps: float, first: int, unknown: set[int]) -> Iterator[Step]:
-    """Yield every strike in the order of time, with what is known of its step and its stride."""
+def _of_foot(steps: list[Step]) -> FootGait:
+    names = ("step_seconds", "step_length", "stride_length", "stance_share")
+    return FootGait(steps=len(_values(steps, "step_seconds")), **{name: _mean(steps, name) for name in names})
+
+
+def _steps(events: GaitEvents, fps: float, first: int, unknown: set[int], in_place: bool) -> Iterator[Step]:
+    """Yield every strike in the order of time, with what is known of its step and its stride; `in_place` no lengths."""
+    least = -np.inf if in_place else MIN_SPEED
     strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
         measures: dict[str, float] = {}
@@ -105,23 +143,25 @@ def _steps(events: GaitEvents, fps: float, first: int, unknown: set[int]) -> Ite
         offs = [off for off in _known(events.offs[foot], unknown) if time < off < again]
         if offs:
             measures["toe_off_seconds"] = (first + offs[0]) / fps
-        if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown):
+        if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown, least):
             other = next(side for side in SIDES if side != foot)
             apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], strikes[k - 1][0])
             x, z = at_frames(events.heading, time)
             measures["step_seconds"] = (time - strikes[k - 1][0]) / fps
-            measures["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
+            if not in_place:
+                measures["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
             # at one moment: between two, whatever is wrong with a person's depth would count
             beside = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], time)
             measures["step_width"] = abs(float(beside @ (z, -x)))
         following = strikes[k + 1 : k + 3]
         in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
         times = [time, *(later for later, _ in following)]
-        if in_turn and all(_walked(events, fps, *pair, unknown) for pair in pairwise(times)):
+        if in_turn and all(_walked(events, fps, *pair, unknown, least) for pair in pairwise(times)):
             end = times[-1]
             moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], time)
             measures["stride_seconds"] = (end - time) / fps
-            measures["stride_length"] = float(np.linalg.norm(moved))
+            if not in_place:
+                measures["stride_length"] = float(np.linalg.norm(moved))
             if offs:
                 measures["stance_share"] = (offs[0] - time) / (end - time)  # WHITTLE2007 (stance)
         yield Step(foot=foot, strike_seconds=(first + time) / fps, **measures)
@@ -132,34 +172,37 @@ def _known(times: Array, unknown: set[int]) -> list[float]:
     return [float(time) for time in times if not {int(time), int(np.ceil(time))} & unknown]
 
 
-def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: set[int]) -> bool:
-    """Return whether the person walked on from one strike to the next, with every frame known."""
+def _walked(events: GaitEvents, fps: float, start: float, end: float, unknown: set[int], least: float) -> bool:
+    """Return whether the person walked on at `least` so fast from a strike to the next, with every frame known."""
     seconds = (end - start) / fps
     if not STEP_SECONDS[0] <= seconds <= STEP_SECONDS[1] or unknown & set(range(int(start), int(end) + 2)):
         return False
     moved: Array = at_frames(events.pelvis, end) - at_frames(events.pelvis, start)
-    return float(moved @ at_frames(events.heading, 0.5 * (start + end))) >= MIN_SPEED * seconds
+    return float(moved @ at_frames(events.heading, 0.5 * (start + end))) >= least * seconds
 
 
-def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], known: float) -> str:
-    """Return why a motion of which so many seconds are known is no walk; empty where it is one."""
+def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], speed: float, known: float) -> str:
+    """Return why a motion at a speed, of which so many seconds are known, is no walk; empty where it is one."""
     strikes = sum(len(events.strikes[side]) for side in SIDES)
     if strikes <= MIN_STEPS:
         return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot detected"
-    speed = float(((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum(axis=1).mean() * motion.fps)
-    if speed < MIN_SPEED:
-        return f"the person moves {'forwards' if speed > -MIN_SPEED else 'backwards'} at {abs(speed):.2f} m/s"
+    if speed <= -MIN_SPEED:
+        return f"the person moves backwards at {-speed:.2f} m/s"
     stance, froude = (
         _values(steps, "stance_share"),
         speed**2 / (GRAVITY * _leg(motion)),
     )  # ALEXANDER1989 (Froude number)
     if froude > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
-        return f"the person runs, at {speed:.1f} m/s"
+        return "the person runs" + (f", at {speed:.1f} m/s" if speed >= MIN_SPEED else " in one place")
     timed = _values(steps, "step_seconds")
     if len(timed) < MIN_STEPS:
         return "the feet do not strike in turn at the pace of a walk, or too little is known"
-    if sum(timed) < MIN_STEPS_SHARE * known:
+    in_place = abs(speed) < MIN_SPEED
+    if sum(timed) < (MIN_STEPS_SHARE_IN_PLACE if in_place else MIN_STEPS_SHARE) * known:
         return f"steps of a walk in {sum(timed):.1f} of {known:.1f} s"
+    strides = _values(steps, "stride_seconds")
+    if in_place and (len(strides) < MIN_STEPS or np.std(strides) > MAX_UNEVEN * np.mean(strides)):
+        return "the person stays in one place, without even strides"
     width = _mean(steps, "step_width")
     return f"steps are {width:.2f} m wide" if width is not None and width > MAX_STEP_WIDTH else ""
 
@@ -177,7 +220,21 @@ def _mean(steps: list[Step], name: str) -> float | None:
     return float(np.mean(values)) if (values := _values(steps, name)) else None
 
 
-def backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
+def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:
+    """Return an angle of `clinical_angles` over the whole strides of each foot, by side (n, 101): degrees."""
+    angles, curves = clinical_angles(motion.skeleton, motion.poses), {}
+    for side in SIDES:
+        strides = [
+            at_frames(angles[f"{side}_{angle}"], start + np.linspace(0.0, step.stride_seconds, CYCLE) * motion.fps)
+            for step in gait.steps
+            if step.foot == side and step.stride_seconds is not None
+            for start in [step.strike_seconds * motion.fps - motion.first]
+        ]
+        curves[side] = np.array(strides).reshape(-1, CYCLE)
+    return curves
+
+
+def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
     """Return in which frames (T,) the root faces away from its way; `unknown` frames count for nothing.
 
     The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who

@@ -22,7 +22,8 @@ from posefit.geometry.rotation import (
 from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
 from posefit.geometry.units import CMU_UNIT, Unit
 from posefit.limits import RATES
-from posefit.motion.asf import lines_of, mistake, parse_asf, shown, values_of
+from posefit.motion.asf import parse_asf
+from posefit.motion.lines import lines_of, mistake, shown, values_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.reading import check_size
 

@@ -1,10 +1,9 @@
 """Acclaim skeletons (.asf): read into a `Skeleton`, and written from one."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,46 +13,13 @@ from posefit.geometry.body import Body
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.geometry.units import CMU_UNIT, INCH, STATURES, UNIT_NAMES, Unit, metres_of, unit_of
-from posefit.reading import SHOWN, check_size, cut, quoted
+from posefit.motion.lines import LARGEST, mistake, values_of
+from posefit.reading import check_size, quoted
 
-LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 # Where to hang the bones that a Skeleton knows by their channels alone.
 _FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthumb": "rwrist"}
-
-
-def mistake(path: Path, line: int, expected: str, got: str) -> InputError:
-    """Return the error of a file's line; what came is quoted, and cut where it is long."""
-    return InputError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
-
-
-def lines_of(path: Path, longest: int) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines of a file with their numbers from 1. Raises ValueError for one of more than `longest` bytes."""
-    with path.open("rb") as file:
-        for number, line in enumerate(iter(partial(file.readline, longest + 1), b""), 1):
-            if len(line) > longest:
-                raise mistake(path, number, f"a line of at most {longest} bytes", "a longer one")
-            yield number, line
-
-
-def shown(*words: bytes | str) -> str:
-    """Return words of a file as a message quotes them."""
-    texts = (word if isinstance(word, str) else word[: 4 * SHOWN].decode("utf-8", errors="replace") for word in words)
-    return repr(cut(" ".join(texts).strip()))
-
-
-def values_of(path: Path, number: int, words: Sequence[Any], count: int) -> list[float]:
-    """Return the numbers of a line after its first word. Raises ValueError where they are not so many small ones."""
-    if len(words) != count + 1:
-        raise mistake(path, number, f"{count} values for {shown(words[0])}", f"{len(words) - 1}")
-    try:
-        values = [float(word) for word in words[1:]]
-    except ValueError:
-        raise mistake(path, number, f"numbers for {shown(words[0])}", shown(*words[1:])) from None
-    if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
-        raise mistake(path, number, f"finite numbers below {LARGEST:g} for {shown(words[0])}", shown(*words[1:]))
-    return values
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ vector. What the joints are is read off their names, see joint_names.py; how the
 """
 
 from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,8 +21,8 @@ from posefit.geometry.rotation import angles_about, rotation_about, steady_angle
 from posefit.geometry.skeleton import ENDS, JOINTS, PARENTS
 from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.motion.amc import SIZE_LIMIT, VALUES
-from posefit.motion.asf import LARGEST, lines_of, mistake, shown, values_of
 from posefit.motion.joint_names import joints_of
+from posefit.motion.lines import LARGEST, lines_of, mistake, shown, values_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.motion.rig import STANDING, Retargeted, Rig, retargeted, upward
 from posefit.reading import check_size, cut, quoted
@@ -140,80 +141,88 @@ class _Content:
     fps: float
 
 
+Lines = Iterator[tuple[int, bytes, list[bytes]]]  # number, text and words
+
+
 def _parsed(path: Path) -> _Content:
     """Return what a file says. Raises InputError with file and line where it is no BVH file."""
+    texts = ((number, raw.removeprefix(BOM)) for number, raw in lines_of(path, LONGEST_LINE))
+    lines = ((number, raw, words) for number, raw in texts if (words := raw.split()))
+    nodes, width = _hierarchy(path, lines)
+    count, frame_time = _head(path, lines)
+    data, rows, number = array("d"), 0, 1
+    for number, raw, words in lines:
+        if len(words) != width:
+            raise mistake(path, number, f"{width} numbers of frame {rows + 1}", f"{len(words)}")
+        rows += 1
+        if rows > LONGEST or rows * width > VALUES:
+            raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
+        try:
+            data.extend(map(float, words))
+        except ValueError:
+            raise mistake(path, number, f"{width} numbers of frame {rows}", shown(raw)) from None
+    if not rows or rows != count:
+        raise mistake(path, number, f"{max(count, 1)} frames", f"{rows}")
+    values = np.array(data).reshape(rows, width)
+    if not (np.abs(values) < LARGEST).all():
+        raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
+    rate = 1.0 / frame_time
+    return _Content(nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate)
+
+
+def _hierarchy(path: Path, lines: Lines) -> tuple[list[_Node], int]:
+    """Return the joints and ends, and how many channels they have, of the lines up to MOTION."""
     nodes: list[_Node] = []
-    opened: list[_Node] = []
-    numbers: list[int] = []  # of those that are opened
-    waiting: _Node | None = None  # what the next brace opens
-    count, frame_time, width = -1, 0.0, 0
-    data, rows, number, moving = array("d"), 0, 0, False
-    for number, raw in lines_of(path, LONGEST_LINE):
-        words = raw.removeprefix(BOM).split()
-        if not words:
-            continue
-        if frame_time:
-            if len(words) != width:
-                raise mistake(path, number, f"{width} numbers of frame {rows + 1}", f"{len(words)}")
-            rows += 1
-            if rows > LONGEST or rows * width > VALUES:
-                raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
-            try:
-                data.extend(map(float, words))
-            except ValueError:
-                raise mistake(path, number, f"{width} numbers of frame {rows}", shown(raw)) from None
-            continue
-        word = words[0].upper()
-        brace = words[-1] == b"{" and len(words) > 1
-        rest = words[1:-1] if brace else words[1:]
-        node = opened[-1] if opened else None
-        if moving:
-            if word == b"FRAMES:" and len(words) == 2 and words[1].isdigit() and len(words[1]) < 10:
-                count = int(words[1])
-            elif b" ".join(words[:2]).upper() == b"FRAME TIME:" and count >= 0:
-                (frame_time,) = values_of(path, number, words[1:], 1)
-                if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
-                    low, high = FRAME_TIMES
-                    raise mistake(path, number, f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}")
-            else:
-                raise mistake(path, number, "Frames: and Frame Time:", shown(raw))
-        elif word in (b"ROOT", b"JOINT", b"END"):
-            if waiting is not None or (word == b"ROOT") != (node is None) or (node is not None and not node.name):
+    opened: list[int] = []  # numbers of the nodes whose braces are open
+    waiting = False  # for the brace of the last node
+    width, number = 0, 1
+    for number, raw, words in lines:
+        word, brace = words[0].upper(), words[-1] == b"{" and len(words) > 1
+        node = nodes[opened[-1]] if opened else None
+        if word in (b"ROOT", b"JOINT", b"END"):
+            if waiting or (word == b"ROOT") != (node is None) or (node is not None and not node.name):
                 raise mistake(path, number, "a ROOT, with JOINT and End Site inside", shown(raw))
             if len(nodes) >= NODES:
                 raise mistake(path, number, f"at most {NODES} joints and ends", "more")
-            name = "" if word == b"END" else b" ".join(rest).decode("utf-8", errors="replace") or "unnamed"
-            waiting = _Node(name, -1 if node is None else numbers[-1])
-            nodes.append(waiting)
-        elif word == b"{" and waiting is not None:
+            rest = b" ".join(words[1:-1] if brace else words[1:]).decode("utf-8", errors="replace")
+            nodes.append(_Node("" if word == b"END" else rest or "unnamed", opened[-1] if opened else -1))
+            waiting = True
+        elif word == b"{" and waiting:
             brace = True
         elif word == b"}" and node is not None:
             if node.offset is None:
                 raise mistake(path, number, f"an OFFSET of {quoted(node.name)}", "none")
             opened.pop()
-            numbers.pop()
         elif word == b"OFFSET" and node is not None:
             node.offset = np.array(values_of(path, number, words, 3))
         elif word == b"CHANNELS" and node is not None and node.name and not node.channels:
             node.channels, node.column = _channels(path, number, words, raw), width
             width += len(node.channels)
         elif word == b"MOTION" and not opened and nodes:
-            moving = True
+            return nodes, width
         elif word != b"HIERARCHY" or nodes:
             raise mistake(path, number, "HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION", shown(raw))
-        if brace and waiting is not None:
-            opened.append(waiting)
-            numbers.append(len(nodes) - 1)
-            waiting = None
-    if not moving:
-        raise mistake(path, max(number, 1), "MOTION after the joints", "the end of the file")
-    if not rows or rows != count:
-        raise mistake(path, max(number, 1), f"{max(count, 1)} frames", f"{rows}")
-    values = np.array(data).reshape(rows, width)
-    if not (np.abs(values) < LARGEST).all():
-        raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
-    rate = 1.0 / frame_time
-    return _Content(nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate)
+        if brace and waiting:
+            opened.append(len(nodes) - 1)
+            waiting = False
+    raise mistake(path, number, "MOTION after the joints", "the end of the file")
+
+
+def _head(path: Path, lines: Lines) -> tuple[int, float]:
+    """Return how many frames there are to be, and the seconds of one."""
+    count, number = -1, 1
+    for number, raw, words in lines:
+        if words[0].upper() == b"FRAMES:" and len(words) == 2 and words[1].isdigit() and len(words[1]) < 10:
+            count = int(words[1])
+        elif b" ".join(words[:2]).upper() == b"FRAME TIME:" and count >= 0:
+            (frame_time,) = values_of(path, number, words[1:], 1)
+            if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
+                low, high = FRAME_TIMES
+                raise mistake(path, number, f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}")
+            return count, frame_time
+        else:
+            raise mistake(path, number, "Frames: and Frame Time:", shown(raw))
+    raise mistake(path, number, f"{max(count, 1)} frames", "0")
 
 
 def _channels(path: Path, number: int, words: list[bytes], raw: bytes) -> list[tuple[bool, int]]:

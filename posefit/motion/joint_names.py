@@ -130,6 +130,13 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     return Joints(limbs, hips, chest, between, bearing, head)
 
 
+_TWO_IN_A_ROW = {  # where two nodes in a row have names of one joint, they are these joints
+    "shin": ("thigh", "shin"),  # `leg` and below it `knee`
+    "foot": ("foot", "toe"),  # `ankle` and below it `foot`
+    "hand": ("hand", "palm"),  # `wrist` and below it `hand`
+}
+
+
 def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> dict[str, int]:
     """Return the joints of a side's arm and leg."""
 
@@ -145,11 +152,10 @@ def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> 
         nodes["arm"] = others["arm"]
     elif not nodes["clavicle"]:
         nodes["clavicle"] = others["clavicle"]
-    # `leg` and `knee`, `arm` and `elbow`, `ankle` and `foot`, `wrist` and `hand`: two names of one kind in a row
-    for above, below in (("thigh", "shin"), ("foot", "toe"), ("hand", "palm")):
-        wanted, spare = (above, nodes[below]) if above == "thigh" else (below, nodes[above])
-        if not nodes[wanted] and len(spare) > 1 and spare[0] in paths[spare[1]]:
-            nodes[above], nodes[below] = [spare[0]], [spare[1]]
+    for joint, (above, below) in _TWO_IN_A_ROW.items():
+        absent, two = below if joint == above else above, nodes[joint]
+        if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
+            nodes[above], nodes[below] = [two[0]], [two[1]]
     return {joint: each[0] for joint, each in nodes.items() if each}
 
 

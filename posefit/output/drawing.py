@@ -48,6 +48,18 @@ def width_of(text: str, scale: float = 0.5) -> int:
     return int(cv2.getTextSize(text, _FONT, scale, 1)[0][0])
 
 
+def wrapped(text: str, width: int, scale: float) -> list[str]:
+    """Return the lines of a text that are at most so many pixels wide, where no word is wider."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if width_of(longer, scale) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return [*filter(None, lines)]
+
+
 def hexadecimal(colour: tuple[int, int, int]) -> str:
     """Return a colour as a page has it."""
     blue, green, red = colour
@@ -132,7 +144,6 @@ def _cones(body: Body, camera: Camera, pose: Array, translation: Array) -> Itera
 
 
 def _hull(centres: Array, radii: Array) -> Any:
-    """Return the convex hull of discs, in sixteenths of a pixel."""
     angles = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     outline = centres[:, None] + radii[:, None, None] * circle

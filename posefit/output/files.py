@@ -31,8 +31,36 @@ from posefit.output.picture import Painter
 from posefit.output.text import undetermined
 from posefit.silhouette.foreground import Image
 
+
+def _write_npz(path: Path, content: Content) -> None:
+    np.savez_compressed(
+        path,
+        poses=content.motion.poses,
+        translations=content.motion.translations,
+        fps=np.array(content.motion.fps),
+        frames=content.motion.first + np.arange(len(content.motion)),
+        joints=np.array(JOINTS),
+        places=np.array(PLACES),
+        costs=content.table["cost"],
+        radii=content.scene.body.radii,
+        **dict[str, Any](content.intervals),
+    )
+
+
+def _write_table(path: Path, content: Content) -> None:
+    names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*content.table, "activity", *names])
+        for k, (frame, points) in enumerate(zip(content.frames, content.motion.joints, strict=True)):
+            values = [column[k].item() for column in content.table.values()]
+            cells = ["" if np.isnan(value) else value for value in values]
+            places = ("" if k in content.blank else f"{value:.6f}" for value in points.reshape(-1))
+            writer.writerow([*cells, frame.activity, *places])
+
+
 FORMATS: dict[str, Callable[[Path, Content], Any]] = {
-    "poses.npz": lambda path, content: _write_npz(path, content),
+    "poses.npz": _write_npz,
     "skeleton.asf": lambda path, content: write_asf(path, content.motion.skeleton),
     "track.amc": lambda path, content: write_amc(path, content.motion),
     "track.bvh": lambda path, content: write_bvh(path, content.motion),
@@ -41,7 +69,7 @@ FORMATS: dict[str, Callable[[Path, Content], Any]] = {
     "track.c3d": lambda path, content: write_c3d(path, content.motion, content.blank, content.gait),
     "track.mot": lambda path, content: write_mot(path, content.motion),
     "model.osim": lambda path, content: write_osim(path, content.scene.body, PLACES),
-    "frames.csv": lambda path, content: _write_table(path, content),
+    "frames.csv": _write_table,
     "angles.csv": lambda path, content: write_angles(path, content.motion, content.blank),
     "gait.csv": lambda path, content: write_gait(path, content.gait),
     "camera.json": lambda path, content: path.write_text(content.scene.cameras[0].to_json(), encoding="utf-8"),
@@ -84,32 +112,4 @@ def page_of(content: Content) -> str:
 
 
 def _filmed(scene: Scene) -> tuple[Iterable[Observation], Iterable[Image | None]]:
-    """Return what was observed in each frame, and the footage of each, None where there is none."""
     return scene.observations, repeat(None) if scene.pictures is None else scene.pictures()
-
-
-def _write_npz(path: Path, content: Content) -> None:
-    np.savez_compressed(
-        path,
-        poses=content.motion.poses,
-        translations=content.motion.translations,
-        fps=np.array(content.motion.fps),
-        frames=content.motion.first + np.arange(len(content.motion)),
-        joints=np.array(JOINTS),
-        places=np.array(PLACES),
-        costs=content.table["cost"],
-        radii=content.scene.body.radii,
-        **dict[str, Any](content.intervals),
-    )
-
-
-def _write_table(path: Path, content: Content) -> None:
-    names = [f"{place}_{axis}" for place in PLACES for axis in "xyz"]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*content.table, "activity", *names])
-        for k, (frame, points) in enumerate(zip(content.frames, content.motion.joints, strict=True)):
-            values = [column[k].item() for column in content.table.values()]
-            cells = ["" if np.isnan(value) else value for value in values]
-            places = ("" if k in content.blank else f"{value:.6f}" for value in points.reshape(-1))
-            writer.writerow([*cells, frame.activity, *places])

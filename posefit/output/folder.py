@@ -62,35 +62,9 @@ class OutputFolder(Recorder):
         say: Callable[[str], None],
     ) -> None:
         self.path, self._spec, self._say = Path(path), dict(spec), say
-        opencv_name(self.path)  # a name that it cannot write is refused before the work
-        if os.path.lexists(self.path):
-            if self.path.is_symlink() or not self.path.is_dir():
-                came = "a link" if self.path.is_symlink() else "a file"
-                raise InputError(f"{self.path}: expected a folder to write to, got {came}")
-            if not force:
-                raise InputError(f"{self.path}: expected a new folder, got one that exists; --force replaces it")
-            if others := other_entries(self.path, _MINE) or _unmarked(self.path):
-                came = f"one with {cut(others[0])}, which is none of posefit's"
-                raise InputError(f"{self.path}: expected a folder of earlier results to replace, got {came}")
         self._recorded, self._force = 0, force
-        self._place = self._same() if resume else None
-
-    def _same(self) -> Unfinished:
-        """Return the folder of the track that goes on: the latest with the same arguments."""
-        interrupted = Unfinished.interrupted(self.path)
-        if not interrupted:
-            raise InputError(f"{self.path}: expected a track that was interrupted to resume, got none")
-        try:
-            others = [difference(folder.info, self._spec) for folder in interrupted]
-        except (AttributeError, TypeError):
-            raise InputError(f"{interrupted[0].path / MARK}: expected the arguments of a track, got others") from None
-        place = interrupted[others.index(None)] if None in others else None
-        for folder in interrupted:
-            if folder is not place:
-                folder.close()
-        if place is None:
-            raise InputError(f"{self.path}: {others[0]}")
-        return place
+        _check_target(self.path, force)
+        self._place = _interrupted(self.path, self._spec) if resume else None
 
     def __enter__(self) -> Self:
         try:
@@ -132,25 +106,9 @@ class OutputFolder(Recorder):
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
-        frames: list[Frame] = []
-        whole_lines: list[bytes] = []
-        state: dict[str, Any] | None = None
-        path = self.building / _RECORD
-        recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
-        for number, line in enumerate(recorded.splitlines(keepends=True), 1):
-            try:
-                frame, state = _frame_of(line)
-            except Exception as error:  # whatever a damaged line raises
-                if line.endswith(b"\n"):  # else it was being written when the track ended
-                    reason = cut(" ".join(str(error).split()))
-                    self._say(
-                        f"warning: {path} line {number}: expected a frame, got {reason}; tracked again from there"
-                    )
-                break
-            frames.append(frame)
-            whole_lines.append(line)
-        if frames:
-            path.write_bytes(b"".join(whole_lines))
+        frames, state, damage = _read_record(self.building / _RECORD)
+        if damage:
+            self._say(f"warning: {damage}; tracked again from there")
         self._recorded = len(frames)
         return frames, state
 
@@ -166,6 +124,61 @@ class OutputFolder(Recorder):
     def finish(self, content: Content) -> None:
         """Write everything."""
         write_files(self.building, content)
+
+
+def _check_target(path: Path, force: bool) -> None:
+    """Raise InputError where a folder may not be written under a name, before the work."""
+    opencv_name(path)  # it writes no other name
+    if not os.path.lexists(path):
+        return
+    if path.is_symlink() or not path.is_dir():
+        came = "a link" if path.is_symlink() else "a file"
+        raise InputError(f"{path}: expected a folder to write to, got {came}")
+    if not force:
+        raise InputError(f"{path}: expected a new folder, got one that exists; --force replaces it")
+    if others := other_entries(path, _MINE) or _unmarked(path):
+        came = f"one with {cut(others[0])}, which is none of posefit's"
+        raise InputError(f"{path}: expected a folder of earlier results to replace, got {came}")
+
+
+def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
+    """Return the unfinished folder of the track that goes on: the latest with the same arguments."""
+    interrupted = Unfinished.interrupted(path)
+    if not interrupted:
+        raise InputError(f"{path}: expected a track that was interrupted to resume, got none")
+    try:
+        others = [difference(folder.info, spec) for folder in interrupted]
+    except (AttributeError, TypeError):
+        raise InputError(f"{interrupted[0].path / MARK}: expected the arguments of a track, got others") from None
+    place = interrupted[others.index(None)] if None in others else None
+    for folder in interrupted:
+        if folder is not place:
+            folder.close()
+    if place is None:
+        raise InputError(f"{path}: {others[0]}")
+    return place
+
+
+def _read_record(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
+    """Return the frames that a file records, the random generator's state after them, and where the file is damaged.
+
+    From there on it is cut off; a line that was being written when the track ended is no damage.
+    """
+    frames, whole_lines = list[Frame](), list[bytes]()
+    state, damage = None, ""
+    recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
+    for number, line in enumerate(recorded.splitlines(keepends=True), 1):
+        try:
+            frame, state = _frame_of(line)
+        except Exception as error:  # whatever a damaged line raises
+            if line.endswith(b"\n"):
+                damage = f"{path} line {number}: expected a frame, got {cut(' '.join(str(error).split()))}"
+            break
+        frames.append(frame)
+        whole_lines.append(line)
+    if frames:
+        path.write_bytes(b"".join(whole_lines))
+    return frames, state, damage
 
 
 def _unmarked(folder: Path) -> list[str]:

@@ -15,6 +15,7 @@ from posefit.evaluation.errors import LOST, Table
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.camera import Camera
+from posefit.motion.steadiness import runs
 from posefit.output.drawing import (
     BACKGROUND,
     BOTH,
@@ -29,6 +30,7 @@ from posefit.output.drawing import (
     side_camera,
     solid_map,
     width_of,
+    wrapped,
     write,
 )
 from posefit.silhouette.cost import project
@@ -46,6 +48,8 @@ SOLID = 0.65  # how much of the footage the body hides
 MIN_OTHER_WEIGHT = 0.2  # above which another mode is drawn
 BORDER = 6  # pixels around a lost frame
 LINE_HEIGHT = 22  # pixels from one line to the next
+PEAK, PEAK_QUANTILE = 2.0, 0.9  # a curve ends at twice what nine in ten frames have at most; what is above is a peak
+MAX_PEAKS = 3  # that are named
 
 
 class Painter:
@@ -157,15 +161,17 @@ class Painter:
         width = grid.shape[1]
         parts = []
         for note in notes:
-            head = blank(LABEL_HEIGHT, width)
-            write(head, note, (12, 26), scale=SUMMARY_SCALE * min(1.0, (width - 24) / width_of(note, SUMMARY_SCALE)))
+            lines = wrapped(note, width - 24, SUMMARY_SCALE)
+            head = blank(LABEL_HEIGHT + LINE_HEIGHT * (len(lines) - 1), width)
+            for k, line in enumerate(lines):
+                write(head, line, (12, 26 + LINE_HEIGHT * k), scale=SUMMARY_SCALE)
             parts.append(head)
         parts.append(grid)
         if self._scene.pictures is None or len(self._scene.cameras) > 1:
             parts.append(blank(LABEL_HEIGHT, width))
             _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
         name = "error_degrees" if "error_degrees" in table else "cost"
-        return np.vstack([*parts, curve(table[name].tolist(), name.replace("_", " "), width, 180)])
+        return np.vstack([*parts, curve(table[name], name.replace("_", " "), width, 180, self._scene.first)])
 
 
 def _draw_border(image: Image, width: int) -> None:
@@ -197,17 +203,27 @@ def _grid(panels: list[Image], columns: int, background: int) -> Image:
     return np.vstack([np.hstack(panels[k : k + columns]) for k in range(0, len(panels), columns)])
 
 
-def curve(values: Sequence[float], name: str, width: int, height: int) -> Image:
-    """Return a plot (height, width, 3) of values, one a frame, from 0 up."""
+def curve(values: Array, name: str, width: int, height: int, first: int = 0) -> Image:
+    """Return a plot (height, width, 3) of values (T,), one a frame, from 0 up; peaks above its top are named."""
     image = blank(height, width)
-    left, right = 66, width - 16
-    scale = (height - 56) / (max(max(values), 1e-9) * 1.15)
-    for lines, level in enumerate((0.0, float(np.mean(values)), max(values))):
+    left, right, limit = 66, width - 16, PEAK * float(np.quantile(values, PEAK_QUANTILE))
+    # one a run of frames, the highest first
+    peaks = sorted(
+        (start + int(values[start:stop].argmax()) for start, stop in runs(values > limit)), key=lambda k: -values[k]
+    )
+    top = limit if peaks and limit > 0.0 else float(values.max())
+    scale = (height - 56) / (max(top, 1e-9) * 1.15)
+    for lines, level in enumerate((0.0, float(np.mean(values)), top)):
         row = int(height - 24 - level * scale)
         cv2.line(image, (left, row), (right, row), LINES, 1)
         write(image, f"{level:.2f}", (8, min(row, height - 24 - lines * LINE_HEIGHT) + 6), scale=SUMMARY_SCALE - 0.1)
     x = np.linspace(left, right, max(len(values), 2))[: len(values)]
-    points = np.rint(np.column_stack([x, height - 24 - scale * np.array(values)]) * 16).astype(np.int32)
+    points = np.rint(np.column_stack([x, height - 24 - scale * np.minimum(values, 1.1 * top)]) * 16).astype(np.int32)
     cv2.polylines(image, [points], False, BOTH, 2, cv2.LINE_AA, 4)
-    write(image, f"{name}, frame by frame: 0, mean and maximum", (left, 20), scale=SUMMARY_SCALE)
+    words = "mean and maximum"
+    if top == limit:
+        named = ", ".join(f"{values[k]:.1f} in frame {first + k}" for k in peaks[:MAX_PEAKS])
+        more = f" and {len(peaks) - MAX_PEAKS} more" if len(peaks) > MAX_PEAKS else ""
+        words = f"mean, and the top; above it {named}{more}"
+    write(image, f"{name}, frame by frame: 0, {words}", (left, 20), scale=SUMMARY_SCALE)
     return image

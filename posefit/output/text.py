@@ -10,6 +10,11 @@ from posefit.reading import counted
 
 MIN_BUILD_CHANGE = 0.05  # a part of the build that is off the average by less is not worth a word
 WIDTH = 30  # of the names
+GAIT_ROWS = (  # of a foot: names, labels, units, factors and digits
+    ("step_length", "step", "m", 1.0, 2),
+    ("step_seconds", "step", "s", 1.0, 2),
+    ("stance_share", "stance", "%", 100.0, 0),
+)
 MAX_NAMED = 8  # motions that were learned from, and are named
 
 
@@ -89,15 +94,27 @@ def undetermined(summary: Mapping[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def gait_line(gait: Mapping[str, Any]) -> str:
+def gait_line(gait: Mapping[str, Any], *, by_side: bool = True) -> str:
     """Return one line about the gait, or why it has no figures."""
     if not gait["walk"]:
         return f"no figures of gait: {gait['why']}"
-    stance = "" if gait["stance_share"] is None else f"stance {100.0 * gait['stance_share']:.0f} %, "
-    return (
-        f"gait: {gait['cadence']:.0f} steps a minute, step {gait['step_length']:.2f} m, speed {gait['speed']:.2f} m/s, "
-        f"{stance}over {gait['steps']} steps"
-    )
+    speed = "" if gait["speed"] is None else f", {gait['speed']:.2f} m/s"
+    sides = ", ".join(f"{label} {left} and {right} {unit}" for label, unit, left, right in gait_rows(gait))
+    parts = [f"{'gait: ' if by_side else ''}{gait['cadence']:.0f} steps a minute{speed}, over {gait['steps']} steps"]
+    parts += [f"left and right: {sides}"] if by_side else []
+    parts += [f"no lengths: {gait['why_no_lengths']}"] if gait["why_no_lengths"] else []
+    return "; ".join(parts)
+
+
+def gait_rows(gait: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return the measures of a walk by side: label, unit, left and right; those that no side has are left out."""
+    rows = []
+    for name, label, unit, factor, digits in GAIT_ROWS:
+        values = [gait[side][name] for side in ("left", "right")]
+        if values != [None, None]:
+            left, right = ("-" if value is None else f"{factor * value:.{digits}f}" for value in values)
+            rows.append((label, unit, left, right))
+    return rows
 
 
 def _effort(summary: Mapping[str, Any]) -> str:

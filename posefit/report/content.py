@@ -73,7 +73,6 @@ def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, 
         drawn = contest.fewer(POINTS)
         errors, certainty = charts.joint_errors(drawn), charts.certainty(contest)
         names = {"leaderboard": True, "comparison": True, "curves": True, "joints": errors, "certainty": certainty}
-        data["header"]["notes"] += _track_notes(contest, drawn)
         part = {
             "sections": [name for name, present in names.items() if present] + part["sections"],
             "pairs": paired_tests(contest),
@@ -122,23 +121,23 @@ def _header(runs: Runs, contest: Contest | None) -> dict[str, Any]:
         "version": runs.version,
         "summary": f"{runs_words} by {counted(len(runs.methods), 'method')}; {failed}.",
         "facts": [[name, printable(text)] for name, text in texts.items()],
-        "notes": _notes(runs, contest),
+        "notes": _notes(runs, contest) + (_track_notes(contest) if contest and runs.kind.name == "track" else []),
         "done": len(runs),
         "failed": len(runs.failures),
         "failed_by": Counter(failure["method"] for failure in runs.failures),
         "unfinished": runs.unfinished,
         "dropped": dropped,
-        "trouble": _trouble(runs, dropped, unpaired_sentence(contest) if contest else ""),
+        "problems": _problems(runs, dropped, unpaired_sentence(contest) if contest else ""),
     }
 
 
-def _trouble(runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str) -> list[tuple[str, list[str]]]:
+def _problems(runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str) -> list[tuple[str, list[str]]]:
     """Return what failed, what is therefore not compared, and what warned: sentences with the most frequent details."""
-    trouble = []
+    problems = []
 
     def add(text: str, details: Sequence[str], most: int) -> None:
         more = [f"and {len(details) - most:,} more"] if len(details) > most else []
-        trouble.append((text, [*details[:most], *more]))
+        problems.append((text, [*details[:most], *more]))
 
     if runs.failures:
         by = Counter(failure["method"] for failure in runs.failures)
@@ -157,7 +156,7 @@ def _trouble(runs: Runs, dropped: Sequence[Mapping[str, Any]], unpaired: str) ->
     if runs.warnings:
         texts = Counter(text for texts in runs.warnings.values() for text in texts).most_common()
         add(f"{counted(len(runs.warnings), 'run')} with a warning", [f"{n} x {text}" for text, n in texts], REASONS)
-    return trouble
+    return problems
 
 
 def _notes(runs: Runs, contest: Contest | None) -> list[str]:
@@ -183,7 +182,7 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
     return notes
 
 
-def _track_notes(contest: Contest, drawn: Contest) -> list[str]:
+def _track_notes(contest: Contest) -> list[str]:
     """Return what limits the figures of tracks."""
     (methods, instances, seeds), size = contest.rows.shape, contest.rows.size
     notes = []
@@ -191,7 +190,7 @@ def _track_notes(contest: Contest, drawn: Contest) -> list[str]:
         notes.append(f"Fewer than {FEW_RUNS} runs of each method: the intervals are wide.")
     if contest.resamples(size) < RESAMPLES:
         notes.append(f"So many runs have {contest.resamples(size)} bootstrap resamples instead of {RESAMPLES:,}.")
-    some = drawn.rows.shape
+    some = contest.fewer(POINTS).rows.shape
     if some[1] * some[2] < instances * seeds:
         notes.append(f"Curves and joints use {some[1]:,} instances with {some[2]:,} seeds each, not all.")
     return notes

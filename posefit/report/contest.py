@@ -45,8 +45,8 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     worst = [math.inf if row[score.name] is None else sign * row[score.name] for row in board]
     board.sort(key=lambda row: (not row["taking_part"], worst[row["method"]], row.get("above", 0.0)))
     best_first = [row["method"] for row in board if row["taking_part"]]
-    letters, duels = _letters(contest, best_first), _duels(contest, best_first[0])
-    return [{**row, **duels[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
+    letters, comparisons = _letters(contest, best_first), _leader_comparisons(contest, best_first[0])
+    return [{**row, **comparisons[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
 
 
 def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
@@ -56,10 +56,12 @@ def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
     return dict(zip(best_first, compact_letters(len(best_first), different), strict=True)) if contest.testable else {}
 
 
-def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
+def _leader_comparisons(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
     """Return how far each method is behind the leader, with the p of the difference; None where there is no test."""
     place, names = contest.methods.index(leader), ("behind", "behind_low", "behind_high", "p")
-    duels: dict[int, dict[str, float | None]] = {m: dict.fromkeys(names) for m in range(len(contest.runs.methods))}
+    comparisons: dict[int, dict[str, float | None]] = {
+        m: dict.fromkeys(names) for m in range(len(contest.runs.methods))
+    }
     for pair in contest.comparisons:
         if place == pair.first:
             ends = -pair.difference, -pair.high, -pair.low
@@ -67,8 +69,8 @@ def _duels(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:
             ends = pair.difference, pair.low, pair.high
         if place in (pair.first, pair.second):
             other = contest.methods[pair.first + pair.second - place]
-            duels[other] = dict(zip(names, (*ends, pair.adjusted), strict=True))
-    return duels
+            comparisons[other] = dict(zip(names, (*ends, pair.adjusted), strict=True))
+    return comparisons
 
 
 def paired_tests(contest: Contest) -> dict[str, Any] | None:

@@ -67,7 +67,7 @@ def write_report(
 def leaderboard_lines(report: dict[str, Any]) -> list[str]:
     """Return the lines that the command prints: the leader, what is left out, the leaderboard, and the page's place."""
     lines = [*report["answer"]] if "leaderboard" in report else []
-    for text, details in report["header"]["trouble"]:
+    for text, details in report["header"]["problems"]:
         lines += [text, *(f"  {detail}" for detail in details)]
     lines += _board_lines(report) if "leaderboard" in report else []
     return lines if report["out"] is None else [*lines, f"written to {report['out']}: open it in any browser"]

@@ -4,7 +4,6 @@
 |---|---|
 | a mask, its unknown pixels, both as bits, and at half or quarter size | mask.py |
 | areas R, B, Y and the cost of poses; a body drawn as a mask | cost.py |
-| one limb of a pose, with the rest as it is | limbs.py |
 | thousands of poses in parts, shared by threads; how many were drawn | sharing.py, drawn.py |
 | a body drawn as spans of bits, compiled | rasteriser.py |
 | its pixels counted against silhouettes, and what it leaves of them, compiled | kernels.py |

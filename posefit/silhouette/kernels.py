@@ -1,4 +1,4 @@
-"""Pixels of bodies and limbs counted against silhouettes: numba loops over arrays. Shapes are checked by the callers.
+"""Pixels of bodies counted against silhouettes: numba loops over arrays. Shapes are checked by the callers.
 
 Bit images are as `rasteriser` makes them.
 """

@@ -198,23 +198,3 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
 
 def _finite(value: Array | float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def score_lines(scores: Sequence[SuiteScore]) -> list[str]:
-    """Return the lines of a table of scores, for a terminal: where runs end, and how soon they reach targets."""
-    budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
-    labels = [
-        one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
-    ]
-    wide, heads = max(24, *map(len, labels)), [f"ERT +{above:g}" for above in SHOWN]
-    lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
-    for one, label in zip(scores, labels, strict=True):
-        function = one.name if one.function == ALL else f"{one.function} {one.name}"
-        times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
-        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
-        lines.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}".rstrip())
-    return lines
-
-
-def _cells(texts: Sequence[str]) -> str:
-    return "".join(f" {text:>10}" for text in texts)

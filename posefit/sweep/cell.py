@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
-UNLIKE = ("evaluations", "evaluations_per_second")  # measures that a row has under another name, or not at all
+RENAMED_MEASURES = (
+    "evaluations",
+    "evaluations_per_second",
+)  # measures that a row has under another name, or not at all
 
 
 @dataclass(frozen=True)
@@ -142,8 +145,8 @@ class TrackCell(Cell):
         errors = 1e3 * joint_distances(truth, estimate).mean(axis=0)  # both roots at one point, as in `mpjpe_mm`
         measured = asdict(result.measures)
         row = {
-            **{name: measured[name] for name in MEASURES if name not in UNLIKE},
-            "warnings": result.course.warnings,
+            **{name: measured[name] for name in MEASURES if name not in RENAMED_MEASURES},
+            "warnings": result.log.warnings,
             "evaluations_used": result.measures.evaluations,
             "dimensions": result.setup.dimensions,
             "joint_errors_mm": [round(float(error), 3) for error in errors],

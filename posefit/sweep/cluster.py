@@ -17,7 +17,7 @@ from posefit.sweep.cell import run_cell
 from posefit.sweep.engine import POLL_SECONDS, Limits, Outcome, Run, text_of
 from posefit.sweep.pool import Pool
 
-PATIENCE = 30.0  # seconds to wait for a scheduler, and for its workers
+CONNECT_TIMEOUT_SECONDS = 30.0  # seconds to wait for a scheduler, and for its workers
 CLOSE_SECONDS = 5.0
 _thread = threading.local()
 
@@ -28,7 +28,9 @@ class Cluster:
     Raises InputError where the scheduler does not answer, has no workers within `patience` seconds, or goes away.
     """
 
-    def __init__(self, scheduler: str, limits: Limits, run: Run = run_cell, patience: float = PATIENCE) -> None:
+    def __init__(
+        self, scheduler: str, limits: Limits, run: Run = run_cell, patience: float = CONNECT_TIMEOUT_SECONDS
+    ) -> None:
         try:
             import distributed
         except ImportError as error:
@@ -78,7 +80,7 @@ class Cluster:
         try:
             return Outcome(job, *future.result(timeout=CLOSE_SECONDS))
         except self._distributed.KilledWorker:
-            return Outcome(job, None, "its worker was lost", own=False)
+            return Outcome(job, None, "its worker was lost", is_own_fault=False)
         except (OSError, TimeoutError, self._distributed.CancelledError):
             return Outcome(job)  # with its worker or the scheduler
         except Exception as error:
@@ -95,4 +97,4 @@ def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None, bool]:
     _thread.pool.submit(job)
     while not (outcomes := _thread.pool.wait(POLL_SECONDS)):
         pass
-    return outcomes[0].result, outcomes[0].reason, outcomes[0].own
+    return outcomes[0].result, outcomes[0].reason, outcomes[0].is_own_fault

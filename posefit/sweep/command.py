@@ -5,11 +5,10 @@ import os
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 from posefit.errors import InputError
 from posefit.progress import bars_shown
@@ -32,26 +31,19 @@ def swept(
     *,
     shard: str | None = None,
     retry_quarantined: bool = False,
-    keep_old: bool = False,
     quiet: bool = False,
 ) -> Tally:
     """Return how the cells of a plan, or of one shard, ended that an engine ran into a folder, with a bar on stderr.
 
-    With `keep_old` a cell does not run that has a row of another version of posefit or of a plugin. The engine is
-    closed at the end.
+    Rows of another version of posefit or of a plugin do not count. The engine is closed at the end.
     """
     from tqdm.auto import tqdm
 
     with closing(engine), Writer(Path(out) / file_of(shard)) as ledger:
-        old: dict[str, Counter[str]] = {}  # the versions of rows that count for no cell of today, by the rest of a spec
-        for spec in ledger.old_specs():
-            if any(map(other_version, spec["version"].split(", "))):
-                old.setdefault(_unversioned(spec), Counter())[spec["version"]] += 1
-        for version, count in sum(old.values(), Counter[str]()).items():
-            kept = "count, too" if keep_old else "do not count here; --keep-old keeps them"
-            say(f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and {kept}")
-        chosen = cells_of(plan, shard)
-        ledger.plan(cell for cell in chosen if not (keep_old and old and _unversioned(cell.spec) in old))
+        for version, count in Counter(spec["version"] for spec in ledger.old_specs()).items():
+            if any(map(other_version, version.split(", "))):
+                say(f"{counted(count, 'row')} in {out} are of another version, {cut(version)}, and do not count here")
+        ledger.plan(cells_of(plan, shard))
         if retry_quarantined:
             count = ledger.release_quarantined()
             say(f"{count} {'cell is' if count == 1 else 'cells are'} out of quarantine, to be tried again")
@@ -87,10 +79,6 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     """Return the cells of a plan, or each Nth of them, from the Ith, for a shard I/N."""
     first, _, count = (shard or "1/1").partition("/")
     return islice(plan, int(first) - 1, None, int(count))
-
-
-def _unversioned(spec: Mapping[str, Any]) -> str:
-    return json_of({**spec, "version": "", "name": ""})
 
 
 def preview(plan: str, out: str | None, shard: str | None, as_json: bool) -> Iterator[str]:

@@ -40,9 +40,9 @@ def drive(
     watch(tally)
     waiting, running = deque(ledger.planned()), dict[str, int]()  # the place of each cell that runs, by its key
     try:
-        with _stopping(say) as wishes:
-            while len(wishes) < 2 and (running or (waiting and not wishes)):
-                while waiting and not wishes and len(running) < engine.window():
+        with _stopping(say) as stop_requests:
+            while len(stop_requests) < 2 and (running or (waiting and not stop_requests)):
+                while waiting and not stop_requests and len(running) < engine.window():
                     place = waiting.popleft()
                     cell = ledger.cell(place)
                     running[cell.key] = place
@@ -60,7 +60,7 @@ def drive(
                             waiting.append(place)
                         else:
                             tally.failed += 1
-                            if ledger.fail(key, outcome.reason, outcome.own):
+                            if ledger.fail(key, outcome.reason, outcome.is_own_fault):
                                 tally.quarantined += 1
                             else:
                                 waiting.append(place)
@@ -76,20 +76,20 @@ def drive(
 
 @contextmanager
 def _stopping(say: Callable[[str], None]) -> Iterator[list[int]]:
-    """Yield wishes to stop, which come by Ctrl-C, twice for at once, or by SIGTERM; in the main thread alone."""
-    wishes: list[int] = []
+    """Yield requests to stop, which come by Ctrl-C, twice for at once, or by SIGTERM; in the main thread alone."""
+    stop_requests: list[int] = []
     if threading.current_thread() is not threading.main_thread():
-        yield wishes
+        yield stop_requests
         return
 
     def stop(number: int, _: object) -> None:
-        wishes.extend([number] * (2 if number == signal.SIGTERM else 1))
-        if len(wishes) == 1:
+        stop_requests.extend([number] * (2 if number == signal.SIGTERM else 1))
+        if len(stop_requests) == 1:
             say("finishing the cells that run; Ctrl-C once more stops at once")
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield wishes
+        yield stop_requests
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -44,7 +44,7 @@ class Outcome:
     job: Any
     result: Any = field(default=None, repr=False)
     reason: str | None = None
-    own: bool = True  # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
+    is_own_fault: bool = True  # its own fault: a limit, an exception, a segfault, an exit; not a kill from outside
 
 
 class Engine(Protocol):

@@ -22,10 +22,18 @@ from posefit.limits import end_with_parent, memory
 from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
 
 START_SECONDS = 60.0  # that a process may take to begin a job; twice as long after each time that none did
-LEFT = 64  # the status of a process that a job ended with 0
+EXIT_ZERO_STATUS = 64  # the status of a process that a job ended with 0
 # Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
 # out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
-OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2}
+EXTERNAL_SIGNALS = {
+    signal.SIGKILL,
+    signal.SIGTERM,
+    signal.SIGINT,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+}
 _starting = threading.Lock()
 
 
@@ -83,9 +91,9 @@ class Pool:
         except ProcessExpired as error:
             code = error.exitcode or 0
             if code >= 0:
-                return Outcome(job, None, f"its process ended itself with status {code % LEFT}")
+                return Outcome(job, None, f"its process ended itself with status {code % EXIT_ZERO_STATUS}")
             name = next((number.name for number in signal.Signals if number == -code), f"signal {-code}")
-            return Outcome(job, None, f"its process died of {name}", own=-code not in OUTSIDE)
+            return Outcome(job, None, f"its process died of {name}", is_own_fault=-code not in EXTERNAL_SIGNALS)
         except (BrokenProcessPool, CancelledError):
             return Outcome(job)
         except Exception as error:  # a result that cannot be read
@@ -119,7 +127,9 @@ def _become_worker(parent: int, path: list[str], prepare: bytes) -> None:
         os.setpgid(0, 0)
     sys.path[:] = path
     leave = os._exit
-    os._exit = lambda status: leave(status or LEFT)  # pebble takes a process that ends with 0 for one that may
+    os._exit = lambda status: leave(
+        status or EXIT_ZERO_STATUS
+    )  # pebble takes a process that ends with 0 for one that may
     single_thread()
     end_with_parent(parent)
     if (called := pickle.loads(prepare)) is not None:

@@ -29,11 +29,6 @@ _TEXTS = (
 )  # fmt: skip
 
 
-def is_search(spec: Mapping[str, Any]) -> bool:
-    """Return whether a spec is that of a single search, which has no motion: see `posefit.sweep.plan`."""
-    return bool(spec["kind"] == "search")
-
-
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     pandas = import_pandas()
@@ -58,7 +53,7 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
     flat |= {name: value for name, value in spec.items() if name not in ("files", "version")}
     flat["settings"] = ", ".join(settings_text(spec["settings"]))
-    if not is_search(spec):
+    if spec["kind"] == "track":
         flat |= {
             "corruption": ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items())),
             "train": ", ".join(spec["train"]),
@@ -81,7 +76,7 @@ def search_runs(rows: Iterable[Mapping[str, Any]], path: object) -> Iterator[Sui
     """Yield the runs of a ledger's rows. Raises ValueError, naming its path, where there are none, or other ones."""
     count = 0
     for row in rows:
-        if not is_search(row["spec"]):
+        if row["spec"]["kind"] != "search":
             raise InputError(f"{path}: expected a ledger of single searches, got one of tracks: posefit report")
         count += 1
         yield search_run(row)

@@ -88,7 +88,6 @@ def _check() -> None:
         out.flush()
 
     sys.path[:] = task["path"]
-    results.SECONDS = task["seconds"]
     try:
         label, checks = _checks(task["kind"], task["name"], task["settings"], task["only"])
     except (ValueError, ImportError) as mistake:
@@ -100,7 +99,7 @@ def _check() -> None:
         for check in checks:
             send(begins=check.name, at=time.monotonic())
             faulthandler.dump_traceback_later(task["seconds"] + task["overrun"], exit=True)
-            done.append(not_run(check.name, done) or check.run())
+            done.append(not_run(check.name, done) or check.run(task["seconds"]))
             send(**vars(done[-1]))
     sys.stdout.flush()
     os._exit(0)  # whatever the plugin left running

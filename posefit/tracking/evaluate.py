@@ -11,11 +11,11 @@ from posefit.evaluation.trust import trust_of
 from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
-from posefit.measuring.gait import backwards, backwards_warning, gait_of
+from posefit.measuring.gait import backwards_warning, gait_of, walks_backwards
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RELOCALISED
-from posefit.tracking.result import Course, Setup, Track
+from posefit.tracking.result import Setup, Track, TrackingLog
 from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import modes_of, track_modes
 
@@ -33,21 +33,43 @@ def evaluate(
     """Return a track with errors against the truth where it is known, else signs of trust.
 
     `frames` are those of `tracked`, smoothed; `clock` (2,) is how many seconds and CPU seconds they took,
-    from the first mask that was read.
+    from the first mask that was read. The build is that of `scene`; that of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
     posteriors = [frame.posterior for frame in frames]
     posteriors = [None if each is None else replace(each, modes=modes_of(skeleton, each)) for each in posteriors]
     frames = [replace(frame, posterior=each) for frame, each in zip(frames, posteriors, strict=True)]
-    none = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
     table, measures = evaluated(scene, frames, method.prior, task.angles, method.audit.beta, clock)
-    motion, trust = scene.motion(frames), None
-    walks_back = backwards(motion, unseen(table))
-    warnings = [*scene.warnings, *method.audit.warnings]
+    trust = None
     if scene.truth is None:
-        warnings += filter(None, [backwards_warning(walks_back)])
         trust = trust_of(scene, tracked.frames, frames, table, measures.iou, task.training)
-    setup = Setup(
+    motion, modes = scene.motion(frames), track_modes(skeleton, posteriors)
+    backwards = walks_backwards(motion, unseen(table))
+    warnings = [*scene.warnings, *method.audit.warnings]
+    if scene.truth is None and (warning := backwards_warning(backwards)):
+        warnings.append(warning)
+    setup = _setup(scene, method, task, options)
+    none = [p.recalibration.none for p in posteriors if p is not None and p.recalibration is not None]
+    log = TrackingLog(
+        hypotheses=tracked.hypotheses,
+        build=None if shape is None else shape.as_dict(),
+        trace=frames[0].trace.tolist() if len(frames) == 1 else None,
+        modes=[round(mode.weight, 6) for mode in modes] or None,
+        none_of_modes=round(float(np.mean(none)), 6) if none else None,
+        unknown_sides=_numbers(table, "unknown_sides", 1.0),
+        lost_frames=_numbers(table, "lost", LOST),
+        relocalised=[scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
+        retracked_outside=tracked.stay and (scene.first + tracked.stay[0], scene.first + tracked.stay[1]),
+        backwards_share=round(float(backwards.mean()), 6),
+        warnings=warnings,
+        guesses=[*scene.guesses],
+    )
+    gait = gait_of(motion, unseen(table))
+    return Track(motion, frames, table, measures, trust, gait, setup, log, modes, scene)
+
+
+def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> Setup:
+    return Setup(
         motion=scene.name,
         method=method.name,
         settings=method.settings,
@@ -62,26 +84,8 @@ def evaluate(
         camera=scene.placing,
         size_pixels=(scene.cameras[0].width, scene.cameras[0].height),
         fps=scene.fps,
-        frames=len(frames),
+        frames=scene.count,
     )
-    modes = track_modes(skeleton, posteriors)
-    stay = None if tracked.stay is None else (scene.first + tracked.stay[0], scene.first + tracked.stay[1])
-    course = Course(
-        hypotheses=tracked.hypotheses,
-        build=None if shape is None else shape.as_dict(),
-        trace=frames[0].trace.tolist() if len(frames) == 1 else None,
-        modes=[round(mode.weight, 6) for mode in modes] or None,
-        none_of_modes=round(float(np.mean(none)), 6) if none else None,
-        unknown_sides=_numbers(table, "unknown_sides", 1.0),
-        lost_frames=_numbers(table, "lost", LOST),
-        relocalised=[scene.first + k for k, frame in enumerate(frames) if RELOCALISED in frame.details],
-        retracked_outside=stay,
-        backwards_share=round(float(walks_back.mean()), 6),
-        warnings=warnings,
-        guesses=[*scene.guesses],
-    )
-    gait = gait_of(motion, unseen(table))
-    return Track(motion, frames, table, measures, trust, gait, setup, course, modes, scene)
 
 
 def _numbers(table: Table, name: str, least: float) -> list[int] | None:

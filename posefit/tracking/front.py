@@ -117,7 +117,6 @@ def _sources(source: Footage | Scene | Sequence[Any]) -> Sequence[Footage]:
 
 
 def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage]) -> None:
-    """Return nothing. Raises InputError for options that do not fit a source whose truth is known, or unknown."""
     captured = any(str(motion).lower().endswith(".amc") for motion in motions if isinstance(motion, str | Path))
     folders = any(Path(motion).is_dir() for motion in options.train if isinstance(motion, str | Path))
     if options.rate is not None and not (captured or folders):

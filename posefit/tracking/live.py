@@ -28,7 +28,7 @@ from posefit.tracking.defaults import completed
 from posefit.tracking.initialise import initialise, task_of
 from posefit.tracking.method import method_names, prepare
 from posefit.tracking.options import TrackOptions, declared
-from posefit.tracking.pipeline import follow, with_notes
+from posefit.tracking.pipeline import track_hypothesis, with_notes
 from posefit.tracking.restarts import SEARCHED, TRIAL_FRAMES, TRIAL_STRIDE
 from posefit.tracking.trajectory import Hypothesis
 
@@ -99,7 +99,7 @@ def track_live(source: str = "-", *, progress: Progress = QUIET, **options: Any)
         method = prepare(chosen, task)
         task, _, _ = initialise(scene, method, task, chosen, progress)
         hypothesis = Hypothesis(SEARCHED, task, np.random.default_rng(chosen.seed))
-        for frame in follow(hypothesis, method, coming(), method.relocalise_gap):
+        for frame in track_hypothesis(hypothesis, method, coming(), method.relocalise_gap):
             live = waiting.popleft()
             arrived, start = live.source.arrived, first[0].source.arrived
             yield LiveFrame(live.source.number, arrived - start, time.perf_counter() - arrived, live.usable, frame)

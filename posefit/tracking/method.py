@@ -74,7 +74,7 @@ class Method:
     settings: dict[str, dict[str, Any]]
     looks_ahead: bool  # whether its tracker takes several observations before it yields a frame
     relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never
-    audit: Audit  # of what its trackers report
+    audit: Audit  # of what its trackers report: grows while they do
     build: Callable[[Task], Tracker] = field(repr=False)
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -143,30 +143,36 @@ def parsed_settings(offers: Sequence[Offer], values: Mapping[str, Any] | Sequenc
     """
     places = places_of(offers)
     each: dict[str, dict[str, Any]] = {name: {} for name in places}
-    for item in values:
-        key, equals, value = (item, "=", values[item]) if isinstance(values, Mapping) else item.partition("=")
-        name, dot, setting = key.partition(".")
-        if not dot:  # the name may be left out where one plugin alone has the setting
-            names = {name: settings.names(factory) for name, (_, factory) in places.items()}
-            owners = [name for name in names if key in names[name]]
-            if equals and len(owners) != 1:
-                known = ", ".join(f"{name}.{each}" for name in names for each in names[name])
-                raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
-            name, setting = (owners or [""])[0], key
-        if not (equals and setting):
-            raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(item)}")
-        if name not in places:
-            known = ", ".join(places)
-            raise InputError(f"a setting must name one of {known}, which are in use here, got {quoted(item)}")
+    stated = isinstance(values, Mapping)  # else texts, whose values are to be parsed
+    for key, value in values.items() if isinstance(values, Mapping) else map(_assignment, values):
+        name, setting = _owner(key, places)
         if setting in each[name]:
             raise InputError(f"a setting must be given once, got {quoted(key)} twice")
         each[name][setting] = value
-    for name, (_, factory) in places.items():
-        if isinstance(values, Mapping):
-            each[name] = settings.check(name, factory, each[name])
-        else:
-            each[name] = settings.parse(name, factory, each[name])
-    return {kind: each[name] for name, (kind, _) in places.items()}
+    checked = settings.check if stated else settings.parse
+    return {kind: checked(name, factory, each[name]) for name, (kind, factory) in places.items()}
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals or key.endswith("."):
+        raise InputError(f"a setting must be NAME.SETTING=VALUE such as sapso.cooling=0.9, got {quoted(text)}")
+    return key, value
+
+
+def _owner(key: str, places: Mapping[str, tuple[str, Callable[..., Any]]]) -> tuple[str, str]:
+    """Return the plugin and the setting that a key names; the plugin may be left out where it alone has the setting."""
+    plugin, dot, setting = key.partition(".")
+    if dot and plugin in places:
+        return plugin, setting
+    if dot:
+        raise InputError(f"a setting must name one of {', '.join(places)}, which are in use here, got {quoted(key)}")
+    names = {plugin: settings.names(factory) for plugin, (_, factory) in places.items()}
+    owners = [plugin for plugin in names if key in names[plugin]]
+    if len(owners) != 1:
+        known = ", ".join(f"{plugin}.{setting}" for plugin in names for setting in names[plugin])
+        raise InputError(f"a setting must be one of {known}, got {quoted(key)}")
+    return owners[0], key
 
 
 def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> Method:

@@ -3,9 +3,9 @@
 | step | what it returns | file |
 |---|---|---|
 | `initialise` | the first pose and the person's build | initialise.py |
-| `follow_all`, `follow` | the frames of each hypothesis, and of one, by the method's own tracker | this one |
+| `track_hypotheses`, `track_hypothesis` | the frames of each, and of one, by the method's tracker | this one |
 | `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
-| `smooth` | of footage: a smooth path, feet that stand, poses fitted to the contours | smoothing/ |
+| `smooth` | of footage: a smooth path, planted feet, poses fitted to the contours | smoothing/ |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
 """
 
@@ -29,17 +29,17 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import (
     SEARCHED,
     after,
-    backwards,
     first_shown_whole,
     initial_guess,
     joined,
     relocalised,
     retrack_spins,
+    reversed_task,
     stream,
 )
 from posefit.tracking.result import Track
 from posefit.tracking.smoothing.smooth import smooth
-from posefit.tracking.trajectory import Hypothesis, cheapest
+from posefit.tracking.trajectory import Hypothesis, cheapest, with_effort_of
 
 MAX_NOTES = 3  # of the files that a method learns from, which may be thousands
 
@@ -71,11 +71,11 @@ def track_scene(
     with threadpool_limits(1):  # an optimiser's matrices are small: BLAS is slower with more threads
         method = prepare(options, task)
         with progress.phase("build"):
-            task, shape, start = initialise(scene, method, task, options, progress)
+            task, shape, start_clocks = initialise(scene, method, task, options, progress)
             scene = replace(scene, body=task.body)
         method.audit.clear()  # what was tried before the first frame is in no row
-        with progress.phase("follow"):
-            hypotheses = follow_all(scene, task, method, options, recorder or Recorder(), progress)
+        with progress.phase("track"):
+            hypotheses = track_hypotheses(scene, task, method, options, recorder or Recorder(), progress)
             tracked = cheapest(scene, hypotheses, task.training)
             if scene.truth is None and method.looks_ahead:
                 tracked = retrack_spins(task, scene.observations, tracked, method.follow, options.seed)
@@ -87,45 +87,44 @@ def track_scene(
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)
         with progress.phase("evaluate"):
-            clock = clocks() - start + scene.reading_seconds
+            clock = clocks() - start_clocks + scene.reading_seconds
             track = evaluate(scene, frames, tracked, shape, method, task, options, clock)
-    for warning in track.course.warnings[len(scene.warnings) :]:
+    for warning in track.log.warnings[len(scene.warnings) :]:
         progress.warn(warning)
     return track
 
 
-def follow_all(
+def track_hypotheses(
     scene: Scene, first: Task, method: Method, options: TrackOptions, recorder: Recorder, progress: Progress
 ) -> list[Hypothesis]:
     """Return each hypothesis with all its frames. Each is recorded as it comes; recorded ones are not tracked again."""
     recorded, state = recorder.earlier()
     gap = method.relocalise_gap if scene.truth is None else 0
-    count, total, start = scene.count, options.hypotheses, _start(scene, first, method)
-    followed: list[Hypothesis] = []
+    count, total, pivot = scene.count, options.hypotheses, _pivot(scene, first, method)
+    tracked: list[Hypothesis] = []
     for number in range(total):
-        usable = (k for k in range(start, count) if scene.observations[k].usable)
-        reference = followed[0].frames[next(usable, 0)] if number else None
-        hypothesis = _begun(number, scene, first, options, reference)
+        hypothesis = _hypothesis(number, scene, first, options, tracked, pivot)
         frames = recorded[number * count : (number + 1) * count]
         done, which = len(frames), f"track {number + 1} of {total}"
         if 0 < done < count and state is not None:
             hypothesis = _resumed(hypothesis, frames, state)
             frames = list(hypothesis.frames)
-            progress.log(f"going on from frame {done} of {count}" + f" of {which}, {hypothesis.guess}" * (total > 1))
+            of_several = f" of {which}, {hypothesis.guess}" if total > 1 else ""
+            progress.log(f"going on from frame {done} of {count}{of_several}")
         elif not done and total > 1:
             progress.log(f"{which}: {hypothesis.guess}")
         if done < count:
             rng = stream(options.seed, "back", number)
-            behind = _followed_back(scene, hypothesis, method, start, rng, progress) if start and not done else []
-            ahead = (scene.observations[k] for k in range(done or start, count))
-            for frame in progress.steps(follow(hypothesis, method, ahead, gap, behind), count - done):
+            behind = _tracked_back(scene, hypothesis, method, pivot, rng, progress) if pivot and not done else []
+            ahead = (scene.observations[k] for k in range(done or pivot, count))
+            for frame in progress.steps(track_hypothesis(hypothesis, method, ahead, gap, behind), count - done):
                 recorder.record(frame, dict(hypothesis.rng.bit_generator.state))
                 frames.append(frame)
-        followed.append(replace(hypothesis, frames=frames))
-    return followed
+        tracked.append(replace(hypothesis, frames=frames))
+    return tracked
 
 
-def follow(
+def track_hypothesis(
     hypothesis: Hypothesis,
     method: Method,
     ahead: Iterable[Observation],
@@ -134,19 +133,20 @@ def follow(
 ) -> Iterator[Frame]:
     """Yield the frames of one hypothesis in the order of time, one for each observation that is `ahead`.
 
-    After a `gap` of so many frames without the person they are searched again. Frames `behind` were followed back in
-    time from the first observation ahead; what comes goes on from there, and they are yielded before it.
+    After a `gap` of so many frames without the person they are searched again. Frames `behind` were tracked back in
+    time from the first observation ahead, the pivot, and are yielded before it. The pivot is searched twice, on the way
+    back and again from there; its frame has the effort of both.
     """
     task = after(hypothesis.task, behind[0]) if behind else hypothesis.task
     frames = relocalised(task, method.follow, ahead, hypothesis.rng, gap)
     if behind:
-        first = next(frames)
-        yield from joined(task.body.skeleton, behind, first)[:0:-1]
-        yield first
+        pivot = next(frames)
+        yield from reversed(joined(task.body.skeleton, behind, pivot)[1:])
+        yield with_effort_of(pivot, [behind[0], pivot])
     yield from frames
 
 
-def _start(scene: Scene, task: Task, method: Method) -> int:
+def _pivot(scene: Scene, task: Task, method: Method) -> int:
     """Return the frame that is tracked first.
 
     In footage, a tracker that looks ahead begins with the first frame that shows the whole person; unless more is known
@@ -158,19 +158,23 @@ def _start(scene: Scene, task: Task, method: Method) -> int:
     return first_shown_whole(scene.observations) if task.yaw == first_yaw else 0
 
 
-def _followed_back(
-    scene: Scene, hypothesis: Hypothesis, method: Method, start: int, rng: np.random.Generator, progress: Progress
+def _tracked_back(
+    scene: Scene, hypothesis: Hypothesis, method: Method, pivot: int, rng: np.random.Generator, progress: Progress
 ) -> list[Frame]:
-    """Return the frames from the one that is tracked first back to the first of the scene."""
-    back = (scene.observations[k] for k in range(start, -1, -1))
-    return list(progress.steps(method.follow(backwards(hypothesis.task), back, rng), start + 1))
+    """Return the frames from the pivot back to the first of the scene."""
+    back = (scene.observations[k] for k in range(pivot, -1, -1))
+    return list(progress.steps(method.follow(reversed_task(hypothesis.task), back, rng), pivot + 1))
 
 
-def _begun(number: int, scene: Scene, first: Task, options: TrackOptions, reference: Frame | None) -> Hypothesis:
-    """Return a hypothesis before its first frame, guessed by a frame of the first hypothesis, if it is another."""
-    if reference is None:
+def _hypothesis(
+    number: int, scene: Scene, first: Task, options: TrackOptions, tracked: Sequence[Hypothesis], pivot: int
+) -> Hypothesis:
+    """Return a hypothesis before its first frame; unless it is the first, its guess varies a frame of the first one."""
+    if not tracked:
         return Hypothesis(SEARCHED, first, np.random.default_rng(options.seed))
-    guess, task = initial_guess(number, first, scene.yaw, options.first_pose == "given", reference)
+    usable = (k for k in range(pivot, scene.count) if scene.observations[k].usable)
+    estimate = tracked[0].frames[next(usable, 0)]
+    guess, task = initial_guess(number, first, scene.yaw, options.first_pose == "given", estimate)
     return Hypothesis(guess, task, stream(options.seed, "hypothesis", number))
 
 

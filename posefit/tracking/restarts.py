@@ -161,43 +161,55 @@ def relocalised(
         yield from follow(task, observations, rng)
         return
     coming, rest = tee(observations)
-    frames = follow(task, rest, rng)
-    many = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
-    few = max(round(HIGH_COST_SECONDS * task.fps), 1)
-    latest: Frame | None = None  # that showed the person
-    unseen, costs = 0, list[float]()  # frames since then; and since the last relocalisation
-
-    def add(frame: Frame, usable: bool) -> None:
-        nonlocal latest, unseen
-        if RELOCALISED in frame.details:
-            costs.clear()
-        unseen += 1
-        if usable:
-            latest, unseen = frame, 0
-            costs.append(frame.cost)
-
-    if len(task.before) > 1:  # a single one is what the track starts from
-        for earlier in task.before:
-            add(earlier, earlier.evaluations > 0)
+    frames, watch = follow(task, rest, rng), _Watch(task, gap)
     for observation in coming:
-        typical, high, trials = costs[:-few], costs[-few:], None
-        costly = len(typical) >= many and min(high) > COST_RISE * float(np.median(typical))
-        if observation.usable and latest is not None and (costly or unseen >= gap):
-            window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]
+        trials = list[Frame]()
+        if observation.usable and (latest := watch.due()) is not None:
+            window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]  # a copy reads ahead
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
-            around = replace(task, yaw=None, anchor=latest.translation, first_pose=None, before=())
-            on = after(around, latest)
-            best, trials = best_restart(around, window, follow, RESTARTS, seeds, on)
-            if best is not on:
+            unconstrained = replace(task, yaw=None, anchor=latest.translation, first_pose=None, before=())
+            continuation = after(unconstrained, latest)
+            best, trials = best_restart(unconstrained, window, follow, RESTARTS, seeds, continuation)
+            if best is not continuation:
                 frames = follow(best, chain([observation], copy(coming)), rng)
         if (frame := next(frames, None)) is None:
             return
-        if trials is not None:
+        if trials:
             frame = with_effort_of(frame, [frame, *trials])
-            frame = replace(frame, details={**frame.details, RELOCALISED: best is not on})
-        add(frame, observation.usable)
+            frame = replace(frame, details={**frame.details, RELOCALISED: best is not continuation})
+        watch.add(frame, observation.usable)
         yield frame
     yield from frames  # none: the tracker gets to its end
+
+
+class _Watch:
+    """Watches a track for what makes it relocalise: a gap, or costs that stay high."""
+
+    def __init__(self, task: Task, gap: int) -> None:
+        self._gap = gap
+        self._typical_frames = max(round(TYPICAL_COST_SECONDS * task.fps), 1)
+        self._high_frames = max(round(HIGH_COST_SECONDS * task.fps), 1)
+        self._latest: Frame | None = None  # that showed the person
+        self._missing = 0  # frames since then
+        self._costs = list[float]()  # since the last relocalisation
+        if len(task.before) > 1:  # a single one is what the track starts from
+            for frame in task.before:
+                self.add(frame, frame.evaluations > 0)
+
+    def add(self, frame: Frame, usable: bool) -> None:
+        """Take the next frame."""
+        if RELOCALISED in frame.details:
+            self._costs.clear()
+        self._missing += 1
+        if usable:
+            self._latest, self._missing = frame, 0
+            self._costs.append(frame.cost)
+
+    def due(self) -> Frame | None:
+        """Return the latest frame that showed the person where it is time to relocalise, else None."""
+        typical, high = self._costs[: -self._high_frames], self._costs[-self._high_frames :]
+        costly = len(typical) >= self._typical_frames and min(high) > COST_RISE * float(np.median(typical))
+        return self._latest if costly or self._missing >= self._gap else None
 
 
 # Several hypotheses.
@@ -266,7 +278,7 @@ def retrack_spins(
         return joined(task.body.skeleton, followed, frames[rows[0]])[1:]
 
     ahead = again(0, steady, range(last, len(frames)))
-    behind = again(1, backwards(steady), range(first, -1, -1))
+    behind = again(1, reversed_task(steady), range(first, -1, -1))
     new = [*behind[::-1], *frames[first : last + 1], *ahead]
     cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(new) < before
@@ -275,7 +287,7 @@ def retrack_spins(
     return tracked._replace(frames=new, stay=stay if better else None)
 
 
-def backwards(task: Task) -> Task:
+def reversed_task(task: Task) -> Task:
     """Return a task whose observations go back in time."""
     return replace(task, training=[motion.reversed() for motion in task.training], backwards=True)
 

@@ -66,7 +66,7 @@ class Setup:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class TrackingLog:
     """How the track went, and what it leaves open."""
 
     hypotheses: list[dict[str, Any]]
@@ -94,7 +94,7 @@ class Track:
     trust: Trust | None = field(repr=False)  # where the truth is unknown
     gait: Gait = field(repr=False)
     setup: Setup = field(repr=False)
-    course: Course = field(repr=False)
+    log: TrackingLog = field(repr=False)
     modes: list[TrackMode] = field(repr=False)  # of the whole track, the likeliest first
     scene: Scene = field(repr=False)
 
@@ -108,7 +108,7 @@ class Track:
     def summary(self) -> dict[str, Any]:
         """Everything but the frames, as `posefit track --json` prints it."""
         trust, gait = None if self.trust is None else asdict(self.trust), self.gait.as_dict()
-        values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.course), "trust": trust, "gait": gait}
+        values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.log), "trust": trust, "gait": gait}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @property
@@ -144,7 +144,7 @@ class Track:
     @property
     def unknown_sides(self) -> NDArray[np.bool_]:
         """In which frames (T,) left and right are unknown; between two of these they may be exchanged as well."""
-        return np.isin(self.table["frame"], self.course.unknown_sides or [])
+        return np.isin(self.table["frame"], self.log.unknown_sides or [])
 
     def angles(self, name: str) -> Array:
         """Return a clinical angle (T,) such as `left_knee_flexion`, in degrees; NaN where the frame shows nothing.

@@ -53,7 +53,7 @@ class TrajectoryCost:
 
     @property
     def total(self) -> float:
-        """By which trajectories are compared: the less the better."""
+        """By which trajectories are compared: lower is better."""
         return self.cost + self.motion
 
 
@@ -131,5 +131,4 @@ def _velocities(joints: Array, fps: float) -> Array:
 
 
 def _mean_squares(velocities: Array) -> Array:
-    """Return the mean square (T,) of velocities (T, 27, 3), over the joints."""
     return np.asarray((velocities**2).sum(axis=2).mean(axis=1))

@@ -183,9 +183,9 @@ def mirrored_gain(targets: Array, joints: Array) -> Array:
     across = joints[:, _LEFT_HIP] - joints[:, _RIGHT_HIP]
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
     mirrored = joints - 2.0 * np.einsum("tjk,tk->tj", joints, across)[..., None] * across[:, None]
-    named = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(axis=1)
-    traded = np.linalg.norm(targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1).mean(axis=1)
-    return np.asarray(named - traded)
+    direct = np.linalg.norm(targets[:, _PAIRED] - joints[:, _PAIRED], axis=-1).mean(axis=1)
+    exchanged = np.linalg.norm(targets[:, _PAIRED] - mirrored[:, np.array(MIRROR)[_PAIRED]], axis=-1).mean(axis=1)
+    return np.asarray(direct - exchanged)
 
 
 def second_side(skeleton: Skeleton, posterior: Posterior, pose: Array) -> float:

@@ -143,7 +143,7 @@ def test_a_shell_completes_methods_and_motions() -> None:
 def test_a_result_has_three_lines_and_messages_only_where_they_are_wanted() -> None:
     result = run("track", "walk", "--frames", "0:5", *QUICK)
     assert len(result.stdout.splitlines()) == 3
-    assert all(f"{phase} " in result.stderr for phase in ("masks", "build", "follow", "write"))
+    assert all(f"{phase} " in result.stderr for phase in ("masks", "build", "track", "write"))
     assert run("track", "walk", "--frames", "0:5", "--quiet", *QUICK).stderr == ""
 
 

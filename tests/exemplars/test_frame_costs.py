@@ -15,8 +15,8 @@ from posefit.motion.built_in import average_skeleton
 from posefit.silhouette.mask import Silhouette
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
+from posefit_exemplars.calibration import evidence, recalibrated, stored_calibration
 from posefit_exemplars.frame_costs import FrameCosts
-from posefit_exemplars.lost_model import evidence, recalibrated, stored_calibration
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
-from posefit_exemplars.lost_model import reported
+from posefit_exemplars.calibration import reported
 from posefit_exemplars.markov import FrameStates, SampledPaths, frame_states, mean_near, state_weights
 from posefit_exemplars.smoothing import Estimate, smoothed, smoothed_pose
 from posefit_exemplars.tracker import SIMILAR_DISTANCE, state_distances

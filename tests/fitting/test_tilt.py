@@ -8,7 +8,7 @@ import pytest
 from posefit import SearchSpace, Task
 from posefit.arrays import Array
 from posefit.fitting.prior import Tilt
-from posefit.fitting.tracker import Follower, Observation, Prediction, SynthesisTracker
+from posefit.fitting.tracker import Observation, Prediction, Predictor, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.motion import built_in
 from posefit.motion.motion import Motion
@@ -69,15 +69,15 @@ def test_a_roll_past_half_a_turn_is_the_same_as_before_it(turns: int) -> None:
 
 def test_a_turn_over_in_training_may_be_repeated() -> None:
     cartwheel = bending(np.zeros(73), np.linspace(0.0, 2.0 * np.pi, 73))
-    follower = Follower(task_of(cartwheel), Line(), Prediction())
-    space = follower.space(NOTHING)
+    predictor = Predictor(task_of(cartwheel), Line(), Prediction())
+    space = predictor.space(NOTHING)
     assert space.periodic.tolist() == [False, False, True, False]
     rolls = []
     for _ in range(50):  # as far as it goes to one side, from frame to frame
         proposal = np.array([0.0, 0.0, 0.9, 0.0])
-        follower.commit(proposal)
+        predictor.commit(proposal)
         rolls.append(space.decode(proposal[None])[0][0, 2])
-        space = follower.space(NOTHING)
+        space = predictor.space(NOTHING)
     np.testing.assert_allclose(np.diff(rolls), np.radians(0.9 * 15.0))
     assert rolls[-1] - rolls[0] > 2.0 * np.pi
     assert not space.periodic[2]
@@ -86,8 +86,8 @@ def test_a_turn_over_in_training_may_be_repeated() -> None:
 def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
     rng = np.random.default_rng(0)
     rolling = bending(np.zeros(500), rng.uniform(-1.0, 1.0, 500))
-    follower = Follower(task_of(rolling), Line(), Prediction(), Tilt.of(Line(), [rolling], 1.0, 0.0))
-    space = follower.space(NOTHING)
+    predictor = Predictor(task_of(rolling), Line(), Prediction(), Tilt.of(Line(), [rolling], 1.0, 0.0))
+    space = predictor.space(NOTHING)
     tilt = space.tilt
     assert tilt is not None
     np.testing.assert_allclose(space.centre[2] + np.array([-1.0, 1.0]) * space.half[2], [tilt.low[1], tilt.high[1]])
@@ -95,8 +95,8 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
     for roll in (0.5, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0):
         last = space.coordinates(np.array([0.0, 0.0, roll, 0.0]))
         moved = space.centre[2] + roll * space.half[2]
-        follower.commit(np.array([0.0, 0.0, roll, 0.0]))
-        space = follower.space(NOTHING)
+        predictor.commit(np.array([0.0, 0.0, roll, 0.0]))
+        space = predictor.space(NOTHING)
         assert space.half[2] == pytest.approx(np.radians(15.0))
         assert space.start is not None
         np.testing.assert_allclose(space.coordinates(space.start.mean), last, atol=1e-12)
@@ -108,20 +108,20 @@ def test_a_part_of_the_range_moves_with_the_last_pose_and_stays_in_it() -> None:
 @each("how", [Prediction(), Prediction(tilt="box")])
 def test_nothing_to_learn_from_or_a_box_is_a_box_around_upright(how: Prediction) -> None:
     training = [bending(np.full(9, 0.8), np.zeros(9))] if how.tilt == "box" else []
-    follower = Follower(task_of(*training), Line(), how)
-    space = follower.space(NOTHING)
+    predictor = Predictor(task_of(*training), Line(), how)
+    space = predictor.space(NOTHING)
     assert space.tilt is None
     np.testing.assert_allclose(space.centre[:3], [0.3, 0.0, 0.0])
     np.testing.assert_allclose(space.half[:3], np.radians([45.0, 15.0, 15.0]))
-    follower.commit(np.array([0.5, 1.0, 1.0, 0.0]))
-    np.testing.assert_array_equal(follower.space(NOTHING).centre[1:3], 0.0)
+    predictor.commit(np.array([0.5, 1.0, 1.0, 0.0]))
+    np.testing.assert_array_equal(predictor.space(NOTHING).centre[1:3], 0.0)
 
 
 def test_a_first_pose_that_is_given_begins_with_the_tilt_that_goes_with_it() -> None:
     hip = np.linspace(-1.0, 1.0, 100)
     lying = bending(0.9 * hip + np.where(hip > 0.5, 0.8, 0.0), 0.0 * hip, hip)
     task = replace(task_of(lying), first_pose=np.eye(63)[0] * 0.4)
-    space = Follower(task, Line(), Prediction()).space(NOTHING)
+    space = Predictor(task, Line(), Prediction()).space(NOTHING)
     assert space.start is not None
     assert space.centre[1] != 0.0
     np.testing.assert_allclose(space.coordinates(space.start.mean), [0.3, 0.0, 0.0, 0.4], atol=1e-12)
@@ -134,10 +134,10 @@ def test_a_learned_prior_has_a_box_unless_its_tilt_is_to_be_learned() -> None:
     def tilt(choice: TrackOptions) -> Tilt | None:
         tracker = prepare(choice, task).build(task)
         assert isinstance(tracker, SynthesisTracker)
-        return Follower(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
+        return Predictor(task, learned, tracker.prediction, tracker.tilt).space(NOTHING).tilt
 
     before = Tilt.of(Line(), [bending(np.full(4, 0.5), np.zeros(4))], 1.0, DEGREE)
-    assert Follower(task_of(), Line(), Prediction(), before).space(NOTHING).tilt is before
+    assert Predictor(task_of(), Line(), Prediction(), before).space(NOTHING).tilt is before
     assert tilt(TrackOptions(method="@pca")) is not None
     assert tilt(TrackOptions(method="@pca", settings={"tracker.tilt": "box"})) is None
     assert tilt(TrackOptions(method=("annealed", learned))) is None

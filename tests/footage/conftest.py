@@ -97,12 +97,12 @@ class Box:
 
 
 @pytest.fixture
-def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Any], None]:
+def segmenter(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Return how a segmenter is registered."""
     registry = segmentation.registry()
 
-    def register(name: str, factory: Any) -> None:
-        offer = Offer("segmenter", name, factory, "its-maker", "1.0")
+    def register(name: str, factory: Any, **more: Any) -> None:
+        offer = Offer("segmenter", name, factory, "its-maker", "1.0", **more)
         changed = SimpleNamespace(
             offers=registry.offers, offer=lambda kind, other: offer if other == name else registry.offer(kind, other)
         )

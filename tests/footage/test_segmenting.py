@@ -193,6 +193,32 @@ def test_a_mask_beside_which_most_of_what_moves_lies_is_not_usable() -> None:
     assert not any(row["usable"] for row in rows[4:])
 
 
+def test_before_a_camera_that_pans_masks_that_need_no_still_background_are_usable(
+    tmp_path: Path, segmenter: Callable[..., None]
+) -> None:
+    rng, path = np.random.default_rng(0), tmp_path / "pan.avi"
+    wide = cv2.resize(rng.integers(0, 255, (30, 160, 3), dtype=np.uint8), (640, 120), interpolation=cv2.INTER_NEAREST)
+    image, mask = figure()
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (160, 120))
+    for k in range(24):
+        writer.write(np.where(mask[..., None], image, wide[:, 12 * k : 12 * k + 160]))
+    writer.release()
+
+    class Network:
+        def __init__(self, film: object) -> None:
+            pass
+
+        def segment(self, image: Image) -> tuple[Any, Any]:
+            return mask, np.zeros_like(mask)
+
+    for still, usable in ((True, 1), (False, 24)):  # of the first there is none before
+        segmenter("network", Network, still_background=still)
+        segmentation, _ = segmented(path, Extraction("network"))
+        assert segmentation.usable.sum() == usable
+        assert segmentation.camera_moves
+        assert any("outside" in text for text in segmentation.warnings) == still
+
+
 def test_what_has_no_persons_shape_is_not_usable() -> None:
     for tall, wide in [(10, 4), (60, 2), (40, 40)]:
         image, mask = figure(0, tall, wide)

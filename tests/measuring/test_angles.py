@@ -321,5 +321,7 @@ def test_steps_are_written_one_a_row(walk: Motion, tmp_path: Path) -> None:
 def test_a_gait_is_json(walk: Motion) -> None:
     gait, none = (json.loads(json.dumps(each.as_dict())) for each in (gait_of(walk), NO_WALK))
     assert (gait["walk"], gait["why"], gait["steps"]) == (True, None, 3)
-    names = ("cadence", "speed", "step_length", "stride_length", "step_width", "stance_share")
-    assert none == {"walk": False, "why": "it is a dance", "steps": 0, **dict.fromkeys(names)}
+    names = ("cadence", "speed", "step_length", "stride_length", "step_width", "stance_share", "why_no_lengths")
+    foot = {"steps": 0, **dict.fromkeys(("step_seconds", "step_length", "stride_length", "stance_share"))}
+    sides = {"left": foot, "right": foot}
+    assert none == {"walk": False, "why": "it is a dance", "steps": 0, **dict.fromkeys(names), **sides}

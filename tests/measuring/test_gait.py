@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import posefit
-from posefit.geometry.skeleton import JOINTS
+from posefit.geometry.skeleton import BONES, JOINTS
 from posefit.measuring.events import gait_events, low_pass
-from posefit.measuring.gait import Gait, backwards, backwards_warning, gait_of
+from posefit.measuring.gait import Gait, backwards_warning, gait_of, stride_curves, walks_backwards
 from posefit.motion import built_in, recorded
 from posefit.motion.amc import read_clip
 from posefit.motion.motion import Motion
 from posefit.output.text import gait_line, table
 from tests.cases import each
 from tests.files import csv_rows
-from tests.measuring.walker import SPEED, walker
+from tests.measuring.walker import SPEED, STANCE, STRIDE, angle, walker
 
 WALKS = ("02_01", "05_01", *(f"16_{k}" for k in (*range(12, 19), *range(20, 33), 47, 58)))
 
@@ -77,7 +77,8 @@ WAITING = np.append(np.arange(len(WALKER)), np.full(999, len(WALKER) - 1))  # it
     [
         (built_in.motion("jacks", frames=90), "no strikes of a foot detected"),
         (built_in.motion("squat", frames=90), "no strikes of a foot detected"),
-        (built_in.motion("step", frames=90), "the person moves forwards at 0.00 m/s"),
+        (recorded.clip("05_07").motion(), "steps of a walk in 4.6 of 9.9 s"),  # a dance
+        (recorded.clip("14_23").motion(), "the person stays in one place, without even strides"),  # some work
         *((recorded.clip(name).motion(), "the person runs") for name in ("09_01", "127_06", "16_35", "49_04")),
         *((recorded.clip(name).motion(), "m wide") for name in ("05_16", "05_17", "127_24")),
         (walker(speed=-SPEED), "the person moves backwards at 1.00 m/s"),
@@ -116,7 +117,90 @@ def test_two_steps_are_enough_though_no_stride_is_whole() -> None:
     assert gait.cadence == pytest.approx(100.0, abs=1.0)
     assert gait.speed == pytest.approx(SPEED, abs=0.01)
     assert (gait.stride_length, gait.stance_share) == (None, None)
-    assert gait_line(gait.as_dict()) == "gait: 100 steps a minute, step 0.60 m, speed 1.00 m/s, over 2 steps"
+    assert gait_line(gait.as_dict()) == (
+        "gait: 100 steps a minute, 1.00 m/s, over 2 steps; left and right: step - and 0.60 m, step - and 0.60 s"
+    )
+
+
+LIMPS = [  # step lengths in metres and times in seconds, of left and right
+    ((-0.05, 0.47), (0.5, 0.7)),
+    ((0.47, -0.05), (0.7, 0.5)),
+    ((0.30, 0.60), (0.6, 0.6)),
+    ((0.62, 0.35), (0.45, 0.75)),
+    ((0.20, 0.50), (0.75, 0.45)),
+    ((0.55, 0.50), (0.65, 0.55)),
+]
+
+
+def limping(lengths: tuple[float, float], seconds: tuple[float, float], speed: float | None = None) -> Motion:
+    """Return a walker with such steps: a step is as long as the body moves meanwhile, and the foot is farther ahead.
+
+    Half a stance apart, a stiff leg's ankle is as far ahead of the hip as the sine of its swing times the leg.
+    """
+    stride = sum(seconds)
+    even = sum(lengths) / stride * np.array(seconds)
+    leg = float(WALKER.skeleton.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum())
+    apart = lengths[0] - even[0]  # of the ankles, ahead of the hips, at their strikes
+    assert lengths[1] - even[1] == pytest.approx(-apart)
+    swing = np.arcsin((0.3 + 0.5 * np.array([apart, -apart])) / leg)
+    first = {"l": 0.3, "r": 0.3 + seconds[1]}
+    assert stride == pytest.approx(STRIDE)
+    return walker(
+        6.0, 30.0, sum(lengths) / stride if speed is None else speed, 0.7, first, dict(zip("lr", swing, strict=True))
+    )
+
+
+@each(("lengths", "seconds"), LIMPS)
+def test_left_and_right_of_a_limp_are_apart(lengths: tuple[float, float], seconds: tuple[float, float]) -> None:
+    gait = gait_of(limping(lengths, seconds))
+    assert gait.why == gait.why_no_lengths == ""
+    for foot, length, time in zip((gait.left, gait.right), lengths, seconds, strict=True):
+        assert foot.step_length == pytest.approx(length, abs=0.04)
+        assert foot.step_seconds == pytest.approx(time, abs=0.03)
+        assert foot.stride_length == pytest.approx(sum(lengths), abs=0.01)
+        assert foot.stance_share == pytest.approx(STANCE, abs=0.03)
+    assert gait.left.steps + gait.right.steps == gait.as_dict()["steps"] >= 8
+
+
+def test_the_line_of_a_limp_has_both_sides() -> None:
+    expected = "left and right: step -0.05 and 0.47 m, step 0.50 and 0.70 s, stance "
+    assert expected in gait_line(gait_of(limping(*LIMPS[0])).as_dict())
+
+
+@each(("lengths", "seconds"), LIMPS)
+def test_of_who_walks_in_one_place_times_alone_are_known(
+    lengths: tuple[float, float], seconds: tuple[float, float]
+) -> None:
+    gait = gait_of(limping(lengths, seconds, 0.05))  # a belt that moves a little slower than they
+    assert gait.cadence == pytest.approx(100.0, abs=1.0)
+    assert [gait.left.step_seconds, gait.right.step_seconds] == pytest.approx(seconds, abs=0.03)
+    assert [gait.speed, gait.step_length, gait.stride_length, gait.left.step_length] == [None] * 4
+    line = gait_line(gait.as_dict())
+    assert line.endswith(
+        "; no lengths: the person stays in one place: on the spot, on a treadmill, or before a camera that turns with them"
+    )
+
+
+@each("name", WALKS)
+def test_recorded_walks_before_a_camera_that_turns_keep_their_cadence(name: str) -> None:
+    motion = recorded.clip(name).motion()
+    still = motion.translations.copy()
+    still[:, [0, 2]] = still[0, [0, 2]]
+    gait = gait_of(replace(motion, translations=still))
+    assert gait.cadence == pytest.approx(gait_of(motion).cadence, abs=1.0)
+    assert gait.step_length is None
+
+
+def test_a_stride_of_the_knee_is_that_between_two_strikes() -> None:
+    motion = walker(fps=100.0)
+    bent = np.zeros(motion.poses.shape)
+    bent[:, angle("ltibia", "x")] = np.radians(10.0 + 0.2 * np.arange(len(motion)))  # a fifth of a degree a frame
+    curves = stride_curves(replace(motion, poses=motion.poses + bent), gait_of(motion), "knee_flexion")
+    assert curves["left"].shape == (3, 101)
+    assert curves["right"].shape == (2, 101)
+    assert np.diff(curves["left"]) == pytest.approx(0.24, abs=0.01)  # 120 frames a stride
+    assert curves["left"][:, 0] - curves["right"][0, 0] == pytest.approx([16.0, 40.0, 64.0], abs=1.0)
+    assert np.ptp(curves["right"]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_strike_in_an_unknown_frame_does_not_count() -> None:
@@ -142,18 +226,18 @@ def turned(degrees: float) -> Motion:
 @each(("degrees", "back"), [(0.0, False), (60.0, False), (120.0, True), (180.0, True)])
 def test_a_person_who_faces_away_from_their_way_walks_backwards(degrees: float, back: bool) -> None:
     # half of half a second, beyond which nothing is known, is 8 frames
-    assert backwards(turned(degrees)).tolist() == [False] * 8 + [back] * 44 + [False] * 8
+    assert walks_backwards(turned(degrees)).tolist() == [False] * 8 + [back] * 44 + [False] * 8
 
 
 @each(("speed", "back"), [(0.29, False), (0.31, True)])
 def test_below_30_cm_a_second_a_person_has_no_way(speed: float, back: bool) -> None:
     places = np.array([0.0, 1.0, 0.0]) + np.arange(60)[:, None] / 30.0 * speed * np.array([0.0, 0.0, -1.0])
-    assert backwards(replace(WALK, poses=np.zeros((60, 66)), translations=places)).any() == back
+    assert walks_backwards(replace(WALK, poses=np.zeros((60, 66)), translations=places)).any() == back
 
 
 def test_unknown_frames_and_those_about_them_count_for_nothing() -> None:
-    assert np.flatnonzero(backwards(turned(180.0), {30})).tolist() == [*range(8, 22), *range(39, 52)]
-    assert not backwards(turned(180.0).frames(0, 16)).any()
+    assert np.flatnonzero(walks_backwards(turned(180.0), {30})).tolist() == [*range(8, 22), *range(39, 52)]
+    assert not walks_backwards(turned(180.0).frames(0, 16)).any()
 
 
 def test_a_few_frames_are_not_worth_a_warning() -> None:
@@ -180,7 +264,7 @@ def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> No
     assert gait["cadence"] == pytest.approx(true.cadence, abs=3.0)
     assert gait["speed"] == pytest.approx(true.speed, abs=0.05)
     assert gait_line(gait) in table(tracked.summary).splitlines()
-    assert gait_line(gait).startswith(f"gait: {gait['cadence']:.0f} steps a minute, step ")
+    assert gait_line(gait).startswith(f"gait: {gait['cadence']:.0f} steps a minute, {gait['speed']:.2f} m/s, over ")
     steps = csv_rows(out / "gait.csv")
     assert sum(step["step_seconds"] != "" for step in steps) == gait["steps"]
 

@@ -20,7 +20,6 @@ LIBRARIES = {
     "nevergrad": "nevergrad",
     "pymoo": "pymoo",
     "optuna": "optuna",
-    "ribs": "ribs",
     "mediapipe": "mediapipe",
 }
 
@@ -46,7 +45,7 @@ def test_listing_plugins_imports_none_of_their_libraries() -> None:
     assert ran.stdout.splitlines()[-1] == "[]"
 
 
-@each("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna", "ribs"])
+@each("name", ["scipy", "scipy:dual_annealing", "pycma", "nevergrad", "pymoo:PSO", "optuna"])
 def test_an_adapter_follows_a_motion_at_the_same_budget(name: str) -> None:
     threads = set(threading.enumerate())
     with warnings.catch_warnings():

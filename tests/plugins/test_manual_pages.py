@@ -13,7 +13,7 @@ PAGES = {
     for path in sorted(ROOT.rglob("*.py"))
     if (tree := ast.parse(path.read_text("utf-8"))).body
 }
-SECONDS = ("posefit_bridges.nevergrad", "posefit_bridges.ribs")  # that take some
+SECONDS = ("posefit_bridges.nevergrad",)  # that take some
 
 
 @pytest.mark.parametrize(

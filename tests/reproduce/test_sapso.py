@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from posefit.cli import main
 from posefit.evaluation.measures import BASELINES
-from posefit.fitting.tracker import Follower, Prediction
+from posefit.fitting.tracker import Prediction, Predictor
 from posefit.geometry.rotation import wrapped
 from posefit.testing.toy import Toy
 from posefit.tracking.defaults import completed
@@ -250,7 +250,7 @@ def test_the_first_yaw_is_searched_within_45_degrees_of_the_true_one(walk: Paper
     scene = paper_scene(walk, 45.0)
     assert scene.yaw == walk.test.poses[0, 0]
     options = completed(TrackOptions(**options_of(OURS, walk.training, 4)), scene.truth)
-    space = Follower(task_of(scene, options, walk.training), UnclusteredPCA().fit(walk.angles), Prediction(tilt="box"))
+    space = Predictor(task_of(scene, options, walk.training), UnclusteredPCA().fit(walk.angles), Prediction(tilt="box"))
     first = space.space(scene.observations[0])
     assert first.root_centre[0] == scene.yaw
     assert np.degrees(first.root_range[0]) == pytest.approx(45.0)

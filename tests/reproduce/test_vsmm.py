@@ -89,7 +89,14 @@ def right(film: activities.Film) -> dict[str, Any]:
     seconds = {"filter_seconds": np.full(len(labels), 0.001), "detection_seconds": np.full(len(labels), 0.002)}
     lost = np.zeros(len(labels), dtype=bool)
     group = np.array([0, 0, 2, 2])[labels]
-    return {"probabilities": probabilities, "group": group, "newcomer": none, "label": labels, "lost": lost, **seconds}
+    return {
+        "probabilities": probabilities,
+        "group": group,
+        "candidate_group": none,
+        "label": labels,
+        "lost": lost,
+        **seconds,
+    }
 
 
 def test_a_tracker_that_is_always_right_makes_no_mistake(film: activities.Film) -> None:
@@ -108,7 +115,7 @@ def test_what_is_late_or_wrong_is_counted(film: activities.Film) -> None:
     assert figures["delay"] == figures["delay_change"] == 140
     assert figures["group"] == pytest.approx(100.0 * 240 / 450)
     arrays = right(film)
-    arrays["newcomer"] = np.where(np.arange(450) == 5, 2, -1)  # G3, while the person steps
+    arrays["candidate_group"] = np.where(np.arange(450) == 5, 2, -1)  # G3, while the person steps
     figures = switching_figures(film.labels, arrays)
     assert (figures["activations"], figures["wrong_activations"], figures["wrong_terminations"]) == (1, 1, 0)
     arrays = right(film)

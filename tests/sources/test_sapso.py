@@ -11,7 +11,7 @@ from posefit import SearchSpace, Silhouette, Start, minimise
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.box import draw_population
-from posefit.fitting.tracker import Follower, Prediction, SynthesisTracker
+from posefit.fitting.tracker import Prediction, Predictor, SynthesisTracker
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import rotation_from_root_angles, yaw_first
@@ -296,7 +296,7 @@ def test_s3_the_papers_root_angles_are_about_x_then_y_then_z() -> None:
 
 def test_the_papers_variant_of_the_tracker_is_the_letter_of_every_interpretation() -> None:
     task, _, observations = scene()
-    space = Follower(task, Line(), Prediction(variant="paper")).space(observations[0])
+    space = Predictor(task, Line(), Prediction(variant="paper")).space(observations[0])
     assert (space.tilt, space.root_order) == (None, "xyz")  # Interpretations S16, S3
 
 

@@ -16,7 +16,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit_vsmm.groups import Topology, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import _TIPS, JointFilter, _knees, _tips, detect, rule_errors
+from posefit_vsmm.joints import _TIPS, JointFilter, _knees, _tips, detect, nearest_crossings, rules, two_crossings
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import MotionModels, library, lifted, ridge, without_heading
 from posefit_vsmm.preprocess import Lines, lines_of
@@ -33,7 +33,7 @@ from posefit_vsmm.state import (
     plus,
     tangents,
 )
-from posefit_vsmm.switching import Switching, limb_angles, normalised, regrouped, requested_group
+from posefit_vsmm.switching import PatentForm, Switching, limb_angles, normalised, regrouped, requested_group
 from posefit_vsmm.tracker import VSMM, TrackFilter
 from tests.cases import each
 
@@ -111,7 +111,9 @@ def detection() -> tuple[dict[str, Array], dict[str, float], Array]:
 
 
 def joints_in(image: np.ndarray, expected: Array, **how: Any) -> tuple[Array, Array]:
-    return detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, NO_BIAS, **how)[:2]
+    return detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules(**how)._replace(bias=NO_BIAS))[
+        :2
+    ]
 
 
 def test_the_head_is_where_a_ring_catches_most_of_the_contour() -> None:  # VSMM 2.1
@@ -145,7 +147,9 @@ def test_an_end_point_out_of_reach_is_not_assigned() -> None:  # Interpretation 
     image, places = figure()
     expected = places.copy()
     expected[AT["left hand"]] += [0.0, 60.0]
-    points, sure, unassigned = detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, NO_BIAS)
+    points, sure, unassigned = detect(
+        lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules()._replace(bias=NO_BIAS)
+    )
     assert sure[AT["left hand"]] == 0.0
     assert np.array_equal(points[AT["left hand"]], expected[AT["left hand"]])
     assert unassigned == 1
@@ -159,14 +163,14 @@ def test_to_the_letter_the_nearest_end_point_is_taken_first_and_by_one_joint() -
     expected[AT["left foot"]], expected[AT["right foot"]] = (128.0, 215.0), (131.0, 215.0)
     for nearest in (False, True):
         gates = np.full(len(POINTS), 1e3 if nearest else 30.0)
-        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], nearest)
+        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], rules(nearest).pairs)
         assert np.array_equal(tips["right foot"], ends[0])
         assert (("left foot" in tips), unassigned) == (nearest, not nearest)
     assert np.array_equal(tips["left foot"], ends[1])
 
 
 def test_plain_joint_errors_are_unbiased_and_the_torsos_are_the_roots() -> None:  # Interpretation V8
-    (bias, deviation), (plain_bias, plain_deviation) = rule_errors(), rule_errors(plain=True)
+    (bias, deviation, *_), (plain_bias, plain_deviation, *_) = rules(), rules(patent=True)
     assert bias.any()
     assert not plain_bias.any()
     assert (deviation[AT["torso"]] > deviation[AT["root"]]).all()
@@ -205,7 +209,7 @@ def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM
         expected[AT[name]] = place
     legs = np.array([[x, y] for x in (20.0, 80.0) for y in range(100, 201)])  # two upright legs around (50, 150)
     shape = Lines(legs, legs, legs, legs[:0])
-    knees = _knees(shape, expected, np.ones(len(POINTS)), expected, np.full(len(POINTS), 40.0))
+    knees = _knees(shape, expected, np.ones(len(POINTS)), expected, np.full(len(POINTS), 40.0), nearest_crossings)
     # the feet's line falls by a fifth from left to right in the picture, and so does the parallel through (50, 150)
     np.testing.assert_allclose(knees["left knee"], [20.0, 156.0], atol=1.1)
     np.testing.assert_allclose(knees["right knee"], [80.0, 144.0], atol=1.1)
@@ -213,7 +217,7 @@ def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM
     wide = np.full(len(POINTS), 90.0)
     for nearest in (False, True):
         one_line = Lines(together, together, together, legs[:0])
-        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, nearest) == {}
+        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, rules(nearest).crossings) == {}
 
 
 def test_to_the_letter_the_knees_are_two_crossings_also_where_both_are_expected_at_one() -> None:  # Interpretation V15
@@ -223,8 +227,8 @@ def test_to_the_letter_the_knees_are_two_crossings_also_where_both_are_expected_
         expected[AT[name]] = place
     legs = np.array([[x, y] for x in (20.0, 80.0) for y in range(100, 201)])
     shape, sure, gates = Lines(legs, legs, legs, legs[:0]), np.ones(len(POINTS)), np.full(len(POINTS), 1e3)
-    assert _knees(shape, expected, sure, expected, gates) == {}
-    knees = _knees(shape, expected, sure, expected, gates, nearest=True)
+    assert _knees(shape, expected, sure, expected, gates, nearest_crossings) == {}
+    knees = _knees(shape, expected, sure, expected, gates, two_crossings)
     np.testing.assert_allclose(knees["left knee"], [20.0, 150.0], atol=1.1)
     np.testing.assert_allclose(knees["right knee"], [80.0, 150.0], atol=1.1)
 
@@ -383,8 +387,8 @@ def test_a_new_models_prediction_has_its_noise_as_covariance_to_the_letter() -> 
     belief = replace(begun(switching), log_probabilities=np.log(np.full(6, 1.0 / 6.0)))
     belief = switching._only("G1", belief)
     old = switching.active
-    both = switching.joined(belief, "G3")
-    states, covariances = switching._beside(old).predict(both.states, both.covariances)
+    both = PatentForm().joined(switching, belief, "G3")
+    states, covariances = PatentForm().beside(switching, old).predict(both.states, both.covariances)
     _, usual = switching.imm.predict(both.states, both.covariances)
     noises = switching.models.of(switching.active).noises
     for k, name in enumerate(switching.active):
@@ -488,7 +492,7 @@ def begun_literally() -> tuple[Switching, Belief]:
     switching = in_first_group(variant="patent")
     state = encode(built_in.motion("jacks").poses[5:6], np.ones((1, 3)))[0]
     belief = replace(switching.start(state, 0.01 * np.eye(ERROR)), log_probabilities=np.log([1, 6, 1]))
-    return switching, switching.joined(normalised(belief), "G3")
+    return switching, PatentForm().joined(switching, normalised(belief), "G3")
 
 
 def test_the_cycle_over_both_groups_is_run_again_and_judged_in_the_frame_of_the_request() -> None:  # VSMM 9
@@ -504,7 +508,7 @@ def test_the_cycle_over_both_groups_is_run_again_and_judged_in_the_frame_of_the_
             return Measurement(*nothing, -100.0 * sign * near)
 
         for points in swinging([[2.0, 2.0, 3.0, 3.0], [4.1, 4.1, 3.0, 3.0]]):
-            assert (switching.group, switching.newcomer) == ("G1", None)
+            assert (switching.group, switching.candidate_group) == ("G1", None)
             after = switching.cycle(belief, measure, points)
         assert (switching.group, len(after.probabilities)) == (group, count)
 
@@ -516,9 +520,9 @@ def test_the_cycle_that_is_run_again_starts_from_the_frame_before(variant: str) 
     belief = switching.start(encode(walk.poses[5:6], walk.translations[5:6])[0], 0.01 * np.eye(ERROR))
     for points in swinging([[2.0, 2.0, 3.0, 3.0], [4.1, 4.1, 3.0, 3.0]]):
         after = switching.cycle(belief, nothing, points)
-    measure = twin._lifting(nothing)
+    measure = twin.form.measure(nothing)
     if variant == "patent":
-        both = twin.joined(belief, "G3")
+        both = PatentForm().joined(twin, belief, "G3")
         expected = twin.decided(twin.imm.cycle(both, measure))
     else:
         old, fused = twin.active, twin.imm.fused(belief)
@@ -538,7 +542,7 @@ def nothing(states: Array) -> Measurement:
 
 def test_a_new_model_is_as_probable_as_the_most_probable_one() -> None:  # VSMM 8.1
     switching, belief = begun_literally()
-    assert switching.newcomer == "G3"
+    assert switching.candidate_group == "G3"
     assert switching.active == ("stiff-walk", "walk", "arms-out", "jacks", "jump", "squat")
     assert np.allclose(belief.probabilities[3:], belief.probabilities[:3].max())
     assert belief.probabilities.sum() == pytest.approx(1.0)
@@ -593,7 +597,7 @@ def decided(steps: Sequence[tuple[Sequence[float], Sequence[float]]]) -> list[st
     switching.bring_in("new")
     for step in steps:
         switching.decided(latest(*step))
-        decisions.append(switching.group if switching.newcomer is None else None)
+        decisions.append(switching.group if switching.candidate_group is None else None)
     return decisions
 
 

@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 EVENTS = ("kill a worker", "kill the driver", "kill the group", "stop and go on", "start a second driver")
 STOPPED = 1.0  # seconds that a process is stopped
 PAUSE = 0.3, 1.5  # seconds between two events, at least and at most
-PATIENCE = 60.0  # seconds for a driver to begin cells, or to end
+CONNECT_TIMEOUT_SECONDS = 60.0  # seconds for a driver to begin cells, or to end
 STARTED = 200  # times that a driver is started, at most
 LIMIT = 10.0  # seconds that a cell may take
 
@@ -64,7 +64,7 @@ class Chaos:
                 before = len(starts(self._starts))
                 self._driver = self._begun()
                 drivers += 1
-                until = time.monotonic() + PATIENCE
+                until = time.monotonic() + CONNECT_TIMEOUT_SECONDS
                 while self._driver.poll() is None and len(starts(self._starts)) == before and time.monotonic() < until:
                     time.sleep(0.1)
                 while self._driver.poll() is None:
@@ -128,7 +128,9 @@ class Chaos:
             else:
                 other = self._begun()
                 done = self._driver.poll() is None
-                refused = other.wait(timeout=PATIENCE) not in (0, 1, 130) or b"that process" in self._output()
+                refused = (
+                    other.wait(timeout=CONNECT_TIMEOUT_SECONDS) not in (0, 1, 130) or b"that process" in self._output()
+                )
                 self.refused += done and refused
             self.happened[event] += done
 

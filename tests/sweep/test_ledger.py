@@ -219,7 +219,9 @@ def test_only_a_cells_own_faults_count_towards_its_three_attempts_and_fifty_loss
         ledger.plan([cell, lost])
         outcomes = [ledger.fail(cell.key, "its own", own) for own in (False, True, False, True, False, True)]
         assert outcomes == [False] * 5 + [True]
-        assert [ledger.fail(lost.key, "killed", own=False) for _ in range(LOSSES)] == [False] * (LOSSES - 1) + [True]
+        assert [ledger.fail(lost.key, "killed", is_own_fault=False) for _ in range(LOSSES)] == [False] * (
+            LOSSES - 1
+        ) + [True]
         assert ledger.counts() == {"quarantined": 2}
         reasons = {row["key"]: row["reasons"] for row in Ledger(tmp_path / "results").quarantined()}
         assert reasons == {cell.key: ["its own"] * 3, lost.key: ["something outside ended it 50 times", "killed"]}
@@ -269,15 +271,12 @@ def old_ones(folder: Path) -> Path:
     return folder
 
 
-def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again_unless_kept(tmp_path: Path) -> None:
+def test_rows_of_another_version_are_read_and_counted_and_their_cells_run_again(tmp_path: Path) -> None:
     folder = old_ones(tmp_path / "results")
     assert Ledger(folder).version == "0.0.9 a1"
     messages: list[str] = []
-    assert swept(cells(3), folder, Instant(), messages.append, keep_old=True).ran == 1  # type: ignore[arg-type]
-    assert messages == [f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and count, too"]
-    messages.clear()
-    assert swept(cells(3), folder, Instant(), messages.append).ran == 2  # type: ignore[arg-type]
-    assert messages[0].endswith("and do not count here; --keep-old keeps them")
+    assert swept(cells(3), folder, Instant(), messages.append).ran == 3  # type: ignore[arg-type]
+    assert messages == [f"2 rows in {folder} are of another version, posefit 0.0.9 a1, and do not count here"]
     ledger = Ledger(folder)
     assert len(ledger) == 5
     assert ledger.version == f"0.0.9 a1, {posefit_build().removeprefix('posefit ')}"

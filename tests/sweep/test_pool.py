@@ -28,7 +28,7 @@ from tests.sweep.fake import behave, cells, swept
 
 TIMES = ("seconds", "seconds_per_frame", "cpu_seconds_per_frame")  # the figures that two runs of a cell differ by
 LIMITS = Limits(seconds=300.0, gigabytes=0.6)  # a slow machine takes seconds to start a worker
-PATIENCE = 300.0  # seconds for workers to come; these tests mean something else
+CONNECT_TIMEOUT_SECONDS = 300.0  # seconds for workers to come; these tests mean something else
 ROOT = Path(__file__).parents[2]
 Make = Callable[..., Engine]
 
@@ -45,7 +45,7 @@ def make(request: pytest.FixtureRequest) -> Iterator[Make]:
     with ExitStack() as served:
 
         def dask(workers: int, limits: Limits = LIMITS) -> Engine:
-            return Cluster(served.enter_context(scheduler(workers)), limits, behave, PATIENCE)
+            return Cluster(served.enter_context(scheduler(workers)), limits, behave, CONNECT_TIMEOUT_SECONDS)
 
         yield dask
 
@@ -95,7 +95,9 @@ def test_exceptions_exits_and_limits_of_memory_and_time_are_the_cells_own_faults
         fake.ENDLESS: "it ran past its limit of 5 s",
     }
     ended = one_by_one(make(1, Limits(5.0, 0.6)), [replace(cells(1)[0], frames=n) for n in reasons])
-    assert [(outcome.reason, outcome.own) for outcome in ended] == [(reason, True) for reason in reasons.values()]
+    assert [(outcome.reason, outcome.is_own_fault) for outcome in ended] == [
+        (reason, True) for reason in reasons.values()
+    ]
 
 
 def test_a_process_that_ends_itself_or_dies_of_its_cell_is_noticed_at_once_and_a_kill_costs_no_attempt(
@@ -103,7 +105,7 @@ def test_a_process_that_ends_itself_or_dies_of_its_cell_is_noticed_at_once_and_a
 ) -> None:
     bad = [replace(cells(1)[0], frames=n) for n in (fake.LEAVE, fake.SEGFAULT)]
     ended = one_by_one(make(1, Limits(3600.0, 0.6)), [*bad, *cells(2, fake.KILLED)])
-    assert [(outcome.reason, outcome.own) for outcome in ended] == [
+    assert [(outcome.reason, outcome.is_own_fault) for outcome in ended] == [
         ("its process ended itself with status 0", True),
         ("its process died of SIGSEGV", True),
         ("its process died of SIGKILL", False),
@@ -203,7 +205,7 @@ def test_shards_another_order_and_dask_give_the_rows_of_one_run_bit_for_bit(tmp_
     names = sorted(path.name for path in (tmp_path / "shards").glob("*.sqlite"))
     assert names == [f"ledger-{k}-of-3.sqlite" for k in (1, 2, 3)]
     with scheduler(2) as address:
-        engine = Cluster(address, Limits(), patience=PATIENCE)
+        engine = Cluster(address, Limits(), patience=CONNECT_TIMEOUT_SECONDS)
         assert swept(tmp_path / "dask", list(plan)[::-1], engine).done == len(plan)  # type: ignore[arg-type]
     first = rows_in(tmp_path / "one")
     assert len(first[0]) == len(plan)
@@ -225,7 +227,7 @@ def test_a_scheduler_that_goes_away_leaves_all_rows_and_the_same_command_goes_on
     from posefit.sweep.cluster import Cluster
 
     with ExitStack() as served, Writer(tmp_path / "results" / FILE) as ledger:
-        engine = Cluster(served.enter_context(scheduler(1)), LIMITS, behave, PATIENCE)
+        engine = Cluster(served.enter_context(scheduler(1)), LIMITS, behave, CONNECT_TIMEOUT_SECONDS)
 
         def watch(tally: Tally) -> None:
             if tally.done >= 3:

@@ -17,7 +17,7 @@ from posefit_swarm.sapso import SAPSO
 from tests.testing import planted
 
 SLOW = ("pso", "particle", "annealed", "scipy", "scipy:dual_annealing")
-ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna", "ribs")
+ADAPTERS = ("pycma", "nevergrad", "pymoo", "pymoo:GA", "optuna")
 SLOW_PRIORS = ("loose", "full", "sklearn", "sklearn:FactorAnalysis", "sklearn:FastICA")
 
 

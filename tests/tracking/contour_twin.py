@@ -30,7 +30,7 @@ def drawn_body(body: Body, camera: Camera, joints: Array) -> Array:
     return np.concatenate([pixels.ravel(), radii.ravel()])
 
 
-def pulled(numbers: Array, mask: tuple, scale: float) -> tuple[Array, Array]:
+def pulled(numbers: Array, mask: kernels.Contour, scale: float) -> tuple[Array, Array]:
     """Return half the second derivatives (106, 106) and half the gradient (106,) by the numbers of a drawn body."""
     centres, radii = numbers[: 2 * len(JOINTS)].reshape(-1, 2), numbers[2 * len(JOINTS) :].reshape(-1, 2)
     blocks, forces = np.zeros((len(BONES), 6, 6)), np.zeros((len(BONES), 6))
@@ -52,7 +52,8 @@ def pull_of_view(view: MaskContours, k: int, here: Array, there: Array, reach: f
     """
     root = view.metres[k]
     points = view.points[view.starts[k] : view.starts[k + 1]]
-    mask = view.fields[k], view.corners[k], view.sizes[k], np.ascontiguousarray(points), view.step
+    points = np.ascontiguousarray(points)
+    mask = kernels.Contour(view.fields[k], view.corners[k], view.sizes[k], points, view.step)
     curves, slopes = pulled(here, mask, max(reach * root, kernels.MIN_ROBUST_SCALE))
     deviation = kernels.BORDER_DEVIATION**2 + (kernels.PIXEL_DEVIATION / root) ** 2
     worth = 1.0 / (root**3 * kernels.CORRELATION_LENGTH * deviation)

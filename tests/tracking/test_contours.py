@@ -145,7 +145,7 @@ def test_the_gradient_of_the_border_points_is_that_of_their_squares() -> None:
     body, rng = Body.of(built_in.average_skeleton()), np.random.default_rng(3)
     numbers = drawn_body(body, CAMERA, body.skeleton.joints(np.zeros((1, 66)), np.array([[0.0, 0.9, 0.0]]))[0])
     points = rng.uniform(40.0, 160.0, (30, 2))
-    mask = np.zeros((1, 1), np.float32), np.zeros(2, np.int64), np.ones(2, np.int64), points, 1.0
+    mask = kernels.Contour(np.zeros((1, 1), np.float32), np.zeros(2, np.int64), np.ones(2, np.int64), points, 1.0)
 
     def half_sum(numbers: np.ndarray) -> float:
         joints, radii, total = numbers[:54].reshape(27, 2), numbers[54:].reshape(26, 2), 0.0
@@ -190,7 +190,7 @@ def test_the_pull_of_a_bone_is_that_of_its_whole_border_in_the_field() -> None:
 
     def pulled(joints: np.ndarray, parents: list[int], radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         blocks, forces = np.zeros((len(parents), 6, 6)), np.zeros((len(parents), 6))
-        mask = field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25
+        mask = kernels.Contour(field, np.zeros(2, int), np.array(field.shape), np.zeros((0, 2)), 0.25)
         kernels.add_pulls(np.array(parents), joints, radii, mask, scale, blocks, forces)
         return blocks[0], forces[0]
 
@@ -244,8 +244,8 @@ def test_a_long_track_is_fitted_in_windows(monkeypatch: pytest.MonkeyPatch) -> N
     scene, truth = footage(20)
     estimate = estimate_of(truth)
     whole, _ = fitted(scene, estimate)
-    monkeypatch.setattr(contours, "WINDOW_FRAMES", 10)
-    monkeypatch.setattr(contours, "OVERLAP_FRAMES", 6)
+    monkeypatch.setattr(contours, "CONTOUR_WINDOW", 10)
+    monkeypatch.setattr(contours, "CONTOUR_OVERLAP", 6)
     assert distance(fitted(scene, estimate)[0], whole) < 0.1 * distance(estimate, whole)
     motion, shape = fitted(scene, estimate, replace(average_shape(scene), height=scene.body.stature))
     assert shape is not None

@@ -98,7 +98,7 @@ def test_too_few_frames_for_a_build_are_reported(tmp_path: Path, count: int, bod
     options: dict[str, Any] = {"method": "@loose", "evaluations": 80, "restarts": 1, "body_frames": body_frames}
     track = posefit.track(tmp_path / "a.npz", progress=Progress(log.append), **options)
     assert any(line.startswith(message) for line in log)
-    assert (track.course.build is None) == message.startswith("no build")
+    assert (track.log.build is None) == message.startswith("no build")
 
 
 def frames_of_builds(scene: Scene, observations: list[Observation], *counts: int) -> list[tuple[list[int], float]]:

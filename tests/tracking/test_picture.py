@@ -1,6 +1,7 @@
 """Pictures of a track: faint limbs, another mode, lost frames."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import JOINTS
 from posefit.geometry.symmetry import mirrored_poses
-from posefit.output.drawing import FAINTEST, MISSED, OTHER, draw_body, opacities
-from posefit.output.picture import PANEL, Painter
+from posefit.output import picture
+from posefit.output.drawing import BOTH, FAINTEST, MISSED, OTHER, draw_body, opacities, width_of, wrapped
+from posefit.output.picture import PANEL, Painter, curve
 from posefit.uncertainty.modes import Mode, Posterior
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, walk
@@ -104,3 +106,44 @@ def test_a_lost_frame_has_a_border(scene: Scene, frame: Frame, lost: float, mark
     edges = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
     assert (edges == MISSED).all(axis=1).all() == marked
     assert pixels(image[-40:, -PANEL + 12 : -PANEL + 120], MISSED) == 0 or marked
+
+
+def test_a_long_note_is_broken_into_lines_of_one_size() -> None:
+    words = [
+        "the",
+        "picture's",
+        "border",
+        "cuts",
+        "the",
+        "mask",
+        "above",
+        "and",
+        "below,",
+        "and",
+        "3",
+        "more",
+        "signs",
+        "speak",
+        "against",
+        "it",
+    ]
+    lines = wrapped(" ".join(words), 300, 0.65)
+    assert " ".join(lines).split() == words
+    assert max(width_of(line, 0.65) for line in lines) <= 300
+    assert all(width_of(f"{line} {more.split()[0]}", 0.65) > 300 for line, more in pairwise(lines))
+
+
+def test_peaks_do_not_flatten_a_curve_and_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    monkeypatch.setattr(picture, "write", lambda image, text, *_, **__: texts.append(text))
+    values = 4.0 + np.sin(np.arange(100.0))
+
+    def highest(values: Array) -> int:
+        """Return the row of the curve's highest pixel in the part that has no peak."""
+        return int(np.flatnonzero((curve(values, "cost", 600, 180, 50)[:, 320:] == BOTH).all(axis=2).any(axis=1))[0])
+
+    calm = highest(values)
+    assert texts[-1] == "cost, frame by frame: 0, mean and maximum"
+    values[[10, 11, 30]] = [80.0, 90.0, 40.0]
+    assert highest(values) < calm + 70  # of 180; 110 where the axis goes to 90
+    assert texts[-1] == "cost, frame by frame: 0, mean, and the top; above it 90.0 in frame 61, 40.0 in frame 80"

@@ -118,7 +118,7 @@ def test_the_files_of_a_track_have_the_build_that_was_fitted(tmp_path: Path) -> 
     motion = built_in.motion("walk", frames=6)
     masks = [project(BODY, CAMERA, *pose) for pose in zip(motion.poses, motion.translations, strict=True)]
     track = posefit.track(masks, camera=CAMERA, fps=25, out=tmp_path / "out", **{**QUICK, "body_frames": 6})
-    assert track.course.build is not None
+    assert track.log.build is not None
     with np.load(tmp_path / "out" / "poses.npz") as stored:
         np.testing.assert_array_equal(stored["radii"], track.scene.body.radii)
 

@@ -138,8 +138,8 @@ def test_tracks_of_any_length_are_smoothed_long_ones_in_windows(monkeypatch: pyt
         assert len(smoothed(walk().frames(0, frames))) == frames
     estimate = shaken(walk())
     whole = smoothed(estimate)
-    monkeypatch.setattr(path, "WINDOW_FRAMES", 30)
-    monkeypatch.setattr(path, "OVERLAP_FRAMES", 25)
+    monkeypatch.setattr(path, "PATH_WINDOW", 30)
+    monkeypatch.setattr(path, "PATH_OVERLAP", 25)
     assert np.abs(smoothed(estimate).translations - whole.translations).max() < 0.02
 
 

@@ -16,7 +16,7 @@ from posefit.output.folder import Recorder
 from posefit.progress import Progress
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.pipeline import follow_all
+from posefit.tracking.pipeline import track_hypotheses
 from posefit.tracking.restarts import (
     MAX_TURN_RATE,
     best_ends,
@@ -201,14 +201,15 @@ def test_footage_is_tracked_from_the_first_frame_that_shows_the_whole_person_fir
         relocalise_gap=0,
         follow=lambda task, observations, rng: Tracker(task).track(observations, rng),
     )
-    frames = follow_all(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())[0].frames
+    frames = track_hypotheses(scene, TASK, method, TrackOptions(hypotheses=2), Recorder(), Progress())[0].frames
     (back, behind), (onward, ahead), (again, _), _ = calls
     assert (behind, ahead) == ([5, 4, 3, 2, 1, 0], [5, 6, 7, 8, 9])
     assert back.backwards
     np.testing.assert_array_equal(back.training[0].poses, WALK.poses[::-1])
     assert np.degrees(onward.yaw or 0.0) == pytest.approx(5.0)  # it goes on from where the track back began
     assert [np.degrees(f.pose[0]) for f in frames] == pytest.approx(range(10))
+    assert [f.evaluations for f in frames] == [10] * 5 + [20] + [10] * 4  # the frame in the middle is searched twice
     assert again.yaw == initial_guess(1, TASK, None, False, frames[5])[1].yaw  # a guess is of the frame it is for
     calls.clear()
-    follow_all(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
+    track_hypotheses(scene, replace(TASK, yaw=0.5), method, TrackOptions(), Recorder(), Progress())
     assert [rows for _, rows in calls] == [list(range(10))]  # what is known of the first frame is kept

@@ -33,6 +33,7 @@ from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS
 from posefit.output.text import table
+from posefit.silhouette.mask import Silhouette
 from tests.cases import each
 from tests.tracking.scenes import exact_frames, truth_of, viewed, walk
 
@@ -52,6 +53,7 @@ FINE: dict[str, Any] = {
     "training_mm": 40.0,
     "frontal": 0.2,
     "held": 0.0,
+    "cropped": 0.0,
     "iou": 0.88,
     "acceleration": 6.0,
 }
@@ -121,6 +123,11 @@ def test_a_body_covers_half_of_what_moves() -> None:
         ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
         ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
+        (
+            {"cropped": 1.0, "training_mm": 218.0},
+            "do not use: the picture's border cuts the mask above and below in 100% of the frames: masks cropped to "
+            "the person do not show where they are, and 1 more sign speaks against it",
+        ),
         ({"iou": 0.41}, "do not use: the body and the mask overlap by 41% only"),
         ({"size_ratio": 0.8, "size_m": 1.44}, "doubtful: the person seems to be 1.44 m tall, not 1.80 m"),
         ({"size_ratio": 1.5, "size_m": 2.7}, "do not use: the person seems to be 2.70 m tall, not 1.80 m"),
@@ -188,6 +195,29 @@ def test_several_cameras_show_the_size_and_one_cannot() -> None:
         assert trust.unknown_signs[name] == "the method does not say"
     assert trust.unknown_signs["training_mm"] == "no motion was learned from"
     assert ONE_CAMERA in trust_line(asdict(trust))
+
+
+def test_motion_says_nothing_where_the_camera_moves() -> None:
+    scene = walk(30, (20.0, 110.0))
+    camera = scene.cameras[0]
+    pictures = [np.full((camera.height, camera.width, 3), 90 * (k // 3 % 2), dtype=np.uint8) for k in range(30)]
+    scene = replace(scene, pictures=lambda: iter(pictures))
+    assert trusted(scene).grade == "useless"
+    trust = trusted(replace(scene, camera_moves=True))
+    assert (trust.grade, trust.unknown_signs["explained"]) == ("good", "the camera moves")
+
+
+def test_masks_cropped_to_the_person_are_the_reason() -> None:
+    scene = walk(30)
+    cropped = []
+    for observation in scene.observations:
+        mask = observation.silhouettes[0].mask
+        box = np.ix_(np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0)))
+        large = cv2.resize(mask[box].astype(np.uint8), mask.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        cropped.append(replace(observation, silhouettes=[Silhouette.of(large)]))
+    assert trusted(scene).cropped == 0.0
+    trust = trusted(replace(scene, observations=cropped))
+    assert "cuts the mask above and below in 100% of the frames: masks cropped" in trust.against[0]
 
 
 def test_poses_are_as_far_from_motions_as_from_the_nearest_pose_or_its_mirror_image() -> None:

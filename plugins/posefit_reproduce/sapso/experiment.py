@@ -156,10 +156,9 @@ def baseline(motion: PaperMotion, scene: Scene, name: str) -> Array:
     return np.column_stack([truth[:, :3], np.tile(angles.mean(axis=0), (len(truth), 1))])
 
 
-def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run, method: Any = None) -> Frame:
-    """Return what a method, or another in its place, makes of the first frame with a swarm of some size."""
+def first_frame(motion: PaperMotion, iterations: int, particles: int, run: Run) -> Frame:
+    """Return what a method makes of the first frame with a swarm of some size."""
     options = options_of(run.method, motion.training, iterations)
-    name = run.method.partition("@")[0] if method is None else method[0].__name__
-    options["settings"] = {**options["settings"], f"{name}.population_size": particles}
-    options |= {"method": method or options["method"], "evaluations": particles * (iterations + 1), "seed": run.seed}
+    options["settings"] = {**options["settings"], f"{run.method.partition('@')[0]}.population_size": particles}
+    options |= {"evaluations": particles * (iterations + 1), "seed": run.seed}
     return track(paper_scene(motion, run.view, (0, 1)), **options).frames[0]

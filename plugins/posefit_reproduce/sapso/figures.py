@@ -1,21 +1,24 @@
 """The figures of the SAPSO paper, drawn again: 3 and 4 the compact space, 5 and 6 one search, 7 and 9 errors."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from posefit.arrays import Array
-from posefit.fitting.space import SearchSpace
+from posefit.fitting.optimiser import populations
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.tracker import Prediction, Predictor
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS
 from posefit.report.figures import COLOURS
+from posefit.tracking.defaults import completed
+from posefit.tracking.initialise import task_of
+from posefit.tracking.options import TrackOptions
 from posefit_priors.pca import PCA
-from posefit_reproduce.experiment import Run
-from posefit_reproduce.sapso.experiment import ITERATIONS, first_frame
+from posefit_reproduce.sapso.experiment import ITERATIONS, options_of
 from posefit_reproduce.sapso.methods import LABELS as METHODS
 from posefit_reproduce.sapso.methods import LETTER, OURS, PAPER
 from posefit_reproduce.sapso.motions import LABELS, PaperMotion, paper_scene
@@ -58,55 +61,43 @@ def _latents(axes: Any, motion: PaperMotion, prior: PCA) -> str:
         points = prior.transform(clip.poses[:, 3:])
         axes.plot(*points[:, :3].T, ".-", color=colour, markersize=3, linewidth=0.4, label=clip.name)
     axes.legend(fontsize=7, frameon=False)
-    kept = 100.0 * prior.explained
-    return f"{kept[:3].sum():.0f} % of the variance, six keep {kept.sum():.1f} %"
+    shares = 100.0 * prior.explained
+    return f"{shares[:3].sum():.0f} % of the variance, six keep {shares.sum():.1f} %"
 
 
 def _clusters(axes: Any, motion: PaperMotion, prior: PCA) -> str:
     """Draw the training poses by their nearest centre of K-means, with the centres."""
     points = prior.transform(motion.angles)
     away = np.abs(points[:, None] - prior.centres).mean(axis=2)
-    for one, colour in zip(range(len(prior.centres)), COLOURS, strict=False):
-        axes.plot(*points[away.argmin(axis=1) == one, :3].T, ".", color=colour, markersize=3)
-        axes.plot(*prior.centres[one, :3, None], "*", color=colour, markersize=13, markeredgecolor="black")
+    for k, (centre, colour) in enumerate(zip(prior.centres, COLOURS, strict=False)):
+        axes.plot(*points[away.argmin(axis=1) == k, :3].T, ".", color=colour, markersize=3)
+        axes.plot(*centre[:3, None], "*", color=colour, markersize=13, markeredgecolor="black")
     within = 100.0 * (away.min(axis=1) < prior.reach).mean()
     return f"K = {len(prior.centres)}, {within:.0f} % of the poses valid"
 
 
-@dataclass(frozen=True, eq=False)
-class WatchedSwarm:
+class WatchedSwarm(NamedTuple):
     """A swarm in the first frame, from iteration to iteration."""
 
     scene: Scene
-    poses: list[Array] = field(repr=False)  # of each iteration (n, 66)
-    translations: list[Array] = field(repr=False)  # of each iteration (n, 3)
+    poses: list[Array]  # of each iteration (n, 66)
+    translations: list[Array]  # of each iteration (n, 3)
     best: list[int]  # of each iteration, the proposal of lowest cost
-    history: Array = field(repr=False)  # (iterations + 1,) lowest cost so far
+    history: Array  # (iterations + 1,) lowest cost so far
 
 
 def watched_swarm(motion: PaperMotion, particles: int = SHOWN_PARTICLES, iterations: int = ITERATIONS) -> WatchedSwarm:
     """Return the proposals of SAPSO in the first frame."""
-
-    class Watched(SAPSO):
-        def __init__(
-            self, space: SearchSpace, rng: np.random.Generator, *, population_size: int, iterations: int
-        ) -> None:
-            super().__init__(space, rng, population_size=population_size, iterations=iterations)
-            self.searched = space
-            for series in (poses, translations, best):
-                del series[:]  # a search before only compiles
-
-        def tell(self, proposals: Array, costs: Array) -> None:
-            decoded = self.searched.decode(proposals)
-            poses.append(decoded[0])
-            translations.append(decoded[1])
-            best.append(int(np.argmin(costs)))
-            super().tell(proposals, costs)
-
-    poses, translations, best = list[Array](), list[Array](), list[int]()
-    run = Run("first", "walk", OURS, SHOWN_VIEW)
-    frame = first_frame(motion, iterations, particles, run, method=(Watched, "pca"))
-    return WatchedSwarm(paper_scene(motion, SHOWN_VIEW, (0, 1)), poses, translations, best, frame.trace[:, 1])
+    scene = paper_scene(motion, SHOWN_VIEW, (0, 1))
+    options = completed(TrackOptions(**options_of(OURS, motion.training, iterations)), scene.truth)
+    task, observation = task_of(scene, options, motion.training), scene.observations[0]
+    space = Predictor(task, PCA().fit(motion.angles), Prediction(tilt="box")).space(observation)
+    problem = PoseProblem(scene.body, scene.cameras, observation.silhouettes, space)
+    search = SAPSO(space, np.random.default_rng(0), population_size=particles, iterations=iterations)
+    steps = list(populations(search, problem.evaluate, particles * (iterations + 1)))
+    poses, translations = zip(*(problem.decode(proposals) for proposals, _ in steps), strict=True)
+    history = np.minimum.accumulate([costs.min() for _, costs in steps])
+    return WatchedSwarm(scene, [*poses], [*translations], [int(costs.argmin()) for _, costs in steps], history)
 
 
 def swarm_figure(swarm: WatchedSwarm) -> Figure:

@@ -9,22 +9,18 @@
 | S10 | the last move is not evaluated: N C evaluations | N (C + 1) |
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from posefit.fitting.space import SearchSpace
-from posefit.plugin import Array, Space, at_least, between, check_tell, displacement, draw_population, wrap
-from posefit_swarm.sapso import Rows, first_velocities, inertia_at, redrawn
+from posefit.plugin import Array, Space, check_tell, displacement, wrap
+from posefit_swarm.sapso import SAPSO, Rows, redrawn
 
-TEMPERATURE, COOLING = 1.0, 0.95  # T and gamma, section 5.2
-ACCELERATION = 2.0  # c1 = c2, section 3.1
 ALPHA = 0.15  # section 2.2
 REDRAWS = 100  # ours: then the particle stays where it is, at rest. Interpretation S7
 
 
-class LetterSAPSO:
+class LetterSAPSO(SAPSO):
     """Algorithm 1 as the paper has it. Positions and velocities are those of the unit box.
 
     Settings:
@@ -44,43 +40,36 @@ class LetterSAPSO:
         stop_temperature: float = 0.0,
         inertia: float = 0.9,
     ) -> None:
-        at_least("population_size", population_size, 1)
-        at_least("iterations", iterations, 1)
-        at_least("stop_temperature", stop_temperature, 0.0)
-        between("inertia", inertia, 0.1, math.inf, ends=False)
-        self.space, self.rng, self.c, self.C, self.waiting = space, rng, 0, iterations, 0
-        self.T, self.T0, self.A = TEMPERATURE, stop_temperature, inertia
+        super().__init__(
+            space,
+            rng,
+            population_size=population_size,
+            iterations=iterations,
+            stop_temperature=stop_temperature,
+            inertia=inertia,
+        )
         self.low, self.high = velocity_limits(space)
-        self.moved = draw_population(space, rng, population_size)
-        self.x, self.cost = self.moved.copy(), np.full(population_size, np.inf)
-        self.pbest, self.pbest_cost = self.x.copy(), self.cost.copy()
-        self.v = np.clip(first_velocities(space, rng, population_size, ALPHA), self.low, self.high)
+        self.v = np.clip(self.v, self.low, self.high)
 
     def ask(self) -> Array:
         """Return the particles (N, d) after their move; none once the iterations or the temperature are used up."""
-        self.waiting = len(self.moved) if self.c < self.C and self.T > self.T0 else 0
-        return self.moved[: self.waiting].copy()
+        return super().ask() if self.c < self.C else self.moved[:0].copy()
 
     def tell(self, proposals: Array, costs: Array) -> None:
         """Accept or refuse the moves by their costs (N,), cool, remember the bests, and move on."""
         check_tell(self.waiting, proposals, costs)
-        with np.errstate(invalid="ignore", over="ignore"):  # infinity less infinity; nan is never accepted
-            chance = np.exp(np.minimum((self.cost - costs) / self.T, 0.0))
-        accepted = (costs <= self.cost) | (chance > self.rng.random(len(costs)))
-        self.x[accepted], self.cost[accepted] = self.moved[accepted], costs[accepted]
+        count = self.accept(costs)
         if self.c > 0:
-            self.T *= COOLING ** int(accepted.sum())
-        better = self.cost < self.pbest_cost
-        self.pbest[better], self.pbest_cost[better] = self.x[better], self.cost[better]
+            self.T *= self.gamma**count
         self.v, self.moved = redrawn(self.x, self.step, self.allowed, REDRAWS)
         self.c, self.waiting = self.c + 1, 0
 
     def step(self, rows: Rows) -> tuple[Array, Array]:
         """Return velocities and positions (k, d) of some particles (k,) after a move by (1) and (2)."""
         x, gbest = self.x[rows], self.pbest[self.pbest_cost.argmin()]
-        phi1, phi2 = ACCELERATION * self.rng.random((2, len(rows), 1))
+        phi1, phi2 = self.acceleration * self.rng.random((2, len(rows), 1))
         to_pbest, to_gbest = displacement(self.space, x, self.pbest[rows]), displacement(self.space, x, gbest)
-        v = inertia_at(self.c, self.C, self.A) * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest
+        v = self.inertia() * self.v[rows] + phi1 * to_pbest + phi2 * to_gbest
         return v, wrap(self.space, x + v)
 
     def allowed(self, v: Array, x: Array) -> NDArray[np.bool_]:

@@ -72,17 +72,14 @@ class Analysis:
         return np.asarray(flags.reshape(poses.shape[:3]).mean(axis=2))
 
 
-def paper_tables(results: Results, motions: Mapping[str, PaperMotion]) -> Iterator[Table]:
-    """Yield all tables: the paper's, its claims, by view, what each part is worth, the turn."""
-    analysis = Analysis(results, motions)
-    yield motions_table(analysis)
-    yield claims_table("claims", list(claims(analysis)))
-    yield parts(analysis)
-    yield table_2(analysis)
-    yield flaws(analysis)
-    yield turn(analysis)
-    yield by_view(analysis)
-    yield table_1(analysis)
+def paper_tables(analysis: Analysis) -> list[Table]:
+    """Return all tables."""
+    return [section(analysis) for section in (motions_table, judged, parts, table_2, flaws, turn, by_view, table_1)]
+
+
+def judged(analysis: Analysis) -> Table:
+    """Return the paper's claims with their verdicts."""
+    return claims_table("claims", list(claims(analysis)))
 
 
 def motions_table(analysis: Analysis) -> Table:
@@ -156,51 +153,54 @@ def flaws(analysis: Analysis) -> Table:
 
 
 def claims(analysis: Analysis) -> Iterator[Claim]:
-    """Yield the paper's claims, each on one motion: of tracks by (8), of single images by the angles that can err."""
-    results, labels, tracked = analysis.results, MOTIONS, ("walk", "run")
-    for motion in tracked:
-        for lower, other in (("sapso@full", "particle@full"), (OURS, "sapso@full")):
-            difference = analysis.errors(motion, lower) - analysis.errors(motion, other)
-            text = f"{LABELS[lower]} has a smaller error than {LABELS[other]}"
-            yield Claim(text, "table 2", labels[motion], difference, "degrees of (8)")
-        ours, full = (1e3 * results.of("cpu_seconds", "track", motion, name) for name in (OURS, "sapso@full"))
-        yield Claim("PCA + SAPSO takes less time than SAPSO", "table 2", labels[motion], ours - full, "CPU ms a frame")
-        errors = analysis.errors(motion)
-        yield Claim(
-            "a track's error is about 4 degrees at most", "5.4", labels[motion], errors, "degrees of (8)", TRACK_DEGREES
-        )
-        share = 100.0 * few_joints(analysis, motion)
-        yield Claim("a few joints make up high errors", "5.4", labels[motion], share, "% by 3 of 22", 50.0, above=True)
-        # the walk with a turn is followed in the space of the straight walk
-        space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
-        share = np.asarray(100.0 * space.explained[:ENOUGH].sum())
-        text = "five components keep 95 % of the variance"
-        yield Claim(text, "2.1", labels[motion], share, "%", 100.0 * VARIANCE, above=True)
-        for name, form in ((OURS, ""), (LETTER, ", the letter")):
-            history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
-            usual = history[:, :, SWARMS.index(40)]
-            fall = usual[:, :, min(CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
-            text = f"the cost falls by less than 1 after 30 iterations{form}"
-            yield Claim(text, "figure 6", labels[motion], fall, "of 100", SAME_COST)
-            ends = history[:, :, 0, -1] - history[:, :, -1, -1]
-            text = f"N = 20 ends less than 1 above N = 100{form}"
-            yield Claim(text, "figure 6", labels[motion], ends, "of 100", SAME_COST)
-    for motion in analysis.motions:
-        where, degrees = labels[motion], "degrees"
-        away = analysis.away(motion, OURS, "image")
-        small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < SMALL_DEGREES).mean(axis=2)
-        yield Claim("most angles have an error below 5 degrees", "figure 7", where, small, "%", 50.0, above=True)
-        paper = float(np.abs(np.subtract(*TABLE_1[motion])).mean())
-        errors = table_1_angles(analysis, motion, OURS, "image")
-        yield Claim("femora and knees are as near as in table 1", "table 1", where, errors, degrees, paper)
-        images = analysis.errors(motion, OURS, "image", free=True)
-        hidden = analysis.errors(motion, OURS, "hidden", free=True)
-        worse = hidden - images[: len(hidden)]  # of the same views
-        yield Claim("a hidden part adds less than 1 degree", "figure 8", where, worse, degrees, SAME_DEGREES)
-        around = np.ptp(images, axis=0)[None]
-        yield Claim("eight views differ by less than 1 degree", "5.3", where, around, degrees, SAME_DEGREES)
-        swapped = 100.0 * analysis.swapped(motion, OURS, "image")
-        yield Claim("left and right are not exchanged", "5.3", where, swapped, "% of frames", 100.0 * SWAPPED)
+    """Yield the paper's claims, each on one motion."""
+    for section, motions in ((track_claims, ("walk", "run")), (image_claims, analysis.motions)):
+        for motion in motions:
+            yield from section(analysis, motion)
+
+
+def track_claims(analysis: Analysis, motion: str) -> Iterator[Claim]:
+    """Yield the claims of tracks, by (8), of the compact space and of searches of first frames."""
+    results, label = analysis.results, MOTIONS[motion]
+    for lower, other in (("sapso@full", "particle@full"), (OURS, "sapso@full")):
+        difference = analysis.errors(motion, lower) - analysis.errors(motion, other)
+        text = f"{LABELS[lower]} has a smaller error than {LABELS[other]}"
+        yield Claim(text, "table 2", label, difference, "degrees of (8)")
+    ours, full = (1e3 * results.of("cpu_seconds", "track", motion, name) for name in (OURS, "sapso@full"))
+    yield Claim("PCA + SAPSO takes less time than SAPSO", "table 2", label, ours - full, "CPU ms a frame")
+    text = "a track's error is about 4 degrees at most"
+    yield Claim(text, "5.4", label, analysis.errors(motion), "degrees of (8)", TRACK_DEGREES)
+    share = 100.0 * few_joints(analysis, motion)
+    yield Claim("a few joints make up high errors", "5.4", label, share, "% by 3 of 22", 50.0, above=True)
+    # the walk with a turn is followed in the space of the straight walk
+    space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
+    share = np.asarray(100.0 * space.explained[:ENOUGH].sum())
+    yield Claim("five components keep 95 % of the variance", "2.1", label, share, "%", 100.0 * VARIANCE, above=True)
+    for name, form in ((OURS, ""), (LETTER, ", the letter")):
+        history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
+        usual = history[:, :, SWARMS.index(40)]
+        fall = usual[:, :, min(CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
+        text = f"the cost falls by less than 1 after 30 iterations{form}"
+        yield Claim(text, "figure 6", label, fall, "of 100", SAME_COST)
+        ends = history[:, :, 0, -1] - history[:, :, -1, -1]
+        yield Claim(f"N = 20 ends less than 1 above N = 100{form}", "figure 6", label, ends, "of 100", SAME_COST)
+
+
+def image_claims(analysis: Analysis, motion: str) -> Iterator[Claim]:
+    """Yield the claims of single images, by the angles that can err."""
+    label, away = MOTIONS[motion], analysis.away(motion, OURS, "image")
+    small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < SMALL_DEGREES).mean(axis=2)
+    yield Claim("most angles have an error below 5 degrees", "figure 7", label, small, "%", 50.0, above=True)
+    paper = float(np.abs(np.subtract(*TABLE_1[motion])).mean())
+    errors = table_1_angles(analysis, motion, OURS, "image")
+    yield Claim("femora and knees are as near as in table 1", "table 1", label, errors, bound=paper)
+    images, hidden = (analysis.errors(motion, OURS, kind, free=True) for kind in ("image", "hidden"))
+    worse = hidden - images[: len(hidden)]  # of the same views
+    yield Claim("a hidden part adds less than 1 degree", "figure 8", label, worse, bound=SAME_DEGREES)
+    around = np.ptp(images, axis=0)[None]
+    yield Claim("eight views differ by less than 1 degree", "5.3", label, around, bound=SAME_DEGREES)
+    swapped = 100.0 * analysis.swapped(motion, OURS, "image")
+    yield Claim("left and right are not exchanged", "5.3", label, swapped, "% of frames", 100.0 * SWAPPED)
 
 
 def table_1_angles(analysis: Analysis, motion: str, method: str, kind: str) -> Array:

@@ -76,7 +76,7 @@ def perform(run: Run) -> Arrays:
 
 
 def arrays_of(frames: list[Frame]) -> Arrays:
-    """Return what a tracker with models holds in every frame: -1 is no group, no newcomer, no label."""
+    """Return what a tracker with models holds in every frame: -1 is no group, no candidate_group, no label."""
     probabilities = np.zeros((len(frames), len(MODELS)))
     for row, frame in zip(probabilities, frames, strict=True):
         row[[MODELS.index(name) for name in frame.details["models"]]] = frame.details.get("probabilities", 0.0)
@@ -87,7 +87,7 @@ def arrays_of(frames: list[Frame]) -> Arrays:
         "areas": [frame.areas[0] for frame in frames],
         "cpu_seconds": [frame.cpu_seconds for frame in frames],
         "label": [[None, *LABELS].index(frame.activity) - 1 for frame in frames],
-        **{name: [groups.index(frame.details[name]) - 1 for frame in frames] for name in ("group", "newcomer")},
+        **{name: [groups.index(frame.details[name]) - 1 for frame in frames] for name in ("group", "candidate_group")},
         **{name: [frame.details[name] for frame in frames] for name in DETAILS},
     }
     return {"probabilities": probabilities, **{name: np.array(values) for name, values in series.items()}}

@@ -40,7 +40,7 @@ def probability_figure(film: Film, arrays: Arrays) -> Figure:
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, 1.18)}
     upper.legend(fontsize=8.5, frameon=False, ncols=len(MODELS), columnspacing=1.2, handlelength=1.4, **place)
     for row in range(len(GROUPS)):
-        force = (arrays["group"] == row) | (arrays["newcomer"] == row) | (arrays["group"] < 0)
+        force = (arrays["group"] == row) | (arrays["candidate_group"] == row) | (arrays["group"] < 0)
         lower.scatter(seconds[force], np.full(force.sum(), row), s=4, marker="s")
     names = [name for name, _ in GROUPS]
     lower.set(yticks=range(len(names)), yticklabels=names, ylim=(-0.6, len(names) - 0.4), xlabel="seconds")

@@ -89,7 +89,8 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
         [set(), *({MODELS.index(name) for name in names} for _, names in GROUPS)],
     )
     force = [
-        sets[group + 1] | sets[other + 1] for group, other in zip(arrays["group"], arrays["newcomer"], strict=True)
+        sets[group + 1] | sets[other + 1]
+        for group, other in zip(arrays["group"], arrays["candidate_group"], strict=True)
     ]
     right = [set(RIGHT[label]) for label in labels]
     right_group = np.array([bool(models & wanted) for models, wanted in zip(force, right, strict=True)])
@@ -98,7 +99,7 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     for start, stop in pairwise([*starts, len(labels)]):
         hits = np.flatnonzero(right_group[start:stop])
         delays.append(hits[0] if len(hits) else stop - start)
-    pairs = list(zip(pairwise(arrays["newcomer"]), pairwise(force), right[1:], strict=True))
+    pairs = list(zip(pairwise(arrays["candidate_group"]), pairwise(force), right[1:], strict=True))
     new = [sets[now + 1] & wanted for (before, now), _, wanted in pairs if now not in (-1, before)]
     return {
         "dominant": 100.0 * np.mean(probabilities.max(axis=1) > 0.5),

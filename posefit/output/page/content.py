@@ -15,11 +15,12 @@ from posefit.geometry.rotation import unwrapped, wrapped
 from posefit.geometry.skeleton import INNER, JOINTS, PARENTS, SIDES
 from posefit.measuring.angles import COLUMNS, clinical_angles
 from posefit.measuring.centres import PLACES
+from posefit.measuring.gait import stride_curves
 from posefit.motion.motion import Motion
 from posefit.output.content import Content
 from posefit.output.page.stills import Stills
 from posefit.output.picture import MIN_OTHER_WEIGHT
-from posefit.output.text import brief, held_frames, undetermined
+from posefit.output.text import brief, gait_line, gait_rows, held_frames, undetermined
 from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
@@ -76,6 +77,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "truth": None if true is None else in_16_bits(true - origin),
         "others": _others(scene, frames[::step], origin),
         "columns": {name: {key: getattr(FRAME[name], key) for key in COLUMN} for name in curves},
+        "gait": _gait(content) if len(frames) > 1 else None,
         "rows": {name: table[name][::step].tolist() for name in curves},
         "marks": {name: np.unique(np.flatnonzero(marked(table)) // step).tolist() for name, marked in MARKS.items()},
         "angles": {
@@ -135,6 +137,18 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
         "weights": [mode.weight for mode in likely.values()],
         "joints": in_16_bits(np.array(joints)),
     }
+
+
+def _gait(content: Content) -> dict[str, Any]:
+    """Return the gait in words and by side, and how the knees bend over a stride, the mean and a standard deviation."""
+    gait, knees = content.summary["gait"], {}
+    if gait["walk"]:
+        for side, curves in stride_curves(content.motion, content.gait, "knee_flexion").items():
+            mean, spread = (curves.mean(axis=0), curves.std(axis=0)) if len(curves) else (np.empty(0), 0.0)
+            lines = {"mean": mean, "low": mean - spread, "high": mean + spread}
+            knees[side] = {name: np.round(line, 1).tolist() for name, line in lines.items()} | {"strides": len(curves)}
+    rows = gait_rows(gait) if gait["walk"] else []
+    return {"text": gait_line(gait, by_side=False), "rows": rows, "knees": knees}
 
 
 def _clinical(motion: Motion, step: int) -> Array:

@@ -194,3 +194,35 @@ function curves() {
   );
   $("marks").append(...counts);
 }
+
+// The gait by side, and how the knees bend over a stride.
+function gait() {
+  const { text, rows, knees } = D.gait;
+  $("gait-text").textContent = `${text[0].toUpperCase()}${text.slice(1)}.`;
+  const row = (tag, cells) => make("tr", {}, ...cells.map((cell) => make(tag, {}, cell)));
+  if (rows.length) $("gait-table").append(row("th", ["", "left", "right"]));
+  $("gait-table").append(...rows.map(([label, unit, ...sides]) => row("td", [`${label}, ${unit}`, ...sides])));
+  const sides = Object.entries(knees).filter(([, { strides }]) => strides);
+  $("knees").hidden = !sides.length;
+  if (!sides.length) return;
+  const all = sides.flatMap(([, { low, high }]) => [...low, ...high]);
+  const [from, to] = [Math.min(0, ...all), 1.06 * Math.max(...all)];
+  const words = sides.map(([side, { mean, strides }]) => `${side}, ${counted(strides, "stride")}: ${summed(mean, 0)}`);
+  $("knee-legend").append(...sides.map(([side], k) => entry(`--${side}`, words[k])));
+  drawn($("knee-chart"), (width) => {
+    const { svg, at, up } = axes(
+      { ...BOX, width, height: width < 500 ? 160 : 200, bottom: 38, name: `Knee flexion. ${words.join("; ")}` },
+      { to: 100, marks: steps(0, 100, 5), show: rounded, label: "% of the stride" },
+      { from, to, marks: steps(from, to, 4), show: rounded },
+    );
+    for (const [side, { low, high }] of sides) {
+      const points = low.map((value, k) => [at(k), up(value), up(high[k])]);
+      svg.append(band(points, { style: `fill: var(--${side})`, opacity: 0.25 }));
+    }
+    for (const [side, { mean }] of sides) {
+      const about = { fill: "none", style: `stroke: var(--${side})`, "stroke-width": 2 };
+      svg.append(draw("path", { d: path(mean.map((value, k) => [at(k), up(value)])), ...about }));
+    }
+    return svg;
+  });
+}

@@ -133,6 +133,8 @@ legends();
 upright();
 if (shown > 1) curves();
 else $("curves").remove();
+if (D.gait) gait();
+else $("gait").remove();
 look(0.7, 0.15);
 turnable($("turning"), paint);
 for (const masks of D.masks) for (const [, uri] of masks.pictures) pictureOf(uri);

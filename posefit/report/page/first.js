@@ -110,8 +110,8 @@ function examples() {
 
 // What failed and what is left out, with the reasons.
 function trouble() {
-  for (const [text, items] of D.header.trouble) {
+  for (const [text, items] of D.header.problems) {
     const list = make("ul", {}, ...items.map((item) => make("li", {}, item)));
-    $("trouble").append(make("div", { class: "note warn" }, text, list));
+    $("problems").append(make("div", { class: "note warn" }, text, list));
   }
 }

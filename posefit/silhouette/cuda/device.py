@@ -11,7 +11,7 @@ DEVICES = ("cpu", "cuda")
 
 
 def check_device(device: str) -> None:
-    """Return nothing. Raises InputError for an unknown device, and for one that is not available."""
+    """Raise InputError for an unknown device, and for one that is not available."""
     if device not in DEVICES:
         raise InputError(f"device must be one of {', '.join(DEVICES)}, got {quoted(device)}")
     if device == "cuda" and (missing := _missing()):

@@ -1,4 +1,4 @@
-"""A track of footage as a body would walk it: no shaking, feet that stand where they stand, contours as in the masks.
+"""A track of footage as a body would walk it: no shaking, planted feet, contours as in the masks.
 
 | looking for | file |
 |---|---|

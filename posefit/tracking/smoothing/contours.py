@@ -29,7 +29,6 @@ from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_s
 FINE_PIXELS = 80.0  # pixels of a metre; of finer masks only every second pixel, third, ... is used
 FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
 
-BoneSums = tuple[Array, Array]  # (T, 27, 6, 6) and (T, 27, 6, 1 + F)
 Distances = NDArray[np.float32]
 Integers = NDArray[np.int64]
 
@@ -70,11 +69,11 @@ class MaskContours:
         starts = np.cumsum([0, *map(len, points)])
         return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
 
-    def add(self, body: Body, frames: Array, scale: float, grown: tuple[Array, Array, Array], out: BoneSums) -> None:
+    def add(self, body: Body, frames: Array, scale: float, grown: kernels.Growth, sums: kernels.BoneSquares) -> None:
         """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
         camera = tuple(writeable(getattr(self.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
-        contours = self.fields, self.corners, self.sizes, self.points, self.starts, self.step
-        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, out)
+        contours = kernels.Contours(self.fields, self.corners, self.sizes, self.points, self.starts, self.step)
+        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, sums)
 
 
 def _border(observation: Observation, view: int, factor: int, step: int) -> tuple[Array, tuple[int, int], Distances]:
@@ -140,41 +139,41 @@ def contour_squares(
     wider, larger = grown or (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
     factors = len(larger)
     placed = skeleton.frames(poses, places)
-    by_factors = np.zeros((1 + factors, 1 + factors))
-    bones = np.zeros((count, len(JOINTS), 6, 6)), np.zeros((count, len(JOINTS), 6, 1 + factors))
+    squares = np.zeros((1 + factors, 1 + factors))
+    bones = [np.zeros((count, len(JOINTS), 6, columns)) for columns in (6, 1 + factors)]
+    sums = kernels.BoneSquares(*bones)
     for view in views:
-        view.add(body, placed[0], scale, (wider, larger, by_factors), bones)
+        view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
     free = np.flatnonzero(np.append([True] * 3, skeleton.free))
     curves, slopes = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
-    kernels.add_all_bones(skeleton.chain, placed, bones, free, (curves, slopes))
-    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], by_factors[1:, 1:], by_factors[1:, 0])
+    kernels.add_all_bones(skeleton.chain, placed, sums, free, (curves, slopes))
+    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], squares[1:, 1:], squares[1:, 0])
 
 
-DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
+FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
 
 
 def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Array]:
     """Return how joints (T, 17, 27, 3) and radii (17, 26, 2), metres, change with the logarithms of factors."""
-    bodies = [shaped(body, np.exp(DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
+    bodies = [shaped(body, np.exp(FACTOR_DIFFERENCE * row), height) for row in np.eye(len(NAMES))]
     here = motion.joints
     joints = [grown.skeleton.joints(motion.poses, motion.translations) - here for grown in bodies]
-    return np.stack(joints, axis=1) / DIFFERENCE, np.stack([grown.radii - body.radii for grown in bodies]) / DIFFERENCE
+    radii = [grown.radii - body.radii for grown in bodies]
+    return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(radii) / FACTOR_DIFFERENCE
 
 
 # metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
 ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
 ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
-ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
+CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
 MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
 BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
-WINDOW_FRAMES, OVERLAP_FRAMES = 300, 30  # frames that are solved for at once, and those that two windows share
+CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A window of a track, before its fit or after some of its steps."""
-
     estimate: Motion  # before it is fitted
     fitted: Motion
     body: Body
@@ -195,7 +194,7 @@ def fit_contours(
     """
     if len(motion) < 3 or not visibility.usable.any():
         return motion, shape
-    parts = windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES)
+    parts = windows_over(len(motion), CONTOUR_WINDOW, CONTOUR_OVERLAP)
     fitted: dict[int, _Part] = {}
     if shape is not None:
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
@@ -254,7 +253,7 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     curves, slopes, mixed, curve, slope = contour_squares(part.body, borders, poses, places, scale, grown)
     squares, some, changes = Squares(len(fitted), numbers), slice(3, numbers), np.zeros(factors)
     squares.add(slice(None), curves, slopes)
-    add_root(squares, estimate, part.visibility, ROOT_DEVIATION, places - estimate.translations)
+    add_root(squares, estimate, part.visibility, CONTOUR_ROOT_DEVIATION, places - estimate.translations)
     change = wrapped(poses - estimate.poses)[:, angles]
     squares.add(some, np.eye(len(angles)) / ANGLE_DEVIATION**2, change / ANGLE_DEVIATION**2)
     squares.add_bends(some, change, fitted.fps**2 / ANGLE_ACCELERATION)

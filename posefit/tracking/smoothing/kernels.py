@@ -6,10 +6,12 @@ meets the sum of those of the bones that it moves. Shapes are checked by the cal
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from posefit.arrays import inlined, jit
+from posefit.arrays import Array, inlined, jit
 from posefit.geometry.skeleton import ANGLES
 from posefit.silhouette.rasteriser import NEAR
 
@@ -21,6 +23,42 @@ MIN_ROBUST_SCALE = 3.0  # pixels: what is farther off counts less
 CAP = 2  # points of a quarter, about, of the disc at a bone's end
 COVERED = 0.25  # pixels within another bone from which on a point of a bone's border is hidden
 TINY = 1e-9
+
+
+class Contour(NamedTuple):
+    """The border of the mask of one frame."""
+
+    field: NDArray[np.float32]  # (h, w) pixels outside the mask, below 0 within
+    corner: NDArray[np.int64]  # (2,) column and row of the field's first pixel
+    size: NDArray[np.int64]  # (2,) rows and columns of the field
+    points: Array  # (n, 2) pixels of the border
+    step: float  # pixels of the border that a point stands for
+
+
+class Contours(NamedTuple):
+    """The borders of the masks of T frames, or one that all frames share, as `MaskContours` has them."""
+
+    fields: NDArray[np.float32]  # (T, h, w)
+    corners: NDArray[np.int64]  # (T, 2)
+    sizes: NDArray[np.int64]  # (T, 2)
+    points: Array  # (n, 2) frame after frame
+    starts: NDArray[np.int64]  # (T + 1,)
+    step: float
+
+
+class Growth(NamedTuple):
+    """What changes with F factors of the build, and the squares by them; F may be 0."""
+
+    joints: Array  # (F, 27, 3), or (T, F, 27, 3): how joints change
+    radii: Array  # (F, 26, 2): how radii change
+    squares: Array  # (1 + F, 1 + F): in its first column half the gradient, in the rest half the second derivatives
+
+
+class BoneSquares(NamedTuple):
+    """Half the second derivatives of each joint's bone, or of T frames', and forces, over twists."""
+
+    curves: Array  # (27, 6, 6), or (T, 27, 6, 6)
+    forces: Array  # (27, 6, 1 + F), or (T, 27, 6, 1 + F): half the gradient, and half the derivatives by F factors
 
 
 @jit
@@ -56,10 +94,10 @@ def cone_distance(x, y, cone):
 
 
 @inlined
-def _add(block, slope, share, across, down, wide, off, weight):
-    """Add the square of one distance, which moves by (across, down) with its bone's axis and by `wide` with radii."""
+def _add(block, slope, share, across, down, radius_change, off, weight):
+    """Add the square of one distance, which moves by (across, down) with its axis and by `radius_change`."""
     rest = 1.0 - share
-    values = (across * rest, down * rest, across * share, down * share, wide * rest, wide * share)
+    values = (across * rest, down * rest, across * share, down * share, radius_change * rest, radius_change * share)
     for i in range(6):
         slope[i] += weight * off * values[i]
         for j in range(6):
@@ -107,75 +145,90 @@ def _covered(x, y, neighbours, cones, discs):
 def add_pulls(parents, centres, radii, contour, scale, blocks, slopes):
     """Add the squares of the distances of the mask's border from the body's, and of the body's from the mask's.
 
-    `contour` is as in `add_view`. Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient:
-    by the column and row of its two joints, and by both radii.
+    Those of a bone go to its half of a second derivative, 6 x 6, and half of a gradient: by the column and row of its
+    two joints, and by both radii.
     """
-    field, corner, size, points, step = contour
     cones, discs = np.empty((parents.size, 8)), np.empty((parents.size, 3))
     write_cones(parents, centres, radii, cones, discs)
-    bone, neighbours = 0, np.empty(parents.size, np.int64)
-    for i in range(points.shape[0]):
-        x, y = points[i, 0], points[i, 1]
+    _add_mask_border(contour, scale, cones, discs, blocks, slopes)
+    neighbours = np.empty(parents.size, np.int64)
+    for b in range(parents.size):
+        if cones[b, 6] > abs(cones[b, 5]) + TINY:  # else one of its discs covers the other
+            others = neighbours[: _write_neighbours(b, discs, neighbours)]
+            start, end = centres[parents[b]], centres[b + 1]
+            _add_bone_border(start, end, radii[b], contour, scale, (others, cones, discs), (blocks[b], slopes[b]))
+
+
+@inlined
+def _add_mask_border(contour, scale, cones, discs, blocks, slopes):
+    """Add the squares of the distances of the mask's border from the nearest bones."""
+    bone = 0
+    for i in range(contour.points.shape[0]):
+        x, y = contour.points[i, 0], contour.points[i, 1]
         bone = _nearest_bone(x, y, bone, cones, discs)
         off, share, nx, ny = cone_distance(x, y, cones[bone])
-        weight = step / (1.0 + (off / scale) ** 2)
+        weight = contour.step / (1.0 + (off / scale) ** 2)
         _add(blocks[bone], slopes[bone], share, -nx, -ny, -1.0, off, weight)
-    spacing = 2.0 * step
-    for b in range(parents.size):
-        p = parents[b]
-        dx, dy = centres[b + 1, 0] - centres[p, 0], centres[b + 1, 1] - centres[p, 1]
-        r0, r1 = radii[b, 0], radii[b, 1]
-        length = math.sqrt(dx * dx + dy * dy)
-        if length <= abs(r0 - r1) + TINY:
-            continue
-        dx, dy = dx / length, dy / length
-        others = neighbours[: _write_neighbours(b, discs, neighbours)]
-        cosine = (r0 - r1) / length
-        sine = math.sqrt(1.0 - cosine * cosine)
-        tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
-        sides = max(int(length / spacing) + 1, 2)
-        for k in range(2 * (sides + 1 + 2 * CAP)):
-            i, side = k // 2, 1.0 - 2.0 * (k % 2)
-            if i <= sides:
-                share, along, aside = i / sides, cosine, sine
-                stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-            elif side > 0.0:
-                share = 1.0 if i <= sides + CAP else 0.0
-                if share > 0.0:
-                    angle, stands = tilt * (i - sides - 0.5) / CAP, r1 * tilt / CAP
-                else:
-                    rest = math.pi - tilt
-                    angle, stands = tilt + rest * (i - sides - CAP - 0.5) / CAP, r0 * rest / CAP
-                along, aside = math.cos(angle), math.sin(angle)
-            nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
-            radius = r0 + share * (r1 - r0)
-            x = centres[p, 0] + share * length * dx + radius * nx
-            y = centres[p, 1] + share * length * dy + radius * ny
-            column, row = x - corner[0] - 0.5, y - corner[1] - 0.5
-            left, top = math.floor(column), math.floor(row)
-            if not (0 <= left < size[1] - 1 and 0 <= top < size[0] - 1):
-                continue
-            if _covered(x, y, others, cones, discs):
-                continue
-            u, v = column - left, row - top
-            upper, lower = field[top], field[top + 1]
-            f00, f01, f10, f11 = upper[left], upper[left + 1], lower[left], lower[left + 1]
-            off = (f00 * (1.0 - u) + f01 * u) * (1.0 - v) + (f10 * (1.0 - u) + f11 * u) * v
-            across = (f01 - f00) * (1.0 - v) + (f11 - f10) * v
-            down = (f10 - f00) * (1.0 - u) + (f11 - f01) * u
+
+
+@inlined
+def _add_bone_border(start, end, ends, contour, scale, others, square):
+    """Add the squares of the distances of a bone's visible border, both sides and both ends, from the mask's."""
+    neighbours, cones, discs = others
+    block, slope = square
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    r0, r1 = ends[0], ends[1]
+    length = math.sqrt(dx * dx + dy * dy)
+    dx, dy = dx / length, dy / length
+    cosine = (r0 - r1) / length
+    sine = math.sqrt(1.0 - cosine * cosine)
+    tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
+    sides = max(int(length / (2.0 * contour.step)) + 1, 2)
+    for k in range(2 * (sides + 1 + 2 * CAP)):
+        i, side = k // 2, 1.0 - 2.0 * (k % 2)
+        if i <= sides:
+            share, along, aside = i / sides, cosine, sine
+            stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
+        elif side > 0.0:
+            share = 1.0 if i <= sides + CAP else 0.0
+            if share > 0.0:
+                angle, stands = tilt * (i - sides - 0.5) / CAP, r1 * tilt / CAP
+            else:
+                rest = math.pi - tilt
+                angle, stands = tilt + rest * (i - sides - CAP - 0.5) / CAP, r0 * rest / CAP
+            along, aside = math.cos(angle), math.sin(angle)
+        nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
+        radius = r0 + share * (r1 - r0)
+        x = start[0] + share * length * dx + radius * nx
+        y = start[1] + share * length * dy + radius * ny
+        known, off, across, down = _mask_distance(x, y, contour)
+        if known and not _covered(x, y, neighbours, cones, discs):
             weight = stands / (1.0 + (off / scale) ** 2)
-            _add(blocks[b], slopes[b], share, across, down, across * nx + down * ny, off, weight)
+            _add(block, slope, share, across, down, across * nx + down * ny, off, weight)
+
+
+@inlined
+def _mask_distance(x, y, contour):
+    """Return whether a point lies in the field, how far it is from the mask's border there, and the slope of that."""
+    known, off, across, down = False, 0.0, 0.0, 0.0
+    column, row = x - contour.corner[0] - 0.5, y - contour.corner[1] - 0.5
+    left, top = math.floor(column), math.floor(row)
+    if 0 <= left < contour.size[1] - 1 and 0 <= top < contour.size[0] - 1:
+        u, v = column - left, row - top
+        upper, lower = contour.field[top], contour.field[top + 1]
+        f00, f01, f10, f11 = upper[left], upper[left + 1], lower[left], lower[left + 1]
+        off = (f00 * (1.0 - u) + f01 * u) * (1.0 - v) + (f10 * (1.0 - u) + f11 * u) * v
+        across = (f01 - f00) * (1.0 - v) + (f11 - f10) * v
+        down = (f10 - f00) * (1.0 - u) + (f11 - f01) * u
+        known = True
+    return known, off, across, down
 
 
 @jit
 def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
-    """Add the squares of one view to those of the bones: curves (27, 6, 6) and forces (27, 6, 1 + F), over twists.
+    """Add the squares of one view to those of the bones, `sums`. `frames` (27, 4, 3) are of the joints.
 
-    `sums` are both. The first force is half the gradient, the others are half the second derivatives by a twist and F
-    factors of the build. `frames` (27, 4, 3) are of the joints. `contour` is the field, its corner and size, the points
-    (n, 2) and how many pixels each stands for; a distance counts less beyond `reach` metres. `grown` is how joints (F,
-    27, 3) and radii (F, 26, 2) change with factors, and a matrix (1 + F, 1 + F) to whose first column the gradient by
-    these is added, and to the rest the second derivatives.
+    A distance counts less beyond `reach` metres.
     """
     rotation, translation, focal, centre = camera
     curves, forces = sums
@@ -228,7 +281,7 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
                 for k in range(6):
                     total += rows[k, i] * turned[k, j]
                 curves[b + 1, i, j] += worth * total
-        if len(grown[0]):
+        if len(grown.joints):
             _add_growth(b, p, rows, depth, (blocks[b], slopes[b]), worth, grown, forces[b + 1])
 
 
@@ -236,16 +289,15 @@ def add_view(parents, radii, camera, frames, contour, reach, grown, sums):
 def _add_growth(b, p, rows, depth, square, worth, grown, forces):
     """Add what bone b, from joint p, has to do with factors of the build, see `add_view`."""
     block, slope = square
-    wider, larger, growth = grown
-    factors = len(wider)
+    factors = len(grown.joints)
     changes, changed = np.zeros((6, 1 + factors)), np.zeros((6, 1 + factors))
     for k in range(6):
         j = p if k in (0, 1, 4) else b + 1
         for f in range(factors):
             for i in range(3):
-                changes[k, 1 + f] += rows[k, i] * wider[f, j, i]
+                changes[k, 1 + f] += rows[k, i] * grown.joints[f, j, i]
             if k > 3:
-                changes[k, 1 + f] += depth[j] * larger[f, b, k - 4]
+                changes[k, 1 + f] += depth[j] * grown.radii[f, b, k - 4]
     for k in range(6):
         changed[k, 0] = worth * slope[k]
         for i in range(6):
@@ -254,7 +306,7 @@ def _add_growth(b, p, rows, depth, square, worth, grown, forces):
     for k in range(6):
         for f in range(1 + factors):
             for g in range(1 + factors):
-                growth[f, g] += changes[k, f] * changed[k, g]
+                grown.squares[f, g] += changes[k, f] * changed[k, g]
             for i in range(6 if f else 0):
                 forces[i, f] += rows[k, i] * changed[k, f]
 
@@ -346,22 +398,17 @@ def _numbers(chain, joint):
 
 
 @jit
-def add_frames(parents, radii, camera, frames, contours, reach, grown, out):
-    """Add the squares of one view of T frames, with joints (T, 27, 4, 3), to those of the bones, see `add_view`.
-
-    `contours` are the fields (T, h, w), corners and sizes (T, 2), points and starts (T + 1,) of `MaskContours`, and the
-    pixels that a point stands for, or those of one frame that all T meet; `grown` is as in `add_view`, its joints
-    (T, F, 27, 3). `out` is curves (T, 27, 6, 6) and forces (T, 27, 6, 1 + F).
-    """
-    fields, corners, sizes, points, starts, step = contours
-    wider, larger, growth = grown
-    curves, forces = out
+def add_frames(parents, radii, camera, frames, contours, reach, grown, sums):
+    """Add the squares of one view of T frames, with joints (T, 27, 4, 3), to those of the bones, see `add_view`."""
+    starts = contours.starts
     for i in range(len(frames)):
         k = min(i, len(starts) - 2)
         if starts[k] < starts[k + 1]:
-            contour = fields[k], corners[k], sizes[k], points[starts[k] : starts[k + 1]], step
-            grows, sums = (wider[i], larger, growth), (curves[i], forces[i])
-            add_view(parents, radii, camera, frames[i], contour, reach, grows, sums)
+            points = contours.points[starts[k] : starts[k + 1]]
+            contour = Contour(contours.fields[k], contours.corners[k], contours.sizes[k], points, contours.step)
+            grows = Growth(grown.joints[i], grown.radii, grown.squares)
+            bones = BoneSquares(sums.curves[i], sums.forces[i])
+            add_view(parents, radii, camera, frames[i], contour, reach, grows, bones)
 
 
 @jit

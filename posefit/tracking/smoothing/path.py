@@ -19,7 +19,7 @@ from posefit.motion.steadiness import BALLS, low, runs
 from posefit.silhouette.cost import only_camera
 
 BAND_REACH = 2  # frames to either side that a frame has terms with
-BEND = np.array([1.0, -2.0, 1.0])
+SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
 
 
 class Squares:
@@ -41,9 +41,10 @@ class Squares:
         count, some = len(series), np.arange(which.start, which.stop)
         for first in range(3):
             frames = slice(first, count - 2 + first)
-            self.slopes[frames, which] += BEND[first] * bends
+            self.slopes[frames, which] += SECOND_DIFFERENCE[first] * bends
             for second in range(first, 3):
-                self.curves[second - first, frames, some, some] += weight**2 * BEND[first] * BEND[second]
+                square = weight**2 * SECOND_DIFFERENCE[first] * SECOND_DIFFERENCE[second]
+                self.curves[second - first, frames, some, some] += square
 
     def add_steps(self, frames: NDArray[np.int64], series: Array, derivatives: Array, weight: float) -> None:
         """Add the squares of `weight` times the changes of `series` (T, m) from some frames to the next ones.
@@ -126,7 +127,7 @@ def _without_short(flags: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
     return longer
 
 
-ROOT_DEVIATION = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
+PATH_ROOT_DEVIATION = 0.006  # metres that a root may be off from its estimate: standard deviation, as all that follow
 DEPTH_DEVIATION = 0.004  # of the distance, towards or away from a single camera
 UNUSABLE_DEVIATION = 1.0  # metres, in frames that show too little
 ROOT_ACCELERATION = 3.0  # metres a second squared, of the root on each axis
@@ -135,8 +136,8 @@ LEG_ACCELERATION = np.radians(400.0)  # a second squared, of that difference
 STANDING_SLIDE = 0.004  # metres that a foot which stands may move in a thirtieth of a second
 OUTLIER_DEVIATIONS = 4.0  # standard deviations from the estimate beyond which a place is weighted down
 GAUSS_NEWTON_STEPS = 4  # of Gauss and Newton
-DIFFERENCE = 1e-4  # radians: of a difference quotient
-WINDOW_FRAMES, OVERLAP_FRAMES = 900, 60  # frames that are solved for at once, and those that two windows share
+ANGLE_DIFFERENCE = 1e-4  # radians: of a difference quotient
+PATH_WINDOW, PATH_OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
 
 # the angles of both
 LEGS = tuple(turns_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
@@ -176,7 +177,7 @@ def smooth_path(motion: Motion, visibility: Visibility) -> Motion:
         lines = [np.interp(frames, known, line) for line in motion.translations[known].T]
         motion = replace(motion, translations=np.column_stack(lines))
     poses, places = motion.poses.copy(), motion.translations.copy()
-    for rows, inner in windows_over(len(motion), WINDOW_FRAMES, OVERLAP_FRAMES):
+    for rows, inner in windows_over(len(motion), PATH_WINDOW, PATH_OVERLAP):
         part = replace(motion, poses=motion.poses[rows], translations=motion.translations[rows])
         stands, visible = np.zeros((len(part), 2), dtype=bool), visibility.at(rows)
         smooth = _solved(part, visible, stands)  # of the root alone, which shows which foot stands
@@ -205,7 +206,7 @@ def _solved(motion: Motion, visibility: Visibility, stands: NDArray[np.bool_]) -
     poses, places = motion.poses.copy(), motion.translations.copy()
     for _ in range(GAUSS_NEWTON_STEPS):
         squares = Squares(*change.shape)
-        add_root(squares, motion, visibility, ROOT_DEVIATION, change[:, root])
+        add_root(squares, motion, visibility, PATH_ROOT_DEVIATION, change[:, root])
         squares.add(legs, np.eye(len(angles)) / LEG_DEVIATION**2, change[:, legs] / LEG_DEVIATION**2)
         squares.add_bends(legs, change[:, legs], motion.fps**2 / LEG_ACCELERATION)
         add_standing(squares, replace(motion, poses=poses, translations=places), stands, angles)
@@ -244,13 +245,13 @@ def add_standing(squares: Squares, motion: Motion, stands: NDArray[np.bool_], an
     columns = [3 + angles.index(angle) for angle in legs]
     turned = np.repeat(motion.poses[None], len(legs), axis=0)
     for row, angle in enumerate(legs):
-        turned[row, :, angle] += DIFFERENCE
+        turned[row, :, angle] += ANGLE_DIFFERENCE
     there = motion.skeleton.joints(turned, np.repeat(motion.translations[None], len(legs), axis=0))
     joints = motion.joints
     for side, ball in enumerate(BALLS):
         feet = joints[:, ball]
         derivatives = np.zeros((*feet.shape, 3 + len(angles)))
         derivatives[..., :3] = np.eye(3)
-        derivatives[..., columns] = np.moveaxis((there[:, :, ball] - feet) / DIFFERENCE, 0, 2)
+        derivatives[..., columns] = np.moveaxis((there[:, :, ball] - feet) / ANGLE_DIFFERENCE, 0, 2)
         both = np.flatnonzero(stands[:-1, side] & stands[1:, side])
         squares.add_steps(both, feet, derivatives, motion.fps / (30.0 * STANDING_SLIDE))
