@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from posefit.fitting.optimiser import NextFrame, OptimiserFactory
     from posefit.fitting.prior import PriorFactory
-    from posefit.fitting.tracker import TrackerFactory
+    from posefit.fitting.tracker import InitialiserFactory, TrackerFactory
     from posefit.silhouette.foreground import SegmenterFactory
 
 PROJECT = "posefit"
@@ -58,6 +58,13 @@ class RegisterPrior(Protocol):
         """Register a prior."""
 
 
+class RegisterStart(Protocol):
+    """Registers what guesses first poses: its name, its factory and what it needs."""
+
+    def __call__(self, name: str, factory: "InitialiserFactory", *, needs: Needs | None = None) -> None:
+        """Register a start."""
+
+
 class RegisterSegmenter(Protocol):
     """Registers a segmenter: its name, its factory, whether it needs a still background, and what else it needs.
 
@@ -86,6 +93,11 @@ def posefit_register_priors(register: RegisterPrior) -> Any:
 @hookspec
 def posefit_register_trackers(register: RegisterTracker) -> Any:
     """Call `register(name, factory)` for each tracker; see `posefit.fitting.tracker`."""
+
+
+@hookspec
+def posefit_register_starts(register: RegisterStart) -> Any:
+    """Call `register(name, factory)` for each way to guess a first pose; see `posefit.fitting.start`."""
 
 
 @hookspec

@@ -10,7 +10,8 @@ with a space is a function here.
 | optimiser | `Optimiser`, or `Filter`, of a `Space` | `posefit_register_optimisers` |
 | prior | `Prior` | `posefit_register_priors` |
 | tracker | `Tracker`: a `Task` and `Observation`s in, `Frame`s out | `posefit_register_trackers` |
-| segmenter | `Segmenter` of a `Footage` | `posefit_register_segmenters` |
+| start | `Initialiser` of a `Task`: an `Observation` in, a `Posterior` of poses out | `posefit_register_starts` |
+| segmenter | `Segmenter` of a `Film` | `posefit_register_segmenters` |
 | command | a `click.Command` | `posefit_register_commands` |
 
 A name is imported when it is first used, so that a command line that lists plugins stays quick.

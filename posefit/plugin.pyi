@@ -25,6 +25,7 @@ from posefit.fitting.optimiser import check_tell as check_tell
 from posefit.fitting.optimiser import finite_costs as finite_costs
 from posefit.fitting.prior import Prior as Prior
 from posefit.fitting.tracker import Frame as Frame
+from posefit.fitting.tracker import Initialiser as Initialiser
 from posefit.fitting.tracker import Observation as Observation
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
@@ -34,14 +35,16 @@ from posefit.hooks import RegisterCommand as RegisterCommand
 from posefit.hooks import RegisterOptimiser as RegisterOptimiser
 from posefit.hooks import RegisterPrior as RegisterPrior
 from posefit.hooks import RegisterSegmenter as RegisterSegmenter
+from posefit.hooks import RegisterStart as RegisterStart
 from posefit.hooks import RegisterTracker as RegisterTracker
 from posefit.silhouette.cost import areas as areas
 from posefit.silhouette.cost import mismatch as mismatch
 from posefit.silhouette.cost import project as project
-from posefit.silhouette.foreground import Footage as Footage
+from posefit.silhouette.foreground import Film as Film
 from posefit.silhouette.foreground import Segmenter as Segmenter
 from posefit.testing import check_optimiser as check_optimiser
 from posefit.testing import check_prior as check_prior
 from posefit.testing import check_segmenter as check_segmenter
 from posefit.testing import check_tracker as check_tracker
 from posefit.tracking.smoothing.contours import contour_fit as contour_fit
+from posefit.uncertainty.modes import Posterior as Posterior

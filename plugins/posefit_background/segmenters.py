@@ -7,7 +7,7 @@ from posefit.silhouette.foreground import (
     SAMPLES,
     THRESHOLD,
     Drawn,
-    Footage,
+    Film,
     Mixture,
     Still,
     mean_background,
@@ -15,7 +15,7 @@ from posefit.silhouette.foreground import (
 )
 
 
-def learned_mixture(film: Footage, *, history: int = HISTORY, threshold: float = THRESHOLD) -> Mixture:
+def learned_mixture(film: Film, *, history: int = HISTORY, threshold: float = THRESHOLD) -> Mixture:
     """Each pixel's background is an adaptive mixture of Gaussians, learned from the whole video: OpenCV's MOG2.
 
     Settings:
@@ -27,7 +27,7 @@ def learned_mixture(film: Footage, *, history: int = HISTORY, threshold: float =
     return Mixture(film.frames(), history, threshold)
 
 
-def learned_median(film: Footage, *, samples: int = SAMPLES) -> Still:
+def learned_median(film: Film, *, samples: int = SAMPLES) -> Still:
     """Each pixel's background is its median over some frames of the whole video, before which a person may walk.
 
     Settings:
@@ -38,7 +38,7 @@ def learned_median(film: Footage, *, samples: int = SAMPLES) -> Still:
     return median_background([image for image, _ in zip(film.frames(step=step), range(samples), strict=False)])
 
 
-def given_mean(film: Footage, *, background: str) -> Still:
+def given_mean(film: Film, *, background: str) -> Still:
     """Each pixel's background is its mean over frames without a person, or a picture of the empty scene.
 
     Settings:
@@ -50,6 +50,6 @@ def given_mean(film: Footage, *, background: str) -> Still:
     return mean_background([film.picture(background)])
 
 
-def given_masks(_film: Footage) -> Drawn:
+def given_masks(_film: Film) -> Drawn:
     """The frames are masks already: what is bright is the person."""
     return Drawn()

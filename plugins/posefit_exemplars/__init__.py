@@ -14,6 +14,7 @@ several hypotheses of each frame are fitted, and the likeliest sequence of them 
 - `smoothing` filters the estimates over time.
 - `calibration` reports a frame with a posterior whose intervals hold.
 - `lost_model` gives the probability that a frame is lost.
+- `lookup` has the poses whose silhouettes are like an observed one, for any method.
 - `kernels` has the compiled loops.
 - `tracker` has the settings, and processes one frame after the other.
 
@@ -24,7 +25,7 @@ several hypotheses of each frame are fitted, and the likeliest sequence of them 
 """
 
 from posefit import hookimpl
-from posefit.hooks import RegisterTracker
+from posefit.hooks import RegisterStart, RegisterTracker
 
 
 @hookimpl
@@ -33,3 +34,11 @@ def posefit_register_trackers(register: RegisterTracker) -> None:
     from posefit_exemplars.tracker import ExemplarTracker
 
     register("exemplars", ExemplarTracker, looks_ahead=True)
+
+
+@hookimpl
+def posefit_register_starts(register: RegisterStart) -> None:
+    """Offer `lookup`."""
+    from posefit_exemplars.lookup import Lookup
+
+    register("lookup", Lookup)

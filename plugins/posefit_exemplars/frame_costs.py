@@ -19,7 +19,7 @@ class FrameCosts:
     """The silhouettes of one frame. `small` costs are of a picture with every fourth pixel of every fourth row."""
 
     def __init__(self, task: Task, observation: Observation) -> None:
-        self._task, self._observation, silhouettes = task, observation, observation.silhouettes
+        self._task, self.observation, silhouettes = task, observation, observation.silhouettes
         side = min(side for camera in task.cameras for side in (camera.width, camera.height))
         factor = next((factor for factor in SMALL_FACTORS if side >= factor * MIN_SMALL_SIDE), 1)
         cameras = [coarser_camera(camera, factor) for camera in task.cameras]
@@ -54,20 +54,20 @@ class FrameCosts:
 
     def landmarks(self, poses: Array, places: Array) -> Array:
         """Return the `landmark_likelihoods` (n, K, 2) of poses: 0 where the frame has no landmarks."""
-        if self._observation.landmarks is None:
+        if self.observation.landmarks is None:
             return np.zeros((len(poses), len(GROUPS) * len(self._task.cameras), 2))
-        return landmark_likelihoods(self.skeleton, self._task.cameras, self._observation.landmarks, poses, places)
+        return landmark_likelihoods(self.skeleton, self._task.cameras, self.observation.landmarks, poses, places)
 
     def side_odds(self, pose: Array, place: Array) -> Array | None:
         """Return the logarithms of the odds (2,) that legs, and arms, are as in a pose (66,), by all landmarks."""
-        if self._observation.landmarks is None:
+        if self.observation.landmarks is None:
             return None
-        known = self._observation.landmarks[..., 2].any()
+        known = self.observation.landmarks[..., 2].any()
         return side_odds(self.landmarks(pose[None], place[None])[0]) if known else None
 
     def contours(self, place: Array) -> list[MaskContours]:
         """Return the contours of the masks in each view, of a person whose root is about at `place` (3,)."""
-        cameras, frame = enumerate(self._task.cameras), [self._observation]
+        cameras, frame = enumerate(self._task.cameras), [self.observation]
         return [MaskContours.of(camera, view, frame, place[None], POINT_SPACING) for view, camera in cameras]
 
     def cost_and_areas(self, pose: Array, place: Array) -> tuple[float, Areas]:

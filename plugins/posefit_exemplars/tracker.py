@@ -19,6 +19,7 @@ from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.calibration import reported
 from posefit_exemplars.exemplars import Codes, Rows, exemplars_of
 from posefit_exemplars.frame_costs import FrameCosts
+from posefit_exemplars.lookup import YAW_STEP, Lookup
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
@@ -28,8 +29,7 @@ FULL_SHARE = 0.6  # of the beam's evaluations: for full-size costs of states
 FIT_SHARE = 0.8  # of the budget: for fitting hypotheses
 CONTINUED_SHARE = 0.25  # of the small pictures: for where clips continue; the rest is for a search everywhere
 SEARCHES_PER_SECOND = 10.0  # everywhere
-SEARCHED_GROUPS = 40  # those that fit best anywhere, whose poses are evaluated; in the first frame more
-FIRST_SEARCHED_GROUPS = 200
+SEARCHED_GROUPS = 200  # those that fit best anywhere, whose poses are evaluated
 GROUP_POSES = 20  # drawn at random, that stand for a group in a search everywhere
 YAW_TOLERANCE = np.radians(45.0)  # of a known yaw, to either side
 POSTERIOR_TEMPERATURE = 8.0  # divides silhouette costs in the posterior
@@ -97,7 +97,7 @@ class ExemplarTracker:
         # one set of states serves both directions
         training = [motion.reversed() for motion in task.training] if task.backwards else task.training
         self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
-        self.step = beams.Step.of(task, spread)
+        self.step, self.lookup = beams.Step.of(task, spread), Lookup(task, mirrored=mirrored)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
         self.sampling = markov.Sampling(samples, temperature / POSTERIOR_TEMPERATURE)
@@ -202,21 +202,24 @@ class ExemplarTracker:
         self, frame_costs: FrameCosts, before: Beam | None, count: int, rng: np.random.Generator
     ) -> tuple[Beam, int]:
         """Return states that fit, from anywhere, and the number of small pictures that were evaluated."""
-        max_groups = FIRST_SEARCHED_GROUPS if before is None else SEARCHED_GROUPS
-        group_count = min(max_groups, max(count // (4 * GROUP_POSES), 1))
-        drawn = max(count - group_count * GROUP_POSES, 1)
-        states, middle, reach = self.exemplars.draw(drawn, rng), 0.0, np.pi
+        group_count = min(SEARCHED_GROUPS, max(count // (4 * GROUP_POSES), 1))
+        tried = max(count - group_count * GROUP_POSES, 1)
         known = self.task.yaw if before is None and frame_costs.yaw is None else frame_costs.yaw
-        if known is not None:
-            middle, reach = known, YAW_TOLERANCE
-        yaws = middle + rng.uniform(-reach, reach, drawn)
+        nearest = self.lookup.nearest(frame_costs.observation, tried, known)
+        if nearest is not None:
+            states, yaws = np.resize(nearest[0], tried), np.resize(nearest[1], tried)
+            yaws += YAW_STEP * rng.uniform(-0.5, 0.5, tried)
+        else:  # no camera shows the whole person
+            middle, reach = (0.0, np.pi) if known is None else (known, YAW_TOLERANCE)
+            states, yaws = self.exemplars.draw(tried, rng), middle + rng.uniform(-reach, reach, tried)
         beam = self._placed(frame_costs, self._started(states, yaws, before), False)
-        best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[:group_count]
+        best = np.argsort(frame_costs.small(self._poses(beam), beam.places), kind="stable")[: 4 * group_count]
         members, starts = self.exemplars.members, self.exemplars.starts
         groups = [members[starts[group] : starts[group + 1]] for group in self.exemplars.groups[states[best]]]
         poses = [rows if len(rows) <= GROUP_POSES else rng.choice(rows, GROUP_POSES, replace=False) for rows in groups]
         yaws = np.repeat(yaws[best], [len(rows) for rows in poses])
-        return self._started(np.concatenate(poses), yaws, before), len(beam)
+        room = slice(count - tried)  # for that many poses, of more groups where they are small
+        return self._started(np.concatenate(poses)[room], yaws[room], before), len(beam)
 
     def _first_states(self, angles: Array, count: int) -> Beam:
         """Return the states, at most `count`, nearest to a first pose whose angles (63,) and yaw are known."""

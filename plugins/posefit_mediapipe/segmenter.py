@@ -13,7 +13,7 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.check import between
 from posefit.geometry.skeleton import JOINTS
-from posefit.silhouette.foreground import Footage, Image
+from posefit.silhouette.foreground import Film, Image
 from posefit.silhouette.mask import Mask
 
 LEFT, RIGHT = (11, 23), (12, 24)  # shoulder and hip, in the model's numbers; x goes to the right, and z away
@@ -34,7 +34,7 @@ class MediaPipe:
         threshold: of the soft mask, from which on a pixel is the person's, between 0 and 1.
     """
 
-    def __init__(self, film: Footage, *, confidence: float = 0.3, threshold: float = 0.5) -> None:
+    def __init__(self, film: Film, *, confidence: float = 0.3, threshold: float = 0.5) -> None:
         between("confidence", confidence, 0.0, 1.0)
         between("threshold", threshold, 0.0, 1.0, ends=False)
         self._threshold = threshold

@@ -56,7 +56,7 @@ class Loose:
     def fit(self, angles: Array, skeleton: Skeleton | None = None) -> Self:
         """Learn the space from joint angles (T, 63). Raises ValueError where there are too few frames."""
         self._pca.fit(angles, skeleton)
-        self._pca.reach = np.array(self._slack * self._pca.reach)
+        self._max_distance = self._slack * float(self._pca.reach)
         angles = np.asarray(angles, dtype=np.float64)
         least, most = angles.min(axis=0), angles.max(axis=0)
         chosen, reach = [], []
@@ -99,4 +99,4 @@ class Loose:
         angles = self._pca.mean[self.loose] + latents[:, m:]
         add_components(writeable(latents[:, :m]), writeable(self._pca.components[:, self.loose]), angles)
         within = (angles >= self.angles_low - ROUNDING) & (angles <= self.angles_high + ROUNDING)
-        return np.asarray(within.all(axis=1) & (distances(writeable(latents), self._pca.centres) < self._pca.reach))
+        return np.asarray(within.all(axis=1) & (distances(writeable(latents), self._pca.centres) < self._max_distance))

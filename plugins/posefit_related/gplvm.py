@@ -14,7 +14,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from posefit.plugin import Array, at_least
 from posefit_related.frames import squared_distances
@@ -73,6 +72,8 @@ class GPLVM:
         self.angles, self.mean = evenly(angles, self._poses), angles.mean(axis=0)
         self.scale = np.maximum(angles.std(axis=0), 1e-3)  # URTASUN2005 (scales)
         y = (self.angles - self.mean) / self.scale
+        from scipy.optimize import minimize  # not before it is needed: it takes a third of a second
+
         left, sizes, _ = np.linalg.svd(y, full_matrices=False)
         x = (left * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[: self._components]
         start = np.concatenate([x.ravel(), [0.0, 0.0, np.log(0.05)]])

@@ -125,12 +125,12 @@ def claims_table(name: str, claims: Sequence[Claim]) -> Table:
     rows = []
     for text, tried in texts.items():
         claim, cells = next(iter(tried.values())), dict.fromkeys(subjects, "")
-        for subject, one in tried.items():
-            verdict, mean = one.verdict(level)
+        for subject, claim in tried.items():
+            verdict, mean = claim.verdict(level)
             cells[subject] = f"**{verdict}** {bounded(mean)}"
         count = str(claim.values.size) if claim.values.ndim else "-"
         bound = f"{'above' if claim.above else 'below'} {{}} {claim.unit}"
-        bounds = dict.fromkeys(f"{one.bound:.3g}" for one in tried.values())
+        bounds = dict.fromkeys(f"{claim.bound:.3g}" for claim in tried.values())
         rows.append([text, claim.source, bound.format(" / ".join(bounds)), count, *cells.values()])
     return Table(name, ["claim", "where", "holds if", "n", *subjects], rows, 3)
 

@@ -51,7 +51,7 @@ COMPLETED = {"method": methods_from, "train": sources_from}  # options whose val
 
 def track_flags(*names: str) -> list[Decorator]:
     """Return the click options of some options of a track; without names, of all that the command line has."""
-    listed = {one.name: one for one in fields(TrackOptions)}
+    listed = {field.name: field for field in fields(TrackOptions)}
     flags: list[Decorator] = []
     for name in names or [name for name, one in listed.items() if declared(one).flag != ""]:
         one, default = declared(listed[name]), listed[name].default
@@ -138,8 +138,8 @@ class TrackCommand(click.Command):
 
     def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options: those of no heading last."""
-        flags = [one for one in self.get_params(context) if isinstance(one, click.Option)]
-        records = {one.name: record for one in flags if (record := one.get_help_record(context))}
+        flags = [flag for flag in self.get_params(context) if isinstance(flag, click.Option)]
+        records = {flag.name: record for flag in flags if (record := flag.get_help_record(context))}
         sections: dict[str, list[str]] = {}
         heading = ""
         for field in fields(TrackOptions):

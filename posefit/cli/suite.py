@@ -30,7 +30,7 @@ def suite(context: click.Context, as_json: bool) -> None:
     for one in FUNCTIONS:
         dimensions = ", ".join(map(str, one.dimensions))
         lines.append(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
-    print_result(lines, [asdict(one) for one in FUNCTIONS], as_json)
+    print_result(lines, [asdict(function) for function in FUNCTIONS], as_json)
 
 
 @suite.command("run")
@@ -131,24 +131,25 @@ def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
     if out is not None:
         write_iohprofiler(runs, out)
         say(f"written to {out}: IOHprofiler's files")
-    print_result(_score_lines(scores), [asdict(one) for one in scores], as_json)
+    print_result(_score_lines(scores), [asdict(score) for score in scores], as_json)
 
 
 def _score_lines(scores: "Sequence[SuiteScore]") -> list[str]:
     """Return the lines of a table of scores, for a terminal: where runs end, and how soon they reach targets."""
     from posefit.suites.running import ALL, SHOWN, budgets_differ
 
-    budgets, ways = budgets_differ(scores), len({one.infeasible for one in scores}) > 1
+    budgets, ways = budgets_differ(scores), len({score.infeasible for score in scores}) > 1
     labels = [
-        one.method + f", {one.budget / one.dimension:g} x d" * budgets + f", {one.infeasible}" * ways for one in scores
+        score.method + f", {score.budget / score.dimension:g} x d" * budgets + f", {score.infeasible}" * ways
+        for score in scores
     ]
     wide, heads = max(24, *map(len, labels)), [f"ERT +{above:g}" for above in SHOWN]
     lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
-    for one, label in zip(scores, labels, strict=True):
-        function = one.name if one.function == ALL else f"{one.function} {one.name}"
-        times = ["-" if time is None else f"{time:.0f}" for time in one.running_times.values()]
-        start = f"{one.dimension:>3} {function:22} {label:{wide}}"
-        lines.append(f"{start} {one.runs:>5} {one.above:>7.2f} {one.reached:>8.1%}{_cells(times)}".rstrip())
+    for score, label in zip(scores, labels, strict=True):
+        function = score.name if score.function == ALL else f"{score.function} {score.name}"
+        times = ["-" if time is None else f"{time:.0f}" for time in score.running_times.values()]
+        start = f"{score.dimension:>3} {function:22} {label:{wide}}"
+        lines.append(f"{start} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}{_cells(times)}".rstrip())
     return lines
 
 

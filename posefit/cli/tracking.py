@@ -98,10 +98,10 @@ def _print(
     if verbose:
         click.echo(table(summary))
     else:
-        worth, work = brief(summary)
+        worth, *work = brief(summary)
         grade = "good" if summary["trust"] is None else summary["trust"]["grade"]
         click.secho(worth, bold=True, fg=COLOURS[grade])
-        click.echo(work)
+        click.echo("\n".join(work))
     if out or not verbose:
         click.echo(f"written to {out}: {hint}" if out else "--verbose prints all figures; --out DIR writes files")
 
@@ -182,6 +182,6 @@ def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]
     """Return what a method learns from, some people of the library left out."""
     from posefit.motion import recorded
 
-    if not any(recorded.is_library(one) for one in train):
+    if not any(recorded.is_library(clips) for clips in train):
         raise InputError(f"without_subject must be given with --train library, got {', '.join(train)}")
-    return [recorded.leaving_out(one, subjects) if recorded.is_library(one) else one for one in train]
+    return [recorded.leaving_out(clips, subjects) if recorded.is_library(clips) else clips for clips in train]

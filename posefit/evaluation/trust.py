@@ -5,7 +5,7 @@ track doubtful, and one from which on useless. docs/howto/trust.md has the limit
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
@@ -199,7 +199,7 @@ class Trust:
         (0.0, 0.2, 1.0), "left and right are unknown in {unknown:.0%} of the frames", "sides unknown {unknown:.0%}"
     )
     held: float = _sign(
-        (0.0, 0.25, 0.6), "the person is gone, or nearly, in {held:.0%} of the frames in between", "held {held:.0%}"
+        (0.0, 0.25, 0.6), "the person is mostly out of sight in {held:.0%} of the frames in between", "held {held:.0%}"
     )
     cropped: float | None = _sign(
         (0.0, 0.25, 0.6),
@@ -296,24 +296,30 @@ def trust_of(
     turns = np.array([frame.pose[0] - facing(camera, frame.translation) for frame in frames])
     lost, unknown, radii = (table[name][usable] for name in ("lost", "unknown_sides", "interval_mm"))
     signs: dict[str, float | str] = {  # a text is why it is unknown
-        "size_ratio": _or(_size(scene, frames, usable), TOO_FEW) if several else ONE_CAMERA,
-        "depth_scatter": TOO_FEW if few else _or(depth_scatter(depths, usable, fps), TOO_FEW),
-        "foot_share": TOO_FEW if few else IN_PLACE if in_place else float(stands.any(axis=1)[usable].mean()),
-        "stance_spread_m": TOO_FEW if few else _or(stance_spread(joints, stands), "no foot stands twice"),
-        "explained": MASKS_ALONE
-        if scene.pictures is None
-        else MOVES
-        if scene.camera_moves
-        else _or(explained_share(scene, frames, usable), STILL),
-        "interval_mm": _or(mean_known(radii), NOT_REPORTED),
-        "training_mm": SEVERAL if several else TOO_FEW if few else _training_mm(scene, frames, usable, training),
-        "lost": _or(mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
-        "unknown": _or(mean_known(unknown), NOT_REPORTED),
+        "size_ratio": _or({ONE_CAMERA: not several}, lambda: _size(scene, frames, usable), TOO_FEW),
+        "depth_scatter": _or({TOO_FEW: few}, lambda: depth_scatter(depths, usable, fps), TOO_FEW),
+        "foot_share": _or({TOO_FEW: few, IN_PLACE: in_place}, lambda: float(stands.any(axis=1)[usable].mean())),
+        "stance_spread_m": _or({TOO_FEW: few}, lambda: stance_spread(joints, stands), "no foot stands twice"),
+        "explained": _or(
+            {MASKS_ALONE: scene.pictures is None, MOVES: scene.camera_moves},
+            lambda: explained_share(scene, frames, usable),
+            STILL,
+        ),
+        "interval_mm": _or({}, lambda: mean_known(radii), NOT_REPORTED),
+        "training_mm": _or(
+            {SEVERAL: several, TOO_FEW: few},
+            lambda: _training_mm(scene, frames, usable, training),
+            "no motion was learned from",
+        ),
+        "lost": _or({}, lambda: mean_known(np.where(np.isnan(lost), lost, lost >= LOST)), NOT_REPORTED),
+        "unknown": _or({}, lambda: mean_known(unknown), NOT_REPORTED),
         "held": held_share(usable, cut),
-        "cropped": TOO_FEW if few else float(cropped[usable].mean()),
-        "frontal": SEVERAL if several else _or(mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW),
+        "cropped": _or({TOO_FEW: few}, lambda: float(cropped[usable].mean())),
+        "frontal": _or(
+            {SEVERAL: several}, lambda: mean_known(1.0 * (np.abs(np.sin(turns)) < FRONTAL)[usable]), TOO_FEW
+        ),
         "iou": iou,
-        "acceleration": TOO_FEW if few else _or(mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
+        "acceleration": _or({TOO_FEW: few}, lambda: mean_known(acceleration(joints, fps)[usable]), TOO_FEW),
     }
     reasons = {name: value for name, value in signs.items() if isinstance(value, str)}
     figures: dict[str, Any] = {**signs, **dict.fromkeys(reasons)}
@@ -339,19 +345,21 @@ def _borders(observation: Observation) -> tuple[bool, bool]:
     return any(map(touches_border, masks)), all(mask[0].any() and mask[-1].any() for mask in masks)
 
 
-def _or(value: float | None, why: str) -> float | str:
-    return why if value is None else value
+def _or(reasons: Mapping[str, bool], compute: Callable[[], float | None], otherwise: str = "") -> float | str:
+    """Return the first of the reasons that holds, or the value, or for None what is the reason otherwise."""
+    for reason, holds in reasons.items():
+        if holds:
+            return reason
+    return otherwise if (value := compute()) is None else value
 
 
 def _training_mm(
     scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_], training: Sequence[Motion]
-) -> float | str:
+) -> float | None:
     """Return how far the poses of usable frames (T,) are from motions, millimetres, the mean."""
     poses = np.array([frame.pose for frame in frames])[usable]
     sampled = poses[:: max(1, len(poses) // SAMPLED_FRAMES)]
-    return _or(
-        mean_known(1e3 * training_distances(scene.body.skeleton, sampled, training)), "no motion was learned from"
-    )
+    return mean_known(1e3 * training_distances(scene.body.skeleton, sampled, training))
 
 
 def _size(scene: Scene, frames: Sequence[Frame], usable: NDArray[np.bool_]) -> float | None:

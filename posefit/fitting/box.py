@@ -1,6 +1,6 @@
 """The box that an optimiser searches, and functions on it; those that draw always end."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,6 +23,8 @@ class Start:
     mean: Array  # (d,)
     spread: Array  # (d,) standard deviations
     velocity: Array  # (d,) v_pred
+    weight: float = 1.0  # how likely it is, beside the others
+    others: Sequence["Start"] = ()  # less likely ones, where several are possible; a population is drawn from all
 
 
 class Space(Protocol):
@@ -124,13 +126,19 @@ def _sample(space: Space, start: Start | None, rng: np.random.Generator, count: 
     """Return proposals (count, d) from the start or uniform, in the box, feasible or not."""
     if start is None:
         return rng.uniform(-1.0, 1.0, (count, space.dimensions))
-    drawn = wrap(space, rng.normal(start.mean, start.spread, (count, space.dimensions)))  # SAPSO (6)
+    mean, spread = start.mean, start.spread
+    if start.others:
+        starts = [start, *start.others]
+        weights = np.array([each.weight for each in starts])
+        rows = rng.choice(len(starts), count, p=weights / weights.sum())
+        mean, spread = (np.array([getattr(each, name) for each in starts])[rows] for name in ("mean", "spread"))
+    mean, spread = (np.broadcast_to(values, (count, space.dimensions)) for values in (mean, spread))
+    drawn = wrap(space, rng.normal(mean, spread))  # SAPSO (6)
     for _ in range(REDRAWS):
         outside = np.abs(drawn) > 1.0
         if not outside.any():
             return drawn
-        columns = outside.nonzero()[1]  # periodic ones are never among them
-        drawn[outside] = rng.normal(start.mean[columns], start.spread[columns])
+        drawn[outside] = rng.normal(mean[outside], spread[outside])  # periodic ones are never among them
     return fold(space, drawn)
 
 

@@ -14,6 +14,7 @@ from posefit.fitting.optimiser import Filter, Minimum, NextFrame, Optimiser, min
 from posefit.fitting.prior import Prior, Tilt
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import ROOT_RANGE_DEGREES, SearchSpace, Translation
+from posefit.fitting.start import modes_apart, start_in
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion.motion import Motion
@@ -83,6 +84,9 @@ class Task:
     fps: float = 30.0
     training: Sequence[Motion] = field(default=(), repr=False)  # what may be learned from
     first_pose: Array | None = None  # (63,) joint angles in the first frame, where they are known
+    # what the first frame may show, where it was guessed: modes with their weights, see `posefit.fitting.start`
+    modes: Sequence[tuple[float, Posterior]] = field(default=(), repr=False)
+    start: "InitialiserFactory | None" = field(default=None, repr=False)  # guesses them; None for a blind search
     before: Sequence[Frame] = field(default=(), repr=False)  # earlier ones, where an interrupted track goes on
     threads: int = 1
     backwards: bool = False  # whether observations and training come in reverse, the last one first
@@ -113,6 +117,26 @@ class Tracker(Protocol):
 TrackerFactory = Callable[..., Tracker]
 
 
+class Initialiser(Protocol):
+    """Guesses which poses an observation may show; nothing to inherit."""
+
+    def posterior(self, observation: Observation) -> Posterior | None:
+        """Return weighted poses with their translations; None where it knows of none, and the search is blind."""
+        ...
+
+
+# Builds an initialiser, as `factory(task, **settings)`: a Task and keyword-only settings.
+InitialiserFactory = Callable[..., Initialiser]
+
+
+def guessed_modes(task: Task, observation: Observation) -> Sequence[tuple[float, Posterior]]:
+    """Return the modes of what an observation may show; none where nothing guesses them, or the pose is known."""
+    if task.start is None or task.first_pose is not None or not observation.usable:
+        return ()
+    posterior = task.start(task).posterior(observation)
+    return () if posterior is None else modes_apart(task.body.skeleton, posterior)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Prediction:
     """Where the next frame's pose is sought, where the search starts, and what a pose costs. SAPSO (4), (6), (7).
@@ -124,6 +148,7 @@ class Prediction:
         tilt: pitch and roll are "learned" with the latents, or a "box" around upright; by default learned, and a box
             to the letter of the paper. Interpretation S16.
         beta: what the missed share counts, 0 to 1, and 1 - beta the spilled one. SAPSO (4).
+        start: what guesses the first pose where the yaw is unknown, by name, "blind" for nothing; by default "lookup".
         relocalise_gap: in footage, frames of a gap after which several starts look all around; 0 never. Ours.
         variant: "paper" is the letter of SAPSO's paper: the step before the latest (Interpretation S12), a box of tilts
             (S16), and a root that turns about x, then y, then z (S3).
@@ -134,6 +159,7 @@ class Prediction:
     root_range_degrees: tuple[float, float, float] = ROOT_RANGE_DEGREES
     tilt: Literal["learned", "box"] | None = None
     beta: float = BETA
+    start: str | None = None
     relocalise_gap: int = RELOCALISE_GAP
     variant: Literal["default", "paper"] = "default"
 
@@ -188,7 +214,11 @@ class Predictor:
         if not latest:
             if anchor is not None:
                 space = space.around(space.centre, anchor=anchor)
-            if self._task.first_pose is not None:
+            if modes := self._task.modes or guessed_modes(self._task, observation):
+                views = self._task.cameras, observation.silhouettes
+                problem = PoseProblem(self._task.body, *views, space, beta=self._how.beta, blank=True)
+                space = replace(space, start=start_in(problem, modes))
+            elif self._task.first_pose is not None:
                 space = replace(space, start=self._start_at_known_pose(space, self._task.first_pose))
             self._space = space
             return space

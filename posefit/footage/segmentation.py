@@ -23,7 +23,7 @@ from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
 from posefit.registry import registry
 from posefit.settings import check
-from posefit.silhouette.foreground import Footage, Image, Person, Segmenter, person
+from posefit.silhouette.foreground import Film, Image, Person, Segmenter, person
 from posefit.silhouette.mask import Mask
 
 T = TypeVar("T", bound=np.generic)
@@ -110,7 +110,7 @@ class Extraction:
         both = [self, replace(self, method=PEOPLE_SEGMENTER)]
         return both[::-1] if cameras == 1 else both
 
-    def segmenter(self, film: Footage) -> Segmenter:
+    def segmenter(self, film: Film) -> Segmenter:
         """Return the segmenter, trained on a film. Raises InputError where a setting does not fit it."""
         offer = registry().offer("segmenter", self.name)
         with plugin_errors(offer.label, "it", passed=(ValueError, ImportError)):

@@ -7,6 +7,7 @@
 | numbered variations of a motion, as in other benchmarks | instance.py |
 | Acclaim skeletons, such as CMU's `02.asf` | asf.py |
 | Acclaim motions, such as CMU's `02_01.amc`; `read_clip` reads both files at once | amc.py |
+| lines of text files, with errors that name file and line | lines.py |
 | recorded clips of ten people, with the package | recorded.py |
 | BVH, of many programs | bvh.py |
 | what the joints of other programs are, by their names | joint_names.py |

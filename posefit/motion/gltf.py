@@ -20,7 +20,7 @@ from posefit.motion.motion import Motion
 
 COLOURS = {"left": (0.87, 0.38, 0.08), "right": (0.1, 0.36, 0.75), "middle": (0.6, 0.6, 0.6)}
 MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.7}
-AROUND, CAP = 16, 4  # corners of a ring, and rings of a cap
+RING_CORNERS, CAP = 16, 4  # corners of a ring, and rings of a cap
 FLOAT, SHORT, ARRAY, ELEMENTS = 5126, 5123, 34962, 34963  # glTF's numbers of types and of what a buffer is for
 MAGIC, VERSION, JSON, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 
@@ -100,13 +100,13 @@ def _capped_cone(offset: Array, radii: Sequence[float] | Array) -> tuple[Array, 
     length = float(np.linalg.norm(offset))
     down, up = np.linspace(-0.5 * np.pi, 0.0, CAP), np.linspace(0.0, 0.5 * np.pi, CAP)
     rings = [(angle, radii[0], 0.0) for angle in down] + [(angle, radii[1], length) for angle in up]
-    around = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    around = np.linspace(0.0, 2.0 * np.pi, RING_CORNERS, endpoint=False)
     normals = np.array([(np.cos(a) * np.cos(b), np.sin(a), np.cos(a) * np.sin(b)) for a, _, _ in rings for b in around])
-    scale = np.repeat([radius for _, radius, _ in rings], AROUND)[:, None]
-    points = scale * normals + np.repeat([(0.0, base, 0.0) for _, _, base in rings], AROUND, axis=0)
-    ring, k = np.divmod(np.arange((len(rings) - 1) * AROUND), AROUND)
-    low, high = ring * AROUND, (ring + 1) * AROUND
-    after = (k + 1) % AROUND
+    scale = np.repeat([radius for _, radius, _ in rings], RING_CORNERS)[:, None]
+    points = scale * normals + np.repeat([(0.0, base, 0.0) for _, _, base in rings], RING_CORNERS, axis=0)
+    ring, k = np.divmod(np.arange((len(rings) - 1) * RING_CORNERS), RING_CORNERS)
+    low, high = ring * RING_CORNERS, (ring + 1) * RING_CORNERS
+    after = (k + 1) % RING_CORNERS
     corners = np.stack([low + k, high + k, low + after, low + after, high + k, high + after], axis=1).ravel()
     turn = along_y(offset).T
     return points @ turn, normals @ turn, corners

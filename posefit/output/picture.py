@@ -36,7 +36,7 @@ from posefit.output.drawing import (
 from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image
 from posefit.uncertainty.calibration import MAIN_LEVEL
-from posefit.uncertainty.modes import Mode, other_mode
+from posefit.uncertainty.modes import Mode, other_mode, other_modes
 
 Row = Mapping[str, float]  # of a table
 PANEL = 480  # pixels high
@@ -46,6 +46,7 @@ SUMMARY_SCALE = 0.65  # of its words, which a page shows at three quarters of th
 LABEL_HEIGHT = 38  # pixels that the label stands on
 SOLID = 0.65  # how much of the footage the body hides
 MIN_OTHER_WEIGHT = 0.2  # above which another mode is drawn
+ALTERNATIVES, MIN_WEIGHT = 3, 0.05  # other modes on the summary of a single frame, at most, and their least weight
 BORDER = 6  # pixels around a lost frame
 LINE_HEIGHT = 22  # pixels from one line to the next
 PEAK, PEAK_QUANTILE = 2.0, 0.9  # a curve ends at twice what nine in ten frames have at most; what is above is a peak
@@ -87,6 +88,19 @@ class Painter:
         image = np.hstack([left, side])
         if self._count in self._wanted:
             self._stills.append(self._still(image, row))
+        if self._scene.count == 1:
+            for mode in other_modes(body.skeleton, frame.modes, pose, MIN_WEIGHT)[:ALTERNATIVES]:
+                alternative = replace(frame, pose=mode.pose, translation=mode.translation)
+                side = blank(PANEL, PANEL)
+                draw_body(
+                    side,
+                    body,
+                    side_camera(body, camera, mode.pose, mode.translation, PANEL),
+                    mode.pose,
+                    mode.translation,
+                )
+                image_of_it = np.hstack([self.overlay(alternative, observation, filmed), side])
+                self._stills.append(_labelled(image_of_it, f"or this, {100.0 * mode.weight:.0f} %"))
         label = [f"frame {self._scene.first + self._count}", f"cost {row['cost']:.2f}", f"IoU {row['iou']:.3f}"]
         label += [f"error {row['error_degrees']:.2f} deg"] if "error_degrees" in row else []
         label += [] if observation.usable else ["pose held"]
@@ -108,14 +122,9 @@ class Painter:
 
     def _still(self, image: Image, row: Row) -> Image:
         """Return a small picture whose words are large enough to be read in a page."""
-        still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         worth = f"error {row['error_degrees']:.1f} deg" if "error_degrees" in row else f"cost {row['cost']:.1f}"
         label = f"frame {self._scene.first + self._count}, {worth}"
-        if row["lost"] >= LOST:
-            _draw_border(still, BORDER // 2)
-        head = blank(LABEL_HEIGHT, still.shape[1])
-        write(head, label, (12, 26), scale=SUMMARY_SCALE)
-        return np.vstack([head, still])
+        return _labelled(image, label, row["lost"] >= LOST)
 
     def overlay(
         self,
@@ -172,6 +181,16 @@ class Painter:
             _write_legend(parts[-1], LABEL_HEIGHT - 12, SUMMARY_SCALE)
         name = "error_degrees" if "error_degrees" in table else "cost"
         return np.vstack([*parts, curve(table[name], name.replace("_", " "), width, 180, self._scene.first)])
+
+
+def _labelled(image: Image, label: str, lost: bool = False) -> Image:
+    """Return a picture at half its size below a label."""
+    still = np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+    if lost:
+        _draw_border(still, BORDER // 2)
+    head = blank(LABEL_HEIGHT, still.shape[1])
+    write(head, label, (12, 26), scale=SUMMARY_SCALE)
+    return np.vstack([head, still])
 
 
 def _draw_border(image: Image, width: int) -> None:

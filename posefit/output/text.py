@@ -9,6 +9,7 @@ from posefit.evaluation.trust import trust_line
 from posefit.reading import counted
 
 MIN_BUILD_CHANGE = 0.05  # a part of the build that is off the average by less is not worth a word
+MIN_MODE = 0.08  # of the weight of a pose that is worth a word
 WIDTH = 30  # of the names
 GAIT_ROWS = (  # of a foot: names, labels, units, factors and digits
     ("step_length", "step", "m", 1.0, 2),
@@ -19,7 +20,7 @@ MAX_NAMED = 8  # motions that were learned from, and are named
 
 
 def brief(summary: Mapping[str, Any]) -> list[str]:
-    """Return in two lines what a track is worth, and what it took."""
+    """Return in lines what a track is worth, which poses a single frame leaves open, and what it took."""
     trust = summary["trust"]
     if trust is None:
         error = MEASURES["error_degrees"].shown(summary["error_degrees"]["mean"])
@@ -29,7 +30,9 @@ def brief(summary: Mapping[str, Any]) -> list[str]:
     guessed = ", camera guessed" if summary["camera"] == "guessed" else ""
     frames = counted(summary["frames"], "frame")
     work = f"{summary['motion']}: {frames} by {summary['method']}{guessed}, {_effort(summary)}"
-    return [printable(worth), printable(work)]
+    open_poses = sum(weight >= MIN_MODE for weight in summary["modes"] or [])
+    modes = [f"one silhouette leaves {open_poses} poses open"] if summary["frames"] == 1 and open_poses > 1 else []
+    return [printable(line) for line in (worth, *modes, work)]
 
 
 def table(summary: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 r"""The report of a ledger: a page that any browser opens, figures and tables for papers, files for other tools.
 
-    from posefit.report.contest import contest_of, leaderboard
+    from posefit.report.leaderboard import contest_of, leaderboard
     from posefit.report.runs import runs_of
     from posefit.report.write import leaderboard_lines, write_report
     from posefit.sweep.ledger import Ledger
@@ -12,7 +12,7 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | looking for | file |
 |---|---|
 | what the command does, in order, and what it refuses | write.py |
-| a table of runs, those that methods share, and what both kinds of runs have in common | kind.py |
+| a table of runs, and what both kinds of runs have in common | kind.py |
 | the rows of a ledger as that table | runs.py |
 | what differs between tracks and single searches | tracks.py, searches.py |
 | figures and the score: digits, averages, texts | columns.py |

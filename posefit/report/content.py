@@ -13,8 +13,8 @@ from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.animations import animations_of
-from posefit.report.contest import contest_of, leaderboard, paired_tests
 from posefit.report.kind import Contest, Runs
+from posefit.report.leaderboard import contest_of, leaderboard, paired_tests
 from posefit.report.page import COLOURS
 from posefit.report.searches import running_times, search_charts
 from posefit.report.summary import leader_sentences, unpaired_sentence

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from posefit.errors import InputError
 from posefit.files import new_file, new_folder
 from posefit.report.charts import Chart, track_charts
-from posefit.report.contest import contest_of, leaderboard
 from posefit.report.export import latex_table, write_csv
 from posefit.report.kind import Runs
+from posefit.report.leaderboard import contest_of, leaderboard
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

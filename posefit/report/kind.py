@@ -1,4 +1,4 @@
-"""What a report knows of runs: their table, those that methods share, and what their kind says of both."""
+"""What a report knows of runs: their table, what their kind says of it, and the contest of methods that share them."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence

@@ -158,12 +158,18 @@ def project(body: Body, camera: Camera, pose: Array, translation: Array) -> Mask
     if np.shape(pose) != (ANGLES,) or np.shape(translation) != (3,):
         came = f"{np.shape(pose)} and {np.shape(translation)}"
         raise InputError(f"pose and translation must have shapes {(ANGLES,)} and (3,), got {came}")
-    drawn.count_poses(1)
-    _check_finite("pose", pose)
-    _check_finite("translation", translation)
+    mask: Mask = masks_of(body, camera, np.asarray(pose)[None], np.asarray(translation)[None])[0]
+    return mask
+
+
+def masks_of(body: Body, camera: Camera, poses: Array, translations: Array) -> Mask:
+    """Return the masks (n, height, width) of bodies, poses (n, 66), roots at translations (n, 3)."""
+    drawn.count_poses(len(poses))
+    _check_finite("pose", poses)
+    _check_finite("translation", translations)
     nothing = np.zeros(strips_and_words(camera.width, camera.height), dtype=np.uint64)
-    image = np.empty((1, *nothing.shape), dtype=np.uint64)
-    drawing = body.skeleton.chain, body.radii, view_of(camera), kernels.Observed(nothing, nothing, 0), image
-    uncounted = np.empty((1, 3), dtype=np.int64)
-    kernels.count_areas(*drawing, writeable(pose)[None], writeable(translation)[None], uncounted)
-    return unpack(image[0], camera.width, camera.height)
+    images = np.empty((len(poses), *nothing.shape), dtype=np.uint64)
+    drawing = body.skeleton.chain, body.radii, view_of(camera), kernels.Observed(nothing, nothing, 0), images
+    uncounted = np.empty((len(poses), 3), dtype=np.int64)
+    kernels.count_areas(*drawing, writeable(poses), writeable(translations), uncounted)
+    return unpack(images, camera.width, camera.height)

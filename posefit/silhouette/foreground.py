@@ -17,7 +17,7 @@ from posefit.silhouette.mask import Mask, padded_box, touches_border
 Image = NDArray[np.uint8]  # (height, width, 3)
 
 SPREADS = 4.0  # a pixel is foreground this many standard deviations from the background
-LEAST = 18.0  # and at least so many grey levels
+MIN_DIFFERENCE_LEVELS = 18.0  # and at least so many grey levels
 SHADE = (0.45, 0.95)  # a shadow keeps this share of the background's brightness
 TINT = 14.0  # and its colour, to within so many grey levels after scaling
 NOISE = 3  # pixels to a side, of which the majority decides
@@ -32,7 +32,7 @@ HISTORY = 500  # frames that a mixture remembers
 THRESHOLD = 25.0  # squared standard deviations from its nearest Gaussian, from which on a pixel is foreground
 
 
-class Footage(Protocol):
+class Film(Protocol):
     """What a segmenter gets before the first frame: a video at its working size, cut to the roi."""
 
     def __len__(self) -> int:
@@ -62,7 +62,7 @@ class Segmenter(Protocol):
         ...
 
 
-SegmenterFactory = Callable[..., Segmenter]  # called with a `Footage`, and settings as keywords
+SegmenterFactory = Callable[..., Segmenter]  # called with a `Film`, and settings as keywords
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Still:
         """Return where an image differs from the background, and where it is only darker."""
         away = cv2.absdiff(image, self.background)
         difference = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2])
-        changed = np.asarray(difference > np.maximum(LEAST, SPREADS * self.spread))
+        changed = np.asarray(difference > np.maximum(MIN_DIFFERENCE_LEVELS, SPREADS * self.spread))
         before, now = self.middle[changed], image[changed].astype(np.float32)  # the rest need not be looked at
         share = (now.mean(axis=1) + 1.0) / (before.mean(axis=1) + 1.0)
         tint = np.abs(now - before * share[:, None]).max(axis=1)
@@ -199,10 +199,10 @@ def _largest(mask: Mask) -> tuple[Mask, int, float]:
     areas = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + int(areas.argmax())
     reach = _morphed(labels == largest, cv2.MORPH_DILATE, 2.0 * NEAR * stats[largest, cv2.CC_STAT_HEIGHT])
-    mine = np.zeros(count, dtype=bool)
-    mine[labels[reach & mask[box]]] = True
-    rival = float(areas[~mine[1:]].max(initial=0) / areas[mine[1:]].sum())
-    kept[box] = mine[labels]
+    belongs_to_person = np.zeros(count, dtype=bool)
+    belongs_to_person[labels[reach & mask[box]]] = True
+    rival = float(areas[~belongs_to_person[1:]].max(initial=0) / areas[belongs_to_person[1:]].sum())
+    kept[box] = belongs_to_person[labels]
     return kept, int(np.count_nonzero(areas > PIECE * areas.max())), rival
 
 

@@ -30,10 +30,10 @@ def pack(mask: Mask) -> Bits:
 
 
 def unpack(bits: Bits, width: int, height: int) -> Mask:
-    """Return the mask (height, width) of a bit image."""
-    rows = bits.view(np.uint32).T[:height]
+    """Return the mask (..., height, width) of a bit image (..., strips, words)."""
+    rows = bits.view(np.uint32).swapaxes(-1, -2)[..., :height, :]
     octets = np.ascontiguousarray(rows.astype("<u4")).view(np.uint8)
-    return np.unpackbits(octets, axis=1, count=width, bitorder="little").astype(bool)
+    return np.unpackbits(octets, axis=-1, count=width, bitorder="little").view(bool)
 
 
 def box_of(mask: Mask) -> tuple[int, int, int, int]:

@@ -44,7 +44,7 @@ FUNCTIONS = (
 
 def suite_function(number: object) -> SuiteFunction:
     """Return the function of a number. Raises ValueError where there is none."""
-    known = {one.number: one for one in FUNCTIONS}
+    known = {function.number: function for function in FUNCTIONS}
     one_of("function", chosen := whole("function", number, 1), known)
     return known[chosen]
 

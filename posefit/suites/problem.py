@@ -158,7 +158,7 @@ class Problem:
         return bool(self.best_observed_fvalue1 <= self.targets[-1])
 
     @property
-    def left(self) -> float:
+    def remaining_evaluations(self) -> float:
         """How many evaluations the budget has left; infinite without one."""
         return np.inf if self.budget is None else self.budget - self.evaluations
 
@@ -219,9 +219,9 @@ class Problem:
 
     def _counted(self, checked: Array) -> Array:
         """Return the costs (n,) of checked proposals (n, d), and count them."""
-        if len(checked) > self.left:
+        if len(checked) > self.remaining_evaluations:
             raise BudgetSpentError(
-                f"{self.id}: {self.left:g} of {self.budget} evaluations are left, got {len(checked)}"
+                f"{self.id}: {self.remaining_evaluations:g} of {self.budget} evaluations are left, got {len(checked)}"
             )
         costs, repaired, penalties = self._noise_free(checked)
         measured = self.made.evaluate_noisy(repaired, self.evaluations) + penalties if self.function.noisy else costs
@@ -305,7 +305,7 @@ class Suite:
     def functions(self) -> tuple[SuiteFunction, ...]:
         """The functions that problems are of, each with its number, name, summary and dimensions."""
         numbers = {number for number, _, _ in self._addresses}
-        return tuple(one for one in FUNCTIONS if one.number in numbers)
+        return tuple(function for function in FUNCTIONS if function.number in numbers)
 
     def __len__(self) -> int:
         return len(self._addresses)

@@ -168,7 +168,9 @@ def method_name(run: SuiteRun) -> str:
 
 def budgets_differ(results: Sequence[SuiteRun] | Sequence[SuiteScore]) -> bool:
     """Return whether in some dimension runs, or those behind scores, have several budgets."""
-    return len({(one.dimension, one.budget) for one in results}) > len({one.dimension for one in results})
+    return len({(result.dimension, result.budget) for result in results}) > len(
+        {result.dimension for result in results}
+    )
 
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:

@@ -136,7 +136,10 @@ class TrackCell(Cell):
                 raise InputError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
-        shared = {one.name for one in fields(TrackOptions)} & {one.name for one in fields(self)} - {*VIEW, "train"}
+        shared = {option.name for option in fields(TrackOptions)} & {field.name for field in fields(self)} - {
+            *VIEW,
+            "train",
+        }
         values = {name: getattr(self, name) for name in shared}
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, completed(options, self.motion))
@@ -234,7 +237,7 @@ def other_version(origin: str) -> str | None:
     name, installed = origin.partition(" ")[0], _installed()
     if origin in installed:
         return None
-    return next((one for one in installed if one.partition(" ")[0] == name), None)
+    return next((other for other in installed if other.partition(" ")[0] == name), None)
 
 
 @lru_cache(maxsize=1)

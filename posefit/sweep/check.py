@@ -23,7 +23,7 @@ from posefit.sweep.cell import ALL_AROUND, DROPPED, SearchCell, TrackCell, diges
 from posefit.tracking.method import method_names, parsed_settings, places_of
 from posefit.tracking.options import TrackOptions, declared
 
-FIELDS = tuple(one.name for one in fields(TrackCell) if one.name not in ("files", "version"))
+FIELDS = tuple(field.name for field in fields(TrackCell) if field.name not in ("files", "version"))
 MAX_VIEWS, MAX_FRAMES = 100, 100_000  # of a cell
 MAX_BODY_OFF = 50.0  # percent that a body may be off
 
@@ -43,7 +43,7 @@ def cell_of(spec: Mapping[str, Any]) -> TrackCell:
     train = values.get("train") or _other_styles(values["motion"])
     if values["motion"] in train:
         raise InputError(f"train must not contain the motion itself, got {values['motion']}")
-    files = {path: digest for one in (values["motion"], *train) for path, digest in _files(one)}
+    files = {path: digest for motion in (values["motion"], *train) for path, digest in _files(motion)}
     version = version_of(offer.origin for offer in offers)
     cell = TrackCell(**{**values, "settings": dict(chosen), "train": train, "files": files, "version": version})
     if (size := _population(cell.method, texts, cell.evaluations)) > cell.evaluations:
@@ -103,7 +103,8 @@ def _of_method(method: str, texts: tuple[str, ...]) -> tuple[tuple[Offer, ...], 
     offers = _offers(method)
     names = {kind: name for name, (kind, _) in places_of(offers).items()}
     each = parsed_settings(offers, texts).items()
-    return offers, dict(sorted((f"{names[kind]}.{one}", value) for kind, mine in each for one, value in mine.items()))
+    named = ((f"{names[kind]}.{setting}", value) for kind, values in each for setting, value in values.items())
+    return offers, dict(sorted(named))
 
 
 @lru_cache(maxsize=1024)
@@ -136,11 +137,11 @@ def _files(motion: str) -> tuple[tuple[str, str], ...]:
         return ()
     if os.path.isdir(motion):
         training_clips([motion])  # raises where one cannot be read
-        return tuple((str(one), digest_of(one)) for one in sorted(Path(motion).iterdir()) if one.is_file())
+        return tuple((str(file), digest_of(file)) for file in sorted(Path(motion).iterdir()) if file.is_file())
     load_motion(motion, FPS)  # raises where it cannot be read
     path = Path(motion)
     beside = sorted(path.parent.glob("*.asf")) if path.suffix.lower() == ".amc" else []
-    return tuple((str(one), digest_of(one)) for one in (path, *beside))
+    return tuple((str(file), digest_of(file)) for file in (path, *beside))
 
 
 @lru_cache(maxsize=1024)
@@ -178,7 +179,7 @@ def _motion(field: str, value: Any) -> str:
 def _train(field: str, value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise InputError(f"{field} must be a list of motions, got {quoted(value)}")
-    return tuple(_learned_from(field, one) for one in value)
+    return tuple(_learned_from(field, source) for source in value)
 
 
 def _learned_from(field: str, value: Any) -> str:
@@ -213,7 +214,11 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
         raise InputError(f"{field} must be a table such as {{sapso.cooling = 0.9}}, got {quoted(value)}")
     flat: dict[str, Any] = {}
     for name, inner in value.items():
-        flat |= {f"{name}.{one}": what for one, what in inner.items()} if isinstance(inner, Mapping) else {name: inner}
+        flat |= (
+            {f"{name}.{setting}": chosen for setting, chosen in inner.items()}
+            if isinstance(inner, Mapping)
+            else {name: inner}
+        )
     return flat
 
 
@@ -242,7 +247,7 @@ def _choice(*choices: object) -> "Check":
     return checked
 
 
-_OPTIONS = {one.name: check for one in fields(TrackOptions) if (check := declared(one).check) is not None}
+_OPTIONS = {option.name: check for option in fields(TrackOptions) if (check := declared(option).check) is not None}
 Check = Callable[[str, Any], Any]
 Checks = Mapping[str, Check]
 CHECKS: Checks = {

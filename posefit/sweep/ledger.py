@@ -271,11 +271,11 @@ class Writer:
         query = "UPDATE cells SET status = 'done', row = ?, arrays = ? WHERE key = ? AND status != 'done'"
         return self._db.execute(query, [row, result.joints, key]).rowcount == 1
 
-    def fail(self, key: str, reason: str, own: bool = True) -> bool:
+    def fail(self, key: str, reason: str, is_own_fault: bool = True) -> bool:
         """Note a failed attempt, and return whether the cell is in quarantine for it."""
         faults, losses = self._db.execute("SELECT faults, losses FROM cells WHERE key = ?", [key]).fetchone()
-        reasons = [*json.loads(faults), reason] if own else json.loads(faults)
-        losses += not own
+        reasons = [*json.loads(faults), reason] if is_own_fault else json.loads(faults)
+        losses += not is_own_fault
         quarantined = len(reasons) >= ATTEMPTS or losses >= LOSSES
         if losses >= LOSSES:
             reasons = [f"something outside ended it {LOSSES} times", reason]
@@ -335,7 +335,6 @@ def _check_format(file: Path, database: sqlite3.Connection) -> bool:
 
 
 def _check_place(path: Path) -> None:
-    """Return nothing. Raises InputError where a folder is no place for a ledger."""
     folder = path.parent
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for the ledger, got a file")

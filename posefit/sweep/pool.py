@@ -5,24 +5,21 @@ import os
 import pickle
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
-from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
 import cloudpickle
 from pebble import ProcessExpired, ProcessFuture, ProcessPool
 
 from posefit.errors import InputError
-from posefit.limits import end_with_parent, memory
-from posefit.sweep.engine import Limits, Outcome, Run, single_thread, text_of
+from posefit.limits import memory
+from posefit.sweep.engine import Limits, Outcome, Run, text_of
+from posefit.sweep.worker import EXIT_ZERO_STATUS, Context, become_worker
 
 START_SECONDS = 60.0  # that a process may take to begin a job; twice as long after each time that none did
-EXIT_ZERO_STATUS = 64  # the status of a process that a job ended with 0
 # Signals that nothing in a cell raises by mistake: they were sent from outside. So does the kernel where memory runs
 # out; a cell's own limit of memory comes first, where the machine has as much as all cells may take.
 EXTERNAL_SIGNALS = {
@@ -34,7 +31,6 @@ EXTERNAL_SIGNALS = {
     signal.SIGUSR1,
     signal.SIGUSR2,
 }
-_starting = threading.Lock()
 
 
 class Pool:
@@ -80,7 +76,7 @@ class Pool:
 
     def _start(self) -> None:
         arguments = os.getpid(), sys.path, self._prepare
-        self._pool = ProcessPool(self._workers, initializer=_become_worker, initargs=arguments, context=_Context())
+        self._pool = ProcessPool(self._workers, initializer=become_worker, initargs=arguments, context=Context())
 
     def _outcome(self, future: "ProcessFuture[bytes]") -> Outcome:
         job, _ = self._running.pop(future)
@@ -98,42 +94,6 @@ class Pool:
             return Outcome(job)
         except Exception as error:  # a result that cannot be read
             return Outcome(job, None, text_of(error))
-
-
-class _Process(SpawnProcess):
-    """A process that imports what it runs, but not the script that started it, which may compare without a guard."""
-
-    @staticmethod
-    def _Popen(process: Any) -> Any:  # noqa: N802
-        main = sys.modules["__main__"]
-        with _starting:
-            before = {name: getattr(main, name, None) for name in ("__file__", "__spec__")}
-            try:
-                vars(main).update(dict.fromkeys(before))
-                return SpawnProcess._Popen(process)  # type: ignore[attr-defined]
-            finally:
-                vars(main).update(before)
-
-
-class _Context(SpawnContext):
-    Process = _Process
-
-
-def _become_worker(parent: int, path: list[str], prepare: bytes) -> None:
-    """Make this process a worker: one thread, deaf to Ctrl-C, which is the driver's, and ended with its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # so that a kill from outside looks like one
-    with suppress(AttributeError):  # a group of its own: what a terminal or a script sends to the driver is not for it
-        os.setpgid(0, 0)
-    sys.path[:] = path
-    leave = os._exit
-    os._exit = lambda status: leave(
-        status or EXIT_ZERO_STATUS
-    )  # pebble takes a process that ends with 0 for one that may
-    single_thread()
-    end_with_parent(parent)
-    if (called := pickle.loads(prepare)) is not None:
-        called()
 
 
 def _call(run: bytes, job: bytes, gigabytes: float) -> bytes:

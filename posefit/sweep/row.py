@@ -88,7 +88,7 @@ def _check_shape(name: str, value: Any) -> None:
 
 def _has_shape(value: Any, shape: Any) -> bool:
     if isinstance(shape, tuple):
-        return any(_has_shape(value, one) for one in shape)
+        return any(_has_shape(value, choice) for choice in shape)
     if shape == [NUMBER] and isinstance(value, list) and value and {*map(type, value)} <= {*NUMBER}:
         return bool(min(value) > -LARGEST and max(value) < LARGEST)  # at once, as rows hold hundreds of numbers
     if isinstance(shape, list):

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, get_origin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.reading import quoted
 from posefit.settings import settings_of
@@ -117,6 +118,12 @@ def duplicates(plugin: Any) -> dict[str, Any]:
         except Exception as error:
             raise BrokenError(f"{what} of it must be possible, got {type(error).__name__}: {error}") from None
     return made
+
+
+def unchanged(*arrays: NDArray[Any]) -> Callable[[], bool]:
+    """Return a function that returns whether arrays are still as they are now."""
+    before = [array.copy() for array in arrays]
+    return lambda: all(map(np.array_equal, before, arrays))
 
 
 def global_random_state() -> tuple[object, ...]:

@@ -18,7 +18,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import common
-from posefit.testing.common import PluginCase, global_random_state, left_alone
+from posefit.testing.common import PluginCase, global_random_state, left_alone, unchanged
 from posefit.testing.problem import SIZE
 from posefit.testing.results import BrokenError, expect
 
@@ -87,17 +87,16 @@ class Case(PluginCase):
                 count += 1
                 yield observation
 
-        before = [np.array(observation.silhouettes[0].mask) for observation in observations], task.anchor.copy()
-        random = global_random_state()
+        masks = [observation.silhouettes[0].mask for observation in observations]
+        inputs_unchanged, random = unchanged(*masks, task.anchor), global_random_state()
         try:
             for frame in drive(tracker, task, stream(), np.random.default_rng(0), audit):
                 frames.append(frame)
                 taken.append(count)
         except BrokenRuleError as broken:
             raise BrokenError(str(broken)) from broken.__cause__
-        after = [observation.silhouettes[0].mask for observation in observations]
-        unchanged = np.array_equal(before[0], after) and np.array_equal(before[1], task.anchor)
-        return Tracked(tracker, frames, taken, audit.warnings, unchanged, random == global_random_state())
+        random_unchanged = random == global_random_state()
+        return Tracked(tracker, frames, taken, audit.warnings, inputs_unchanged(), random_unchanged)
 
 
 def one_frame_each(case: Case) -> str:

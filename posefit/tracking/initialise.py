@@ -9,11 +9,12 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import Shape, fit_shape
-from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
+from posefit.reading import counted
 from posefit.settings import POPULATION_SIZE
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
@@ -49,10 +50,16 @@ def initialise(
 
     Also the clocks (2,), see `posefit.fitting.driving.clocks`, at the moment when everything was compiled.
     """
+    if task.yaw is None:
+        task = replace(task, start=method.start)
     _warm_up(method, task, scene)
     start, shape, body_frames = clocks(), None, options.body_frames
     if options.restarts:
-        progress.log(f"looking for the first pose, {options.restarts} times")
+        first = usable_observations(scene.observations, 1)
+        modes = guessed_modes(task, first[0]) if first else []
+        tried = counted(min(len(modes), options.restarts), "pose")
+        where = f"around at most {tried} with such a silhouette" if modes else "anywhere"
+        progress.log(f"looking for the first pose {where}")
         task, _ = best_restart(task, scene.observations, method.follow, options.restarts, options.seed)
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"

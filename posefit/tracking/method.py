@@ -13,7 +13,16 @@ from posefit.fitting.box import Space
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
-from posefit.fitting.tracker import RELOCALISE_GAP, Frame, Observation, Prediction, SynthesisTracker, Task, Tracker
+from posefit.fitting.tracker import (
+    RELOCALISE_GAP,
+    Frame,
+    InitialiserFactory,
+    Observation,
+    Prediction,
+    SynthesisTracker,
+    Task,
+    Tracker,
+)
 from posefit.fitting.validation import CheckedOptimiser, CheckedPrior, check_prior, plugin_errors
 from posefit.reading import quoted
 from posefit.registry import Kind, Offer, registry
@@ -22,6 +31,7 @@ from posefit.tracking.options import TrackOptions
 
 DEFAULT_OPTIMISER = "annealed"
 DEFAULT_PRIOR = "pca"
+DEFAULT_START, BLIND = "lookup", "blind"  # where it is installed; for none
 
 
 class MethodNames(NamedTuple):
@@ -76,6 +86,7 @@ class Method:
     relocalise_gap: int  # frames of a gap in footage after which it relocalises, 0 for never
     audit: Audit  # of what its trackers report: grows while they do
     build: Callable[[Task], Tracker] = field(repr=False)
+    start: InitialiserFactory | None = field(default=None, repr=False)  # guesses first poses; None for blind searches
 
     def follow(self, task: Task, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a frame for each observation, as a task asks."""
@@ -123,7 +134,16 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
     label = f"{optimiser.name}@{name}"
     audit = Audit(label, prediction.beta)
-    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build)
+    start = start_of(prediction.start)
+    return Method(label, learned, plugin_settings, False, prediction.relocalise_gap, audit, build, start)
+
+
+def start_of(name: str | None = None) -> InitialiserFactory | None:
+    """Return what guesses first poses, by its name; the default one where it is installed; None for "blind"."""
+    if name == BLIND or (name is None and DEFAULT_START not in registry().offers["start"]):
+        return None
+    factory: InitialiserFactory = registry().offer("start", name or DEFAULT_START).factory
+    return factory
 
 
 def places_of(offers: Sequence[Offer]) -> dict[str, tuple[str, Callable[..., Any]]]:
@@ -187,9 +207,8 @@ def _tracker_method(offer: Offer, values: Mapping[str, Any] | Sequence[str]) -> 
         return tracker
 
     gap = 0 if offer.looks_ahead else RELOCALISE_GAP
-    return Method(
-        offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, Audit(offer.label, beta), build
-    )
+    audit = Audit(offer.label, beta)
+    return Method(offer.name, None, {"tracker": plugin_settings}, offer.looks_ahead, gap, audit, build, start_of())
 
 
 def _rules(offer: Offer) -> AbstractContextManager[None]:

@@ -250,7 +250,9 @@ class TrackOptions:
     first_pose: Literal["searched", "given"] = option(
         "searched", "searched, or given (the true one).", _one_of("searched", "given"), "HOW"
     )
-    restarts: int | None = _int(None, "Searches of an unknown first pose: 8, or 0 for a tracker that looks ahead.", 0)
+    restarts: int | None = _int(
+        None, "Searches of an unknown first pose, at most; by default 8, or 0 for a tracker that looks ahead.", 0
+    )
     body_frames: int | None = _int(
         None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", 0, live=False
     )

@@ -2,7 +2,7 @@
 
 | when | what is tried | what is kept |
 |---|---|---|
-| before the first frame | `best_restart`: searches of the first frame, followed over a few more | the cheapest |
+| before the first frame | `best_restart`: searches around what it may show, followed for a second | the cheapest |
 | after a gap, or while costs are high | `relocalised`: such restarts beside the track as it is | the cheapest |
 | with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
 | where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.space import ROOT_RANGE_DEGREES
-from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
@@ -27,9 +27,11 @@ from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, r
 from posefit.motion.steadiness import runs
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.trajectory import Tracked, mean_cost, with_effort_of, with_total_effort
+from posefit.uncertainty.modes import Posterior
 
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902}  # part of the seed of what is tracked again
-RESTARTS = 8  # searches of the first frame
+RESTARTS = 8  # searches of the first frame, at most
+MIN_WEIGHT = 0.05  # of a mode of the first frame that is tried
 TRIAL_FRAMES = 10  # by which a restart is judged
 TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
 TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
@@ -98,7 +100,8 @@ def best_restart(
 ) -> tuple[Task, list[Frame]]:
     """Return the task with the best of several restarts as the frame before the first, and all frames of the trial.
 
-    Each searches the first usable frame, at all yaws where none is known, and follows the person through a few more
+    Each searches the first usable frame around a mode of what it may show, as many as are likely; or, where nothing is
+    guessed, anywhere, at all yaws where none is known. It then follows the person through a few more
     frames. The least mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution,
     and the first frame is then searched once more in the whole one, around the best. A task that is `going_on` is
     followed beside the restarts, and is returned where none of them is better.
@@ -118,8 +121,9 @@ def best_restart(
         on = replace(going_on, fps=trial.fps, cameras=trial.cameras)
         tried += follow(on, compared, np.random.default_rng([*prefix, restarts + 1]))
         least = _trial_cost(tried)
-    for k in range(restarts):
-        frames = list(follow(trial, compared, np.random.default_rng([*prefix, k])))
+    modes = [mode for weight, mode in guessed_modes(task, chosen[0])[:restarts] if weight >= MIN_WEIGHT]
+    for k, start in enumerate([around(trial, mode) for mode in modes] or [trial] * restarts):
+        frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
         tried += frames
         if (cost := _trial_cost(frames)) < least:
             best, least = after(task, frames[0]), cost
@@ -139,9 +143,16 @@ def _trial_cost(frames: Sequence[Frame]) -> float:
     return float(np.mean([frame.cost for frame in frames])) * (BACKWARDS_PENALTY if backwards else 1.0)
 
 
+def around(task: Task, mode: Posterior) -> Task:
+    """Return the task that begins around a mode of what the first frame may show."""
+    pose, place = mode.poses[0], mode.translations[0]
+    return replace(task, yaw=float(pose[0]), anchor=place, first_pose=pose[3:], modes=[(1.0, mode)])
+
+
 def after(task: Task, frame: Frame) -> Task:
     """Return the task that goes on from a frame."""
-    return replace(task, yaw=float(frame.pose[0]), anchor=frame.translation, first_pose=frame.pose[3:], before=(frame,))
+    first = replace(task, yaw=float(frame.pose[0]), anchor=frame.translation, first_pose=frame.pose[3:], modes=())
+    return replace(first, before=(frame,))
 
 
 # While a track goes on.
@@ -153,7 +164,7 @@ def relocalised(
     """Yield the frames that `follow` gives, searched at all yaws again where the person may have turned unseen.
 
     That is in the first frame that shows the person after a `gap` of frames that do not, none for 0, and where for half
-    a second every cost is half as high again as is typical since the last relocalisation. Eight restarts are compared
+    a second every cost is half as high again as is typical since the last relocalisation. Restarts are compared
     with the track as it is, over about a second of the observations to come; the cheapest goes on. The frame has the
     evaluations and the time of all of them.
     """
@@ -167,7 +178,7 @@ def relocalised(
         if observation.usable and (latest := watch.due()) is not None:
             window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]  # a copy reads ahead
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
-            unconstrained = replace(task, yaw=None, anchor=latest.translation, first_pose=None, before=())
+            unconstrained = replace(task, yaw=None, anchor=latest.translation, first_pose=None, modes=(), before=())
             continuation = after(unconstrained, latest)
             best, trials = best_restart(unconstrained, window, follow, RESTARTS, seeds, continuation)
             if best is not continuation:

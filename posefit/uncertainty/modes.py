@@ -85,7 +85,7 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     the posterior's recalibration; they sum to 1, less its probability that no mode is right.
     """
     distances = poses_apart(skeleton, posterior.poses, posterior.poses)
-    clusters = _clusters(distances, posterior.weights, APART)
+    clusters = [(weight, row) for weight, row, _ in clusters_of(distances, posterior.weights, APART)]
     if posterior.recalibration is not None:
         powers = [weight**posterior.recalibration.sharpness for weight, _ in clusters]  # temperature scaling
         share = (1.0 - posterior.recalibration.none) / sum(powers)
@@ -93,13 +93,18 @@ def modes_of(skeleton: Skeleton, posterior: Posterior) -> list[Mode]:
     return [Mode(weight, posterior.poses[row], posterior.translations[row]) for weight, row in clusters]
 
 
-def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
-    """Return the likeliest mode but the one nearest to a pose (66,); None where no weight is above `above`."""
+def other_modes(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> list[Mode]:
+    """Return the modes with weights above `above` but the one nearest to a pose (66,), the likeliest first."""
     if len(modes) < 2:
-        return None
+        return []
     nearest = _nearest(skeleton, modes, skeleton.joints(pose))[0]
-    other = max((mode for k, mode in enumerate(modes) if k != nearest), key=lambda mode: mode.weight)
-    return other if other.weight > above else None
+    others = [mode for k, mode in enumerate(modes) if k != nearest and mode.weight > above]
+    return sorted(others, key=lambda mode: -mode.weight)
+
+
+def other_mode(skeleton: Skeleton, modes: Sequence[Mode], pose: Array, above: float = 0.0) -> Mode | None:
+    """Return the likeliest of the `other_modes`; None where there are none."""
+    return next(iter(other_modes(skeleton, modes, pose, above)), None)
 
 
 def likeliest_is_right(skeleton: Skeleton, modes: Sequence[Mode], joints: Array, apart: float = APART) -> bool:
@@ -135,12 +140,12 @@ def track_modes(skeleton: Skeleton, posteriors: Sequence[Posterior | None], apar
     weights = np.mean([frame.weights for frame in coherent], axis=0)
     poses = np.array([frame.poses for frame in coherent])
     translations = np.array([frame.translations for frame in coherent])
-    clusters = _clusters(distances, weights, apart)
-    return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row in clusters]
+    clusters = clusters_of(distances, weights, apart)
+    return [TrackMode(weight, poses[:, row], translations[:, row]) for weight, row, _ in clusters]
 
 
-def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[float, int]]:
-    """Return the weight and the medoid of each cluster, the heaviest first.
+def clusters_of(distances: Array, weights: Array, apart: float) -> list[tuple[float, int, NDArray[np.intp]]]:
+    """Return the weight, the medoid and all rows of each cluster, the heaviest first.
 
     A centre is the row with the greatest weight near it among those that are near no earlier centre; then every row
     joins its nearest centre.
@@ -157,7 +162,7 @@ def _clusters(distances: Array, weights: Array, apart: float) -> list[tuple[floa
     for k in range(len(centres)):
         rows = np.flatnonzero(owners == k)
         medoid = int(rows[(distances[np.ix_(rows, rows)] @ weights[rows]).argmin()])
-        clusters.append((float(weights[rows].sum()), medoid))
+        clusters.append((float(weights[rows].sum()), medoid, rows))
     return sorted(clusters, key=lambda cluster: -cluster[0])
 
 

@@ -49,7 +49,7 @@ def check(path: Path, wanted: Sequence[Any], label: int | None = None) -> tuple[
 
 def indexed(path: Path, numbers: Any, colours: Sequence[tuple[int, int, int]]) -> None:
     """Write a PNG with a palette, as tools for annotation do; OpenCV writes none."""
-    image = images.Image.fromarray(numbers.astype(np.uint8), "P")
+    image = images.Image.frombytes("P", numbers.shape[::-1], numbers.astype(np.uint8).tobytes())
     image.putpalette([value for colour in colours for value in colour])
     image.save(path)
 
@@ -412,7 +412,7 @@ def test_no_more_pixels_are_decoded_than_were_counted(tmp_path: Path, suffix: st
 
 
 def test_a_palette_is_the_files_own(tmp_path: Path) -> None:
-    image = images.Image.fromarray(np.eye(9, dtype=np.uint8), "P")
+    image = images.Image.frombytes("P", (9, 9), np.eye(9, dtype=np.uint8).tobytes())
     image.putpalette([0, 0, 0, 200, 0, 0])
     note = PngInfo()
     note.add_text("a", "PLTE")  # which stands before the palette

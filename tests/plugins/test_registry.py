@@ -52,12 +52,15 @@ def test_the_built_ins_are_registered_like_a_third_partys() -> None:
     offers = registry().offers
     assert {"sapso", "random"} <= set(offers["optimiser"])
     assert "pca" in offers["prior"]
+    assert "lookup" in offers["start"]
     assert offers["optimiser"]["sapso"].distribution == "posefit"
     next_frames = {name: offer.next_frame for name, offer in offers["optimiser"].items()}
     assert {next_frames[name] for name in ("sapso", "pso", "cma", "scipy")} == {"start"}
     assert {next_frames[name] for name in ("particle", "annealed")} == {"carry"}
     assert next_frames["random"] == "forget"
     assert Registry(load([point("mine", offering("mine"))])).optimiser("mine") is PCA
+    starts = Registry(load([point("mine", registering(("guess", PCA), hook="starts"))]))
+    assert starts.offer("start", "guess").factory is PCA
 
 
 BROKEN = {

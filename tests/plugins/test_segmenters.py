@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from posefit.registry import registry
-from posefit.silhouette.foreground import Footage, Mixture
+from posefit.silhouette.foreground import Film, Mixture
 from posefit.testing import check_segmenter
 
 BUILT_IN = ("masks", "mean", "median", "mixture")
@@ -33,7 +33,7 @@ def test_the_kit_passes_mediapipe() -> None:
 class Sound(Mixture):
     """Nothing is wrong with it, and the others each spoil one thing."""
 
-    def __init__(self, footage: Footage) -> None:
+    def __init__(self, footage: Film) -> None:
         super().__init__(footage.frames())
 
 
@@ -57,12 +57,12 @@ class WrongBackground(Sound):
 
 
 class Swallows(Sound):
-    def __init__(self, footage: Footage, **settings: Any) -> None:
+    def __init__(self, footage: Film, **settings: Any) -> None:
         super().__init__(footage)
 
 
 class TakesNonsense(Sound):
-    def __init__(self, footage: Footage, *, levels: int = 3) -> None:
+    def __init__(self, footage: Film, *, levels: int = 3) -> None:
         super().__init__(footage)
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from posefit.report.contest import contest_of, leaderboard
 from posefit.report.kind import Contest
+from posefit.report.leaderboard import contest_of, leaderboard
 from posefit.report.runs import runs_of
 from posefit.report.summary import leader_sentences
 from posefit.sweep.cell import CellResult

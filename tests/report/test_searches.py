@@ -11,7 +11,7 @@ import pytest
 
 from posefit.reading import parsed_toml
 from posefit.report.content import data_of
-from posefit.report.contest import leaderboard
+from posefit.report.leaderboard import leaderboard
 from posefit.report.repeat import repeat_command
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger

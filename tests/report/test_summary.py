@@ -4,7 +4,7 @@ from pathlib import Path
 
 from posefit.report.columns import listed
 from posefit.report.content import three_tracks
-from posefit.report.contest import leaderboard
+from posefit.report.leaderboard import leaderboard
 from posefit.report.summary import unpaired_sentence
 from tests.report.contests import contest_of_errors, full, sentences, three_methods
 

@@ -187,7 +187,7 @@ def test_a_budget_of_evaluations_holds() -> None:
     posed(np.zeros((3, 9)))
     with pytest.raises(BudgetSpentError, match="2 of 5 evaluations are left, got 3"):
         posed(np.zeros((3, 9)))
-    assert (posed.evaluations, posed.left) == (3, 2)
+    assert (posed.evaluations, posed.remaining_evaluations) == (3, 2)
     posed(np.zeros((2, 9)))
     with pytest.raises(BudgetSpentError, match="0 of 5 evaluations are left, got 1"):
         posed(np.zeros(9))

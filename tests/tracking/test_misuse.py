@@ -37,7 +37,10 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"evaluations": 30, "method": "sapso"}, "evaluations must hold one population of 40, got 30"),
     ({"method": "sapzo"}, "method must be OPTIMISER@PRIOR, or one of .*, got 'sapzo'; did you mean 'sapso'"),
     ({"method": "sapzo@pca"}, "optimiser must be one of .*did you mean 'sapso'"),
-    ({"method": "@pcb"}, "prior must be one of full, loose, pca, sklearn, got 'pcb'; did you mean 'pca'"),
+    (
+        {"method": "@pcb"},
+        "prior must be one of full, gplvm, isomap, loose, pca, sklearn, got 'pcb'; did you mean 'pca'",
+    ),
     ({"method": 3}, "method must be a name, a factory, or a pair of optimiser and prior, got 3"),
     ({"first_pose": "mine"}, "first_pose must be one of searched, given, got 'mine'"),
     ({"settings": {"sapso.coling": 1.0}}, "a setting of sapso must be one of .*did you mean 'cooling'"),

@@ -122,7 +122,7 @@ def test_a_body_covers_half_of_what_moves() -> None:
             "doubtful: one camera leaves depth to the motions learned from, and the nearest are 75 mm away",
         ),
         ({"lost": 0.63}, "do not use: the person is lost in 63% of the frames"),
-        ({"held": 0.4}, "doubtful: the person is gone, or nearly, in 40% of the frames in between"),
+        ({"held": 0.4}, "doubtful: the person is mostly out of sight in 40% of the frames in between"),
         (
             {"cropped": 1.0, "training_mm": 218.0},
             "do not use: the picture's border cuts the mask above and below in 100% of the frames: masks cropped to "

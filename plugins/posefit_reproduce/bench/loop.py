@@ -28,7 +28,7 @@ ENDLESS: dict[str, dict[str, Any]] = {
     "FitImage-v0": {"max_evaluations": 10**9, "target_cost": -1.0},
     "Race-v0": {"generations": (10**9, 10**9)},
 }
-SEARCHES, PATIENCE = 5, 3.0  # of each optimiser; seconds after which a slow one has no other
+SEARCHES, SLOW_SECONDS = 5, 3.0  # of each optimiser; seconds after which a slow one has no other
 
 
 def loop_figures(threads: int | None = None) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def ask_and_tell(space: SearchSpace) -> dict[str, float]:
     with threadpool_limits(1):  # as a track has it: BLAS is slower with more threads where matrices are small
         for name, offer in registry().offers["optimiser"].items():
             if not offer.missing:
-                ended, seconds = time.perf_counter() + PATIENCE, [search_seconds(space, offer, 0)]
+                ended, seconds = time.perf_counter() + SLOW_SECONDS, [search_seconds(space, offer, 0)]
                 while len(seconds) < SEARCHES and time.perf_counter() < ended:
                     seconds.append(search_seconds(space, offer, len(seconds)))
                 figures[name] = 1e6 * min(seconds)

@@ -125,20 +125,17 @@ def swarm_figure(swarm: WatchedSwarm) -> Figure:
 
 def lowest_cost_figure(analysis: Analysis) -> Figure:
     """Return the lowest cost against the iteration in the first frame, for each N: medians over views and seeds."""
-    figure = Figure(figsize=(10.0, 3.8), layout="constrained")
-    panels: Any = figure.subplots(1, len(MOTIONS), sharey=True)
+    figure, panels = _panels((10.0, 3.8), 1, len(MOTIONS), sharey=True)
     for axes, motion in zip(panels, MOTIONS, strict=True):
         for name, style in ((OURS, "-"), (LETTER, ":")):
             histories = analysis.results.of("history", "first", motion, name)
             for k, count in enumerate(SWARMS):
-                middle = np.median(histories[:, :, k].reshape(-1, histories.shape[-1]), axis=0)
-                axes.plot(
-                    middle, style, color=COLOURS[k], linewidth=1.3, label=f"N = {count}" + " letter" * (style == ":")
-                )
+                middle, label = np.median(histories[:, :, k], axis=(0, 1)), f"N = {count}" + " letter" * (style == ":")
+                axes.plot(middle, style, color=COLOURS[k], linewidth=1.3, label=label)
         axes.axvline(CONVERGED, color=_DIM, linewidth=0.8, linestyle=":")
         runs = histories.shape[0] * histories.shape[1]
-        axes.set(xlabel="iteration", ylim=(0.0, None), title=f"{LABELS[motion]}, first frame, {runs} runs")
-        _plain(axes)
+        axes.set(xlabel="iteration", ylim=(0.0, None))
+        axes.set_title(f"{LABELS[motion]}, first frame, {runs} runs", fontsize=9)
     panels[0].set_ylabel("lowest cost")
     panels[-1].legend(ncols=2, **_LEGEND)
     return figure
@@ -147,8 +144,7 @@ def lowest_cost_figure(analysis: Analysis) -> Figure:
 def dimension_figure(analysis: Analysis) -> Figure:
     """Return the error of each angle in single images of eight views, of PCA + SAPSO, its letter and the mean pose."""
     names = ["root", *(JOINTS[joint] for joint in INNER)]
-    figure = Figure(figsize=(12.0, 7.5), layout="constrained")
-    panels: Any = figure.subplots(len(analysis.motions), 1, sharex=True)
+    figure, panels = _panels((12.0, 7.5), len(analysis.motions), sharex=True)
     for axes, motion in zip(panels, analysis.motions, strict=True):
         for name, kind, style in ((LETTER, "image", "x"), ("mean_pose", "track", "_")):
             away = analysis.away(motion, name, kind).mean(axis=(0, 1, 2))
@@ -157,10 +153,10 @@ def dimension_figure(analysis: Analysis) -> Figure:
         ours = analysis.away(motion, OURS, "image").mean(axis=(0, 1, 2))
         axes.bar(np.arange(len(ours)), ours, color=COLOURS[0], label=METHODS[OURS])
         axes.axhline(SMALL_DEGREES, color=_DIM, linewidth=0.8, linestyle=":")
-        axes.set(ylabel="degrees", xlim=(-1, len(ours)), ylim=(0.0, 25.0), title=LABELS[motion])
+        axes.set(ylabel="degrees", xlim=(-1, len(ours)), ylim=(0.0, 25.0))
+        axes.set_title(LABELS[motion], fontsize=9)
         for k in range(3, len(ours), 3):
             axes.axvline(k - 0.5, color="0.92", linewidth=0.8, zorder=0)
-        _plain(axes)
     panels[0].legend(**_LEGEND)
     panels[-1].set_xticks(3 * np.arange(len(names)) + 1, names, rotation=60, ha="right", fontsize=8)
     panels[-1].tick_params(axis="x", length=0)
@@ -169,28 +165,26 @@ def dimension_figure(analysis: Analysis) -> Figure:
 
 def frame_figure(analysis: Analysis) -> Figure:
     """Return the error of each frame of the paper's methods and the letter: medians of all runs, middle halves."""
-    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
-    panels: Any = figure.subplots(len(MOTIONS), 1)
+    figure, panels = _panels((10.0, 6.4), len(MOTIONS))
     for axes, motion in zip(panels, MOTIONS, strict=True):
         for name, colour in zip((*PAPER, LETTER), (*COLOURS[1::-1], *COLOURS[2:4]), strict=True):
             errors = analysis.away(motion, name).mean(axis=3)
-            _band(axes, errors.reshape(-1, errors.shape[2]), colour, METHODS[name])
+            low, middle, high = np.quantile(errors.reshape(-1, errors.shape[2]), [0.25, 0.5, 0.75], axis=0)
+            axes.plot(middle, color=colour, linewidth=1.3, label=METHODS[name])
+            axes.fill_between(np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0)
         mean = analysis.away(motion, "mean_pose").mean(axis=3)[0, 0]
         axes.plot(mean, color=_DIM, linewidth=1.0, linestyle="--", label="mean training pose, true root")
-        axes.set(ylabel="error, degrees", ylim=(0.0, None), title=LABELS[motion], xlim=(0, len(mean) - 1))
-        _plain(axes)
+        axes.set(ylabel="error, degrees", ylim=(0.0, None), xlim=(0, len(mean) - 1))
+        axes.set_title(LABELS[motion], fontsize=9)
     panels[0].legend(ncols=3, **_LEGEND)
     panels[-1].set_xlabel("frame")
     return figure
 
 
-def _band(axes: Any, rows: Array, colour: str, label: str) -> None:
-    """Draw the median of rows (n, T), and their middle half."""
-    low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75], axis=0)
-    axes.plot(middle, color=colour, linewidth=1.3, label=label)
-    axes.fill_between(np.arange(len(middle)), low, high, color=colour, alpha=0.15, linewidth=0)
-
-
-def _plain(axes: Any) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.title.set_fontsize(9)
+def _panels(size: tuple[float, float], rows: int, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
+    """Return a figure of a size in inches and its axes, open at the top and the right."""
+    figure = Figure(figsize=size, layout="constrained")
+    panels: Any = figure.subplots(rows, columns, **shared)
+    for axes in panels:
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure, panels

@@ -12,22 +12,11 @@ from posefit.geometry.skeleton import turns_of
 from posefit.uncertainty.modes import nearer_mirrored
 from posefit_priors.pca import PCA
 from posefit_reproduce.experiment import Claim, Results, Table, bounded, claims_table, interval
+from posefit_reproduce.sapso import paper
 from posefit_reproduce.sapso.experiment import COMPARED
 from posefit_reproduce.sapso.methods import LABELS, LETTER, METHODS, OTHERS, OURS, PAPER, PARTS
 from posefit_reproduce.sapso.motions import LABELS as MOTIONS
 from posefit_reproduce.sapso.motions import PaperMotion
-from posefit_reproduce.sapso.paper import (
-    CONVERGED,
-    ENOUGH,
-    SMALL_DEGREES,
-    SWARMS,
-    TABLE_1,
-    TABLE_1_JOINTS,
-    TABLE_2,
-    TRACK_DEGREES,
-    TRAINING_FRAMES,
-    VARIANCE,
-)
 
 # LFemur, RFemur, LKnee, RKnee: an Acclaim knee has one angle, the other two are padding that cannot err
 ANGLES = turns_of(("lfemur", "rfemur", "ltibia", "rtibia"))
@@ -87,7 +76,12 @@ def motions_table(analysis: Analysis) -> Table:
     rows = []
     for name, motion in analysis.motions.items():
         yaw = np.degrees(np.unwrap(motion.test.poses[:, 0]))
-        counts = [f"{len(motion.test)}", f"{yaw[-1] - yaw[0]:.0f}", f"{len(motion.angles)}", f"{TRAINING_FRAMES[name]}"]
+        counts = [
+            f"{len(motion.test)}",
+            f"{yaw[-1] - yaw[0]:.0f}",
+            f"{len(motion.angles)}",
+            f"{paper.TRAINING_FRAMES[name]}",
+        ]
         seeds = [str(analysis.results.of("poses", kind, name, OURS).shape[1]) for kind in ("track", "image")]
         rows.append(
             [MOTIONS[name], motion.test.name, ", ".join(clip.name for clip in motion.training), *counts, *seeds]
@@ -102,7 +96,7 @@ def table_1(analysis: Analysis) -> Table:
     Ours is the middle frame of the first seed from 45 degrees.
     """
     rows = []
-    for motion, pair in TABLE_1.items():
+    for motion, pair in paper.TABLE_1.items():
         test = analysis.motions[motion].test.poses
         frame, images = len(test) // 2, analysis.results.of("poses", "image", motion, OURS)
         ours = [np.degrees(wrapped(pose[ANGLES])).reshape(-1, 3) for pose in (test[frame], images[1, 0, frame])]
@@ -116,7 +110,7 @@ def table_1(analysis: Analysis) -> Table:
         for label, angles, error in zip(labels, (*pair, *ours), errors, strict=True):
             cells = [" ".join(f"{value:.1f}" for value in joint) for joint in angles]
             rows.append([MOTIONS[motion], label, *cells, error])
-    return Table("table-1", ["motion", "", *TABLE_1_JOINTS, "mean error"], rows, 2)
+    return Table("table-1", ["motion", "", *paper.TABLE_1_JOINTS, "mean error"], rows, 2)
 
 
 def table_2(analysis: Analysis) -> Table:
@@ -124,15 +118,15 @@ def table_2(analysis: Analysis) -> Table:
     rows = []
     for name in (*PAPER, *OTHERS, *BASELINES):
         cells = [LABELS[name]]
-        for motion in TABLE_2:
-            paper = TABLE_2[motion].get(name)
-            cells.append("" if paper is None else " / ".join(f"{value:.2f}" for value in paper))
+        for motion in paper.TABLE_2:
+            cell = paper.TABLE_2[motion].get(name)
+            cells.append("" if cell is None else " / ".join(f"{value:.2f}" for value in cell))
             figures = [bounded(interval(analysis.errors(motion, name))), f"{analysis.spread(motion, name).mean():.2f}"]
             if name in METHODS:
                 figures.append(f"{analysis.results.of('cpu_seconds', 'track', motion, name).mean():.4f}")
             cells.append(" / ".join(figures))
         rows.append(cells)
-    heads = [f"{motion}, {whose}" for motion in TABLE_2 for whose in ("the paper", "here")]
+    heads = [f"{motion}, {whose}" for motion in paper.TABLE_2 for whose in ("the paper", "here")]
     return Table("table-2", ["(9) / (10) / seconds", *heads], rows)
 
 
@@ -169,17 +163,19 @@ def track_claims(analysis: Analysis, motion: str) -> Iterator[Claim]:
     ours, full = (1e3 * results.of("cpu_seconds", "track", motion, name) for name in (OURS, "sapso@full"))
     yield Claim("PCA + SAPSO takes less time than SAPSO", "table 2", label, ours - full, "CPU ms a frame")
     text = "a track's error is about 4 degrees at most"
-    yield Claim(text, "5.4", label, analysis.errors(motion), "degrees of (8)", TRACK_DEGREES)
+    yield Claim(text, "5.4", label, analysis.errors(motion), "degrees of (8)", paper.TRACK_DEGREES)
     share = 100.0 * few_joints(analysis, motion)
     yield Claim("a few joints make up high errors", "5.4", label, share, "% by 3 of 22", 50.0, above=True)
     # the walk with a turn is followed in the space of the straight walk
     space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
-    share = np.asarray(100.0 * space.explained[:ENOUGH].sum())
-    yield Claim("five components keep 95 % of the variance", "2.1", label, share, "%", 100.0 * VARIANCE, above=True)
+    share = np.asarray(100.0 * space.explained[: paper.ENOUGH].sum())
+    yield Claim(
+        "five components keep 95 % of the variance", "2.1", label, share, "%", 100.0 * paper.VARIANCE, above=True
+    )
     for name, form in ((OURS, ""), (LETTER, ", the letter")):
         history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
-        usual = history[:, :, SWARMS.index(40)]
-        fall = usual[:, :, min(CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
+        usual = history[:, :, paper.SWARMS.index(40)]
+        fall = usual[:, :, min(paper.CONVERGED, usual.shape[2] - 1)] - usual[:, :, -1]
         text = f"the cost falls by less than 1 after 30 iterations{form}"
         yield Claim(text, "figure 6", label, fall, "of 100", SAME_COST)
         ends = history[:, :, 0, -1] - history[:, :, -1, -1]
@@ -189,11 +185,11 @@ def track_claims(analysis: Analysis, motion: str) -> Iterator[Claim]:
 def image_claims(analysis: Analysis, motion: str) -> Iterator[Claim]:
     """Yield the claims of single images, by the angles that can err."""
     label, away = MOTIONS[motion], analysis.away(motion, OURS, "image")
-    small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < SMALL_DEGREES).mean(axis=2)
+    small = 100.0 * (away[..., analysis.free(motion)].mean(axis=2) < paper.SMALL_DEGREES).mean(axis=2)
     yield Claim("most angles have an error below 5 degrees", "figure 7", label, small, "%", 50.0, above=True)
-    paper = float(np.abs(np.subtract(*TABLE_1[motion])).mean())
+    theirs = float(np.abs(np.subtract(*paper.TABLE_1[motion])).mean())
     errors = table_1_angles(analysis, motion, OURS, "image")
-    yield Claim("femora and knees are as near as in table 1", "table 1", label, errors, bound=paper)
+    yield Claim("femora and knees are as near as in table 1", "table 1", label, errors, bound=theirs)
     images, hidden = (analysis.errors(motion, OURS, kind, free=True) for kind in ("image", "hidden"))
     worse = hidden - images[: len(hidden)]  # of the same views
     yield Claim("a hidden part adds less than 1 degree", "figure 8", label, worse, bound=SAME_DEGREES)

@@ -80,8 +80,10 @@ def film_of(seed: int, activities: Sequence[Activity] = ACTIVITIES) -> Film:
     """Return the film of a seed."""
     rng = np.random.default_rng(seed)
     parts = [
-        built_in.motion(one.motion, frames=one.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random())
-        for one in activities
+        built_in.motion(
+            activity.motion, frames=activity.frames, fps=FPS, speed=rng.uniform(*SPEEDS), phase=rng.random()
+        )
+        for activity in activities
     ]
     poses = np.concatenate([part.poses for part in parts])
     places = np.concatenate([part.translations * [1.0, 1.0, 0.0] for part in parts])  # striding, but on the spot

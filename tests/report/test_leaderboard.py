@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefit.report.charts import certainty, convergence, grid, joint_errors
-from posefit.report.contest import contest_of, leaderboard, paired_tests
+from posefit.report.leaderboard import contest_of, leaderboard, paired_tests
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import ledger, result, sure

@@ -1,0 +1,130 @@
+"""The look-up of silhouettes: the right mode, refusals, cameras of any attitude, and how a search uses it."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import posefit
+from posefit.arrays import Array
+from posefit.fitting.start import modes_apart
+from posefit.fitting.tracker import Observation, Task
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.geometry.rotation import wrapped
+from posefit.motion import built_in
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+from posefit_exemplars.lookup import YAW_STEP, Lookup, looking_at, straightened
+from tests.cases import each
+
+WALK = built_in.motion("walk-a")
+BODY = Body.of(WALK.skeleton)
+TRAINING = [built_in.motion(style) for style in ("walk-b", "walk-c")]
+PLACE = np.array([0.0, 0.1, 0.0])
+
+
+def camera_at(azimuth: float, elevation: float = 0.0, roll: float = 0.0) -> Camera:
+    straight = looking_at(azimuth, elevation)
+    cosine, sine = np.cos(roll), np.sin(roll)
+    rolled = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ straight.rotation
+    return Camera(160, 160, np.full(2, 200.0), np.full(2, 80.0), rolled, straight.translation)
+
+
+def seen(cameras: list[Camera], pose: Array) -> Observation:
+    return Observation([Silhouette.of(project(BODY, camera, pose, PLACE)) for camera in cameras])
+
+
+def task_of(cameras: list[Camera], yaw: float | None = None) -> Task:
+    return Task(BODY, cameras, 1000, yaw, np.zeros(3), "aligned", training=TRAINING)
+
+
+@cache
+def turned(seed: int) -> Array:
+    """Return a pose of a walker whom the look-up does not know, at any yaw."""
+    rng = np.random.default_rng(seed)
+    pose = WALK.poses[rng.integers(len(WALK))].copy()
+    pose[0] = rng.uniform(-np.pi, np.pi)
+    return pose
+
+
+def yaws_off(task: Task, observation: Observation, pose: Array) -> Array:
+    """Return how far the yaws (modes,) of the modes of an observation are off, radians."""
+    posterior = Lookup(task).posterior(observation)
+    assert posterior is not None
+    modes = modes_apart(BODY.skeleton, posterior)
+    return np.abs([float(wrapped(mode.poses[0, :1] - pose[0])[0]) for _, mode in modes])
+
+
+@each("seed", range(12))
+def test_a_mode_faces_as_the_walker_does(seed: int) -> None:
+    pose, cameras = turned(seed), [camera_at(0.4)]
+    assert yaws_off(task_of(cameras), seen(cameras, pose), pose)[:3].min() < np.radians(30.0)
+
+
+@each("seed", range(6))
+@each(("elevation", "roll"), [(0.0, 0.0), (np.radians(25.0), 0.0), (0.0, np.radians(90.0))])
+def test_two_cameras_of_any_attitude_decide(seed: int, elevation: float, roll: float) -> None:
+    pose, cameras = turned(seed), [camera_at(0.4, elevation, roll), camera_at(0.4 + np.pi / 2.0, elevation, roll)]
+    assert yaws_off(task_of(cameras), seen(cameras, pose), pose)[0] < np.radians(30.0)
+
+
+def test_a_known_yaw_leaves_out_the_others() -> None:
+    cameras = [camera_at(0.0)]
+    for yaw in (-2.0, 0.3, 1.5):
+        posterior = Lookup(task_of(cameras, yaw)).posterior(seen(cameras, turned(0)))
+        assert posterior is None or np.abs(wrapped(posterior.poses[:, 0] - yaw)).max() < np.radians(50.0) + YAW_STEP
+
+
+def test_a_silhouette_like_none_of_the_clips_is_refused() -> None:
+    cameras, rows, columns = [camera_at(0.0)], *np.mgrid[:160, :160]
+    dog = (np.abs(rows - 80) < 12) & (np.abs(columns - 80) < 50)
+    dog |= (np.abs(rows - 100) < 20) & ((np.abs(columns - 40) < 5) | (np.abs(columns - 115) < 5))
+    lying = turned(0).copy()
+    lying[1] = np.pi / 2.0
+    for observation in (Observation([Silhouette.of(dog)]), seen(cameras, lying)):
+        assert Lookup(task_of(cameras)).posterior(observation) is None
+
+
+def test_a_silhouette_that_is_cut_is_refused() -> None:
+    camera = replace(camera_at(0.0), centre=np.array([80.0, 150.0]))
+    observation = seen([camera], turned(0))
+    assert observation.silhouettes[0].mask[-1].any()
+    assert Lookup(task_of([camera])).posterior(observation) is None
+
+
+def test_the_same_silhouette_has_the_same_modes() -> None:
+    cameras = [camera_at(0.0)]
+    one, two = (Lookup(task_of(cameras)).posterior(seen(cameras, turned(1))) for _ in range(2))
+    assert one is not None
+    assert two is not None
+    np.testing.assert_array_equal(one.poses, two.poses)
+    np.testing.assert_array_equal(one.weights, two.weights)
+
+
+@each(("azimuth", "elevation"), [(0.0, 0.0), (1.0, 0.3), (-2.5, 0.5)])
+def test_a_camera_is_straightened_to_where_it_stands(azimuth: float, elevation: float) -> None:
+    joints = BODY.skeleton.joints(turned(2)[None])[0]
+    camera = camera_at(azimuth, elevation, roll=0.7)
+    mask = project(BODY, camera, turned(2), -joints.mean(axis=0))
+    picture, about, above = straightened(camera, Silhouette.of(mask))
+    assert about == pytest.approx(azimuth, abs=0.05)
+    assert above == pytest.approx(elevation, abs=0.05)
+    rows = np.flatnonzero(picture.any(axis=1))
+    assert len(rows) > picture.any(axis=0).sum()  # upright again
+    assert len(rows) > 0.6 * len(picture)
+
+
+@each("optimiser", ["sapso", "cma"])
+def test_a_search_that_looks_faces_the_right_way(optimiser: str) -> None:
+    pose, cameras = turned(3), [camera_at(0.4), camera_at(2.0)]
+    masks = [mask.mask[None] for mask in seen(cameras, pose).silhouettes]
+    options = {"train": TRAINING, "evaluations": 840, "height": BODY.stature, "camera": cameras}
+    fitted = posefit.fit(masks, method=f"{optimiser}@pca", **options)
+    assert abs(wrapped(fitted.pose[:1] - pose[:1])[0]) < np.radians(30.0)
+
+
+def test_an_unknown_start_is_refused_with_those_that_are_known() -> None:
+    with pytest.raises(ValueError, match="start must be one of lookup, got 'nowhere'"):
+        posefit.fit("walk", method="sapso@pca", settings={"tracker.start": "nowhere"})

@@ -1,0 +1,106 @@
+"""Modes of first poses, their projection onto a prior's latents, and populations that are drawn from several."""
+
+from dataclasses import replace
+
+import numpy as np
+
+import posefit
+from posefit.fitting.box import Start, draw_population
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.fitting.start import APART, SPREAD, modes_apart, start_in
+from posefit.fitting.tracker import Observation, Task, guessed_modes
+from posefit.motion import built_in
+from posefit.testing.toy import Toy
+from posefit.uncertainty.modes import Posterior
+
+WALK = built_in.motion("walk-a", frames=40)
+PRIOR = posefit.prior("pca")().fit(WALK.poses[:, 3:], WALK.skeleton)
+SPACE = SearchSpace(PRIOR, np.zeros(3), np.array([np.pi, 0.3, 0.3]), np.zeros(3))
+
+
+def weighted(rows: list[int], turns: list[float], weights: list[float]) -> Posterior:
+    poses = WALK.poses[rows].copy()
+    poses[:, 0] += turns
+    return Posterior(poses, WALK.translations[rows], np.array(weights))
+
+
+def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
+    count, means, spreads, weights = 4000, [-0.5, 0.5], [0.02, 0.05], [0.75, 0.25]
+    modes = [
+        Start(np.full(3, mean), np.full(3, spread), np.zeros(3), weight)
+        for mean, spread, weight in zip(means, spreads, weights, strict=True)
+    ]
+    drawn = draw_population(Toy(3, start=replace(modes[0], others=modes[1:])), np.random.default_rng(0), count)
+    first = drawn[:, 0] < 0.0
+    # binomial, of standard deviation sqrt(p q / n); a mean's error is spread / sqrt(n), that of a spread over sqrt(2)
+    assert abs(first.mean() - 0.75) < 4.0 * np.sqrt(0.75 * 0.25 / count)
+    for rows, mean, spread in ((first, -0.5, 0.02), (~first, 0.5, 0.05)):
+        error = 4.0 * spread / np.sqrt(rows.sum())
+        np.testing.assert_allclose(drawn[rows].mean(axis=0), mean, atol=error)
+        np.testing.assert_allclose(drawn[rows].std(axis=0), spread, atol=error)
+
+
+def test_one_mode_is_drawn_as_a_prediction_always_was() -> None:
+    start = Start(np.full(3, 0.1), np.full(3, 0.05), np.zeros(3))
+    drawn = draw_population(Toy(3, start=start), np.random.default_rng(7), 10)
+    np.testing.assert_array_equal(drawn, np.random.default_rng(7).normal(start.mean, start.spread, (10, 3)))
+
+
+def test_poses_near_each_other_are_one_mode_with_the_sum_of_their_weights() -> None:
+    both = weighted([5, 5, 5], [0.0, 0.05, np.pi], [1.0, 3.0, 4.0])
+    modes = modes_apart(WALK.skeleton, both)
+    assert sorted(weight for weight, _ in modes) == [0.5, 0.5]
+    assert sorted(len(mode) for _, mode in modes) == [1, 2]
+    assert 0.1 < APART < 0.4  # a body that is turned by half a circle is farther from itself
+
+
+def problem_of(row: int, turn: float) -> PoseProblem:
+    """Return the problem whose silhouette is of one of the walker's poses, turned."""
+    body = posefit.Body.of(WALK.skeleton)
+    camera = posefit.Camera.around(WALK.translations[row], 0.3, 5.0, (160, 120))
+    pose = WALK.poses[row].copy()
+    pose[0] += turn
+    mask = posefit.project(body, camera, pose, WALK.translations[row])
+    space = replace(SPACE, anchor=WALK.translations[row])
+    return PoseProblem(body, [camera], [posefit.Silhouette.of(mask)], space)
+
+
+def test_modes_are_projected_onto_the_latents_of_the_prior_and_weighed_by_their_costs_there() -> None:
+    start = start_in(problem_of(20, 2.5), modes_apart(WALK.skeleton, weighted([5, 20], [0.0, 2.5], [3.0, 1.0])))
+    (other,) = start.others
+    assert start.weight > other.weight > 0.0  # the silhouette is that of the mode whose weight was less
+    for mode, row, turn in ((start, 20, 2.5), (other, 5, 0.0)):
+        pose = SPACE.decode(mode.mean[None])[0][0]
+        np.testing.assert_allclose(np.cos(pose[0] - WALK.poses[row, 0] - turn), 1.0)
+        projected = PRIOR.inverse_transform(PRIOR.transform(WALK.poses[row : row + 1, 3:]))[0]
+        np.testing.assert_allclose(pose[3:], projected, atol=1e-9)
+        np.testing.assert_array_equal(mode.spread, np.full(SPACE.dimensions, SPREAD))
+
+
+def test_a_mode_is_around_its_pose_that_costs_least() -> None:
+    ((_, mode),) = modes_apart(WALK.skeleton, weighted([5, 5, 5], [0.3, 0.2, 0.0], [5.0, 4.0, 1.0]))
+    start = start_in(problem_of(5, 0.0), [(1.0, mode)])
+    np.testing.assert_allclose(SPACE.decode(start.mean[None])[0][0, 0], WALK.poses[5, 0], atol=1e-9)
+
+
+class Knows:
+    """Guesses one pose; the ten lines that any model of silhouettes needs."""
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+
+    def posterior(self, observation: Observation) -> Posterior | None:
+        return weighted([5], [1.0], [1.0])
+
+
+def test_nothing_is_guessed_where_the_pose_is_known_or_nothing_shows() -> None:
+    body = posefit.Body.of(WALK.skeleton)
+    camera = posefit.Camera.framing(WALK.joints[0], body.joint_radii(), 0.0, (64, 48))
+    seen = Observation([posefit.Silhouette.of(np.ones((48, 64)))])
+    task = Task(body, [camera], 100, None, np.zeros(3), start=Knows)
+    ((weight, mode),) = guessed_modes(task, seen)
+    assert (weight, len(mode)) == (1.0, 1)
+    assert not guessed_modes(replace(task, first_pose=WALK.poses[0, 3:]), seen)
+    assert not guessed_modes(task, replace(seen, usable=False))
+    assert not guessed_modes(replace(task, start=None), seen)
