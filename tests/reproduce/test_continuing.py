@@ -78,7 +78,7 @@ def test_a_quick_experiment_is_another_one_and_more_seeds_are_not() -> None:
 
 
 def test_clips_are_what_their_files_hold(tmp_path: Path) -> None:
-    walk, shared = motion("walk", fps=120.0), []
+    walk, shared = motion("walk", frames=300, fps=120.0), []
     for folder in (tmp_path / "a", tmp_path / "b"):
         for test, training in CLIPS.values():
             for clip in (test, *training):
