@@ -58,9 +58,9 @@ class FrameCosts:
             return np.zeros((len(poses), len(GROUPS) * len(self._task.cameras), 2))
         return landmark_likelihoods(self.skeleton, self._task.cameras, self.observation.landmarks, poses, places)
 
-    def side_odds(self, pose: Array, place: Array) -> float | None:
-        """Return the logarithm of the odds that left and right are as in a pose (66,), by one camera's landmarks."""
-        if self.camera_count > 1 or self.observation.landmarks is None:
+    def side_odds(self, pose: Array, place: Array) -> Array | None:
+        """Return the logarithms of the odds (2,) that legs, and arms, are as in a pose (66,), by all landmarks."""
+        if self.observation.landmarks is None:
             return None
         known = self.observation.landmarks[..., 2].any()
         return side_odds(self.landmarks(pose[None], place[None])[0]) if known else None

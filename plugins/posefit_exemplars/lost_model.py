@@ -27,7 +27,7 @@ from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import second_side
 
 LANDMARK_SECONDS = 0.5  # that the mean of the landmarks' evidence of sides reaches back
-MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which left and right are known
+MIN_SIDE_ODDS = 0.4  # the least mean logarithm of the odds at which one camera's landmarks tell left from right
 MEAN_SECONDS = {"lately": 0.2, "in general": 1.0}  # that the means reach back
 
 
@@ -142,7 +142,7 @@ def stored_classifier() -> FailureClassifier:
 
 def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
     """Yield frames that have sampled tracks with the probabilities that they are lost, or have sides exchanged."""
-    means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(2), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
+    means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(3), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
         if frame.posterior is None:
@@ -155,9 +155,12 @@ def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: 
         exchanged = classifier.sides.probability(features)
         # left and right are unknown, or else known unless no sample has them as reported
         known = exchanged < classifier.unknown
-        if (odds := frame.details.get("sides")) is not None:  # landmarks are better evidence
-            side_sums = decay * side_sums + [odds, 1.0]
-            known = bool(side_sums[0] >= MIN_SIDE_ODDS * side_sums[1])
+        if (odds := frame.details.get("sides")) is not None:
+            side_sums = decay * side_sums + [*odds, 1.0]
+            legs, arms, count = side_sums
+            if len(task.cameras) == 1:  # its landmarks are better evidence than its silhouettes
+                known = legs + arms >= MIN_SIDE_ODDS * count
+            known = bool(known and legs >= 0.0)  # however many cameras agree: arms may have sides that legs have not
         recalibration = replace(frame.posterior.recalibration or Recalibration(), second_side=float(known))
         posterior, lost = replace(frame.posterior, recalibration=recalibration), classifier.lost.probability(features)
         details = {**frame.details, "evidence": evidence, "exchanged": exchanged}

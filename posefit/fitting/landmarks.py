@@ -68,11 +68,16 @@ def exchanged_given(likelihoods: Array, exchanged: Array) -> Array:
     return logistic(np.log(exchanged) - np.log1p(-exchanged) + likelihoods[..., 1] - likelihoods[..., 0])
 
 
-def side_odds(likelihoods: Array) -> float:
-    """Return the logarithm of the odds that legs and arms are on the sides of a pose, by its likelihoods (K, 2).
+def side_odds(likelihoods: Array) -> Array:
+    """Return the logarithms of the odds (2,) that legs, and arms, are on a pose's sides, by its likelihoods (K, 2).
 
     Unknown landmarks add 0, and each limb of each view at most the odds of its usual share of exchanges.
     """
-    limbs = np.arange(len(likelihoods)) % len(GROUPS) <= ARMS
-    usual, limb_likelihoods = usually_exchanged(likelihoods)[limbs], likelihoods[limbs]
-    return float(landmark_costs(limb_likelihoods[:, ::-1], usual) - landmark_costs(limb_likelihoods, usual))
+    limb, usual = np.arange(len(likelihoods)) % len(GROUPS), usually_exchanged(likelihoods)
+    return np.array(
+        [
+            landmark_costs(likelihoods[limb == group, ::-1], usual[limb == group])
+            - landmark_costs(likelihoods[limb == group], usual[limb == group])
+            for group in (LEGS, ARMS)
+        ]
+    )

@@ -11,6 +11,8 @@ from click.testing import CliRunner
 
 import functions
 import gpu
+import proportions
+import seeds
 from make_boxes import learned_from, upright_poses
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
 from posefit.motion.built_in import average_skeleton
@@ -247,6 +249,43 @@ def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch
     lines = list(gpu.lines_of(figures))
     assert len(lines) == 4
     assert lines[2].endswith("  equal")
+
+
+def test_proportions_are_of_as_many_men_as_women(tmp_path: Path) -> None:
+    heads = sorted({"stature", *(name.strip("-") for of in proportions.MEASURES.values() for name in of)})
+    table = tmp_path / "men.csv"
+    person = dict.fromkeys(heads, 100.0) | {
+        "stature": 2000.0,
+        "trochanterionheight": 1100.0,
+        "cervicaleheight": 1700.0,
+    }
+    people = [person | {"lateralfemoralepicondyleheight": height} for height in (500.0, 600.0)]
+    table.write_text("\n".join([",".join(heads), *(",".join(str(row[name]) for name in heads) for row in people)]))
+    logs = proportions.proportions(table)
+    assert logs.shape == (2, 9)
+    np.testing.assert_allclose(logs[:, :3], np.log([[2.0, 0.3, 0.2], [2.0, 0.25, 0.25]]))
+    men, women = np.array([[0.0, 0.0], [2.0, 2.0]]), np.array([[3.0, -3.0], [3.0, -1.0], [3.0, -2.0]])
+    spread, correlation = proportions.moments(men, women)
+    # means 2 and -0.5; variances 0.5 * (0.5 * (4 + 0) + 1) and 0.5 * (0.5 * (0.25 + 6.25) + (6.25 + 0.25 + 2.25) / 3)
+    assert spread**2 == pytest.approx([1.5, 0.5 * (3.25 + 8.75 / 3)])
+    covariance = 0.5 * (0.5 * (-2.0 * 0.5 + 0.0) + 1.0 * -1.5)
+    assert correlation[0, 1] == pytest.approx(covariance / np.sqrt(1.5 * 0.5 * (3.25 + 8.75 / 3)))
+
+
+def test_the_density_of_people_is_that_of_a_normal_distribution() -> None:
+    from scipy.stats import multivariate_normal
+
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(4, 4))
+    people, covariance = rng.normal(size=(6, 4)), root @ root.T + np.eye(4)
+    expected = multivariate_normal(np.zeros(4), covariance).logpdf(people).mean()
+    assert proportions.likelihood(people, covariance) == pytest.approx(expected)
+
+
+def test_tracks_are_as_far_apart_as_the_median_joint_of_all_pairs() -> None:
+    tracks = [np.zeros((1, 3, 3)), np.full((1, 3, 3), [3.0, 4.0, 0.0]), np.full((1, 3, 3), [0.0, 12.0, 0.0])]
+    assert seeds.median_distance(tracks) == pytest.approx(np.sqrt(73.0))  # of 5, 12 and the square root of 9 + 64
+    assert seeds.median_distance(tracks[:1]) == 0.0
 
 
 def test_blind_equivalents_lie_between_the_budgets_measured_by_their_logarithm() -> None:

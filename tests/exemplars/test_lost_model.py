@@ -109,6 +109,28 @@ def test_sides_are_unknown_from_a_probability_on(walker: Walk, least: float, unk
     assert unknown_sides(walker.motion.skeleton, frame.posterior, frame.pose) == unknown
 
 
+@each(
+    ("cameras", "odds", "unknown"),
+    [
+        (1, [0.3, 0.2], False),
+        (1, [0.1, 0.2], True),
+        (1, [-0.1, 2.0], True),  # arms do not outvote legs
+        (2, [0.1, 0.2], False),
+        (2, [-0.1, 4.0], True),
+    ],
+)
+def test_landmarks_of_legs_that_contradict_make_sides_unknown(
+    walker: Walk, cameras: int, odds: list[float], unknown: bool
+) -> None:
+    classifier = FailureClassifier(EVEN, EVEN, 0.6)  # silhouettes call them known
+    frame, task = frame_of(walker), replace(walker.task, cameras=list(walker.task.cameras)[:1] * cameras)
+    details = {**frame.details, "sides": np.array(odds)}
+    frame = replace(frame, areas=np.repeat(frame.areas, cameras, axis=0), details=details)
+    frame = next(with_failure_probabilities([frame], task, classifier))
+    assert frame.posterior is not None
+    assert unknown_sides(walker.motion.skeleton, frame.posterior, frame.pose) == unknown
+
+
 def test_evidence_of_a_track(walker: Walk) -> None:
     def names(frames: Sequence[Frame]) -> list[set[str]]:
         assert all(frame.lost is not None and 0.0 < frame.lost < 1.0 for frame in frames)

@@ -12,7 +12,9 @@ from posefit.fitting.landmarks import (
     ARMS,
     DEVIATION,
     EXCHANGED,
+    GROUPS,
     LEGS,
+    MIRRORED,
     PERSISTENCE,
     exchanged_given,
     exchanged_next,
@@ -94,12 +96,22 @@ def test_exchanged_landmarks_are_expected_to_stay_so() -> None:
 
 def test_the_odds_of_sides_are_at_most_those_of_the_usual_shares() -> None:
     usual = EXCHANGED[[LEGS, ARMS]]
-    most = np.log((1.0 - usual) / usual).sum()
+    most = np.log((1.0 - usual) / usual)
     landmarks = landmarks_of(1.0)
     right, wrong = (likelihoods(points, WALK.poses[3:4])[0] for points in (landmarks, landmarks[:, list(MIRROR)]))
-    assert 0.3 * most < side_odds(right) <= most
+    assert 0.3 * most.sum() < side_odds(right).sum() <= most.sum()
+    assert (side_odds(right) <= most).all()
     np.testing.assert_allclose(side_odds(wrong), -side_odds(right), rtol=1e-9)
-    assert side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0]) == 0.0
+    assert not side_odds(likelihoods(landmarks_of(0.0), WALK.poses[3:4])[0]).any()
+
+
+def test_legs_have_odds_of_their_own_and_views_add_up() -> None:
+    landmarks = landmarks_of(1.0)
+    legs = GROUPS[LEGS]
+    landmarks[0, legs] = landmarks[0, MIRRORED[legs]]  # the legs alone are exchanged
+    right, crossed = (likelihoods(points, WALK.poses[3:4])[0] for points in (landmarks_of(1.0), landmarks))
+    np.testing.assert_allclose(side_odds(crossed), side_odds(right) * [-1.0, 1.0], rtol=1e-9)
+    np.testing.assert_allclose(side_odds(np.concatenate([right, right])), 2.0 * side_odds(right), rtol=1e-9)
 
 
 def test_landmarks_are_read_with_their_masks(tmp_path: Path) -> None:

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from posefit.fitting import shape
 from posefit.fitting.problem import align
-from posefit.fitting.shape import GIRTHS, LENGTHS, NAMES, Shape, fit_shape, shaped
+from posefit.fitting.shape import COVARIANCE, GIRTHS, LENGTHS, NAMES, PULL, Shape, fit_shape, shaped
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
@@ -52,6 +53,33 @@ def test_factors_multiply_what_they_name() -> None:
     wide = made.radii / AVERAGE.radii
     np.testing.assert_allclose(wide[BONES.index("lradius")], 1.32)
     np.testing.assert_allclose(wide[BONES.index("thorax")], 1.1)
+
+
+def test_proportions_have_the_published_spreads_and_correlations() -> None:
+    np.testing.assert_array_equal(shape.PROPORTIONS_CORRELATION, shape.PROPORTIONS_CORRELATION.T)
+    np.testing.assert_array_equal(np.diag(shape.PROPORTIONS_CORRELATION), 1.0)
+    assert np.linalg.eigvalsh(COVARIANCE).min() > 0.0
+    thighs, shanks, torso, girth = (
+        NAMES.index(name) for name in ("thighs length", "shanks length", "torso length", "torso girth")
+    )
+    assert COVARIANCE[thighs, thighs] == pytest.approx(0.049**2 + 0.01**2)
+    assert COVARIANCE[thighs, torso] == pytest.approx(-0.67 * 0.049 * 0.044)
+    assert COVARIANCE[shanks, torso] == pytest.approx(-0.59 * 0.044 * 0.044)
+    assert not COVARIANCE[0, 1:].any()
+    assert COVARIANCE[girth, girth] == pytest.approx(0.3**2)
+    assert np.count_nonzero(COVARIANCE[girth]) == 1
+
+
+def test_a_length_that_is_measured_moves_those_that_go_with_it() -> None:
+    thighs, weight, log_length = NAMES.index("thighs length"), 2000.0, 0.08
+
+    def cost(factors: np.ndarray) -> float:
+        return float(weight * (np.log(factors[thighs]) - log_length) ** 2)
+
+    estimate = np.log(shape._search(cost, np.ones(len(NAMES)), np.random.default_rng(0), 0.5, 400))
+    expected = weight * log_length / (weight * COVARIANCE[thighs, thighs] + PULL) * COVARIANCE[thighs]
+    np.testing.assert_allclose(estimate, expected, atol=2e-3)  # the least of the cost and the pull, by hand
+    assert estimate[NAMES.index("torso length")] < -0.03
 
 
 def test_varied_people_are_symmetric_and_within_their_percentage() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.arrays import Array, writeable
-from posefit.fitting.shape import NAMES, REACH, SPREAD, Shape, shaped
+from posefit.fitting.shape import MODEL_SPREAD, NAMES, PRECISION, REACH, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
@@ -200,7 +200,8 @@ def fit_contours(
         best = int(np.argmax([visibility.usable[rows].sum() for rows, _ in parts]))
         part = _fitted(scene, motion, visibility, parts[best][0], scene.body, shape, beta)
         if part.body is not scene.body:  # else no build fits better, and only poses are fitted
-            shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=part.spread)
+            spread = np.minimum(np.hypot(part.spread, MODEL_SPREAD), SPREAD)
+            shape = replace(shape, body=part.body, factors=np.exp(part.factors), spread=spread)
             fitted[best] = part
     body = scene.body if shape is None else shape.body
     poses, places = motion.poses.copy(), motion.translations.copy()
@@ -263,9 +264,9 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
         solved = squares.steps_for(np.concatenate([squares.slopes[..., None], mixed], axis=2))
         steps, by_factor = solved[..., 0], solved[..., 1:]
         held = max(np.count_nonzero(part.visibility.usable) / BUILD_FRAMES, 1.0)
-        known = held / SPREAD**2
-        curve = curve + np.diag(known) - np.einsum("tni,tnj->ij", mixed, by_factor)
-        slope = slope + known * part.factors - np.einsum("tni,tn->i", mixed, steps)
+        known = held * PRECISION
+        curve = curve + known - np.einsum("tni,tnj->ij", mixed, by_factor)
+        slope = slope + known @ part.factors - np.einsum("tni,tn->i", mixed, steps)
         changes = np.clip(np.linalg.solve(curve, slope), -MAX_FACTOR_STEP, MAX_FACTOR_STEP)
         changes = part.factors - np.clip(part.factors - changes, -REACH * SPREAD, REACH * SPREAD)
         steps = steps - by_factor @ changes

@@ -1,0 +1,102 @@
+"""How much a track of the same film depends on the seed: FILM is the demonstration video of Sports2D, or any other.
+
+Frames, height and how the person is taken out are chosen as for `posefit track`.
+"""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from itertools import combinations
+from typing import Any
+
+import click
+import numpy as np
+
+from posefit.arrays import Array
+from posefit.cli.options import EXTRACTION, FRAMES, options, track_flags
+from posefit.evaluation.errors import LOST
+from posefit.footage.masks import Range
+from posefit.footage.segmentation import Extraction
+from posefit.geometry.skeleton import BONES
+from posefit.progress import QUIET
+from posefit.tracking.front import track
+from posefit_reproduce.jobs import each
+from table import WORKERS, earlier, kept, markdown
+
+LIMBS = {"thigh": ("lfemur",), "shank": ("ltibia",), "upper arm": ("lhumerus",), "forearm": ("lradius", "lwrist")}
+
+
+def seed_row(film: str, how: Mapping[str, Any], seed: int) -> dict[str, Any]:
+    """Return the figures of a film tracked with a seed, and its joints in millimetres."""
+    start, cpu = time.perf_counter(), time.process_time()
+    result = track(film, seed=seed, progress=QUIET, **how)
+    seconds, cpu_seconds = time.perf_counter() - start, time.process_time() - cpu
+    usable, skeleton = result.table["usable"] > 0.0, result.motion.skeleton
+    lengths = dict(zip(BONES, skeleton.lengths, strict=True))
+    return {
+        "seed": seed,
+        "lost": float((result.table["lost"][usable] >= LOST).mean()),
+        "unknown": float((result.table["unknown_sides"][usable] == 1.0).mean()),
+        "iou": result.measures.iou,
+        "grade": None if result.trust is None else result.trust.grade,
+        **{f"{name}_mm": 1e3 * sum(lengths[bone] for bone in bones) for name, bones in LIMBS.items()},
+        "seconds": seconds,
+        "cpu_ms_a_frame": 1e3 * cpu_seconds / len(result.motion),
+        "joints_mm": (1e3 * result.motion.joints).round().astype(int).tolist(),
+    }
+
+
+def median_distance(tracks: Sequence[Array]) -> float:
+    """Return the median distance of joints (T, 27, 3) between two tracks, over all pairs, frames and joints."""
+    distances = [np.linalg.norm(first - second, axis=2) for first, second in combinations(tracks, 2)]
+    return float(np.median(distances)) if distances else 0.0
+
+
+def seeds_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield the table of all seeds, and how far their joints are apart."""
+    heads = ["seed", "lost %", "unknown %", "IoU", "verdict", *(f"{name} mm" for name in LIMBS), "CPU ms a frame"]
+    cells = [
+        [
+            str(row["seed"]),
+            *(f"{100.0 * row[name]:.0f}" for name in ("lost", "unknown")),
+            f"{row['iou']:.3f}",
+            str(row["grade"]),
+            *(f"{row[f'{name}_mm']:.0f}" for name in LIMBS),
+            f"{row['cpu_ms_a_frame']:.0f}",
+        ]
+        for row in rows
+    ]
+    yield from markdown(heads, cells, 1)
+    apart = median_distance([np.array(row["joints_mm"]) for row in rows])
+    yield f"joints of two seeds are {apart:.0f} mm apart, median"
+
+
+@click.command(help=__doc__)
+@click.argument("film")
+@click.option("--seeds", type=click.IntRange(1), default=4, show_default=True, help="From 0 on.")
+@click.option("--rows", metavar="FILE", help="Of a row a line as they come; what it holds is not measured again.")
+@WORKERS
+@options((FRAMES, *track_flags("height"), *EXTRACTION))
+def main(
+    film: str,
+    seeds: int,
+    rows: str | None,
+    workers: int | None,
+    frames: Range,
+    height: float | None,
+    extraction: str | None,
+    **settings: Any,
+) -> None:
+    chosen = {name: value for name, value in {"method": extraction, **settings}.items() if value is not None}
+    how: dict[str, Any] = {"frames": frames, "height": height}
+    if chosen:
+        how["extraction"] = Extraction(**chosen)
+    done = earlier(rows, lambda row: int(row["seed"]))
+    jobs = {seed: partial(seed_row, film, how, seed) for seed in range(seeds) if seed not in done}
+    done |= each(jobs, workers, partial(kept, rows)) if jobs else {}
+    for line in seeds_lines([done[seed] for seed in range(seeds)]):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()
