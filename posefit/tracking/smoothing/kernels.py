@@ -184,12 +184,11 @@ def _add_bone_border(start, end, ends, contour, scale, others, square):
     sine = math.sqrt(1.0 - cosine * cosine)
     tilt = math.acos(cosine)  # from the axis to the normal of the cone's side
     sides = max(int(length / (2.0 * contour.step)) + 1, 2)
-    for k in range(2 * (sides + 1 + 2 * CAP)):
-        i, side = k // 2, 1.0 - 2.0 * (k % 2)
+    for i in range(sides + 1 + 2 * CAP):
         if i <= sides:
             share, along, aside = i / sides, cosine, sine
             stands = length * sine / sides * (0.5 if i in (0, sides) else 1.0)
-        elif side > 0.0:
+        else:
             share = 1.0 if i <= sides + CAP else 0.0
             if share > 0.0:
                 angle, stands = tilt * (i - sides - 0.5) / CAP, r1 * tilt / CAP
@@ -197,14 +196,15 @@ def _add_bone_border(start, end, ends, contour, scale, others, square):
                 rest = math.pi - tilt
                 angle, stands = tilt + rest * (i - sides - CAP - 0.5) / CAP, r0 * rest / CAP
             along, aside = math.cos(angle), math.sin(angle)
-        nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
         radius = r0 + share * (r1 - r0)
-        x = start[0] + share * length * dx + radius * nx
-        y = start[1] + share * length * dy + radius * ny
-        known, off, across, down = _mask_distance(x, y, contour)
-        if known and not _covered(x, y, neighbours, cones, discs):
-            weight = stands / (1.0 + (off / scale) ** 2)
-            _add(block, slope, share, across, down, across * nx + down * ny, off, weight)
+        for side in (1.0, -1.0):
+            nx, ny = along * dx - side * aside * dy, along * dy + side * aside * dx
+            x = start[0] + share * length * dx + radius * nx
+            y = start[1] + share * length * dy + radius * ny
+            known, off, across, down = _mask_distance(x, y, contour)
+            if known and not _covered(x, y, neighbours, cones, discs):
+                weight = stands / (1.0 + (off / scale) ** 2)
+                _add(block, slope, share, across, down, across * nx + down * ny, off, weight)
 
 
 @inlined
