@@ -150,20 +150,25 @@ def searched(training: Training, start: Mapping[str, Any] | None) -> list[float]
     return costs if start is None else np.minimum(costs, start["costs"]).tolist()
 
 
-def trained(training: Training, curve: list[Any]) -> Policy:
-    """Return the policy of a learner, the mean of its distribution; `curve` gets its held-out costs on the way."""
+def ppo(vector: Any, seed: int) -> Any:
+    """Return the untrained learner of a vector environment for Stable-Baselines3."""
     import torch
     from stable_baselines3 import PPO
-    from stable_baselines3.common.callbacks import BaseCallback
 
     torch.set_num_threads(1)
-    vector = to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False))
     policy_settings = {"log_std_init": LOG_DEVIATION, "net_arch": NETWORKS, "activation_fn": torch.nn.ReLU}
-    model = PPO(
-        "MlpPolicy", vector, seed=training.seed, device="cpu", gamma=0.0,
+    return PPO(
+        "MlpPolicy", vector, seed=seed, device="cpu", gamma=0.0,
         learning_rate=lambda left: LEARNING_RATE * left,
         n_steps=ROLLOUT, batch_size=BATCH, n_epochs=EPOCHS, policy_kwargs=policy_settings,
     )  # fmt: skip
+
+
+def trained(training: Training, curve: list[Any]) -> Policy:
+    """Return the policy of a learner, the mean of its distribution; `curve` gets its held-out costs on the way."""
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    model = ppo(to_sb3_vec_env(made(training, ENVIRONMENTS, errors=False)), training.seed)
 
     def act(pictures: Any) -> Array:
         return np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)

@@ -1,0 +1,141 @@
+"""What does PPO reach that sees its last proposals stacked, in every frame of Track-v0, beside blind searches?
+
+    python docs/studies/agents_track.py
+
+Costs are the committed ones, the means over the frames of held-out tracks. A search has the environment's box and
+prediction, and as many evaluations a frame as it says; what it commits, the next frame's box goes by.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from time import process_time
+from typing import Any
+
+import click
+import gymnasium as gym
+import numpy as np
+from gymnasium.wrappers.vector import ResizeObservation
+
+from agents import (
+    ENVIRONMENTS,
+    HELD_OUT,
+    MAX_EVALUATIONS,
+    SEARCHES,
+    SHOWN,
+    STEPS,
+    check_learners,
+    equivalent,
+    interval,
+    ppo,
+)
+from posefit import minimise
+from posefit.arrays import Array
+from posefit.cli.output import Command
+from posefit.registry import registry
+from posefit.settings import planned
+from posefit_envs import to_sb3_vec_env
+from posefit_envs.track import FRAMES
+from posefit_reproduce.jobs import each
+from table import WORKERS, bar, markdown
+
+NAME = "posefit_envs:posefit/Track-v0"
+STACKED = 4  # the latest pictures that the agent sees
+BUDGETS = (8, 40, 100, 200)  # evaluations of a frame, of blind searches
+SEEDS, INSTANCES = 2, 100
+DIMENSIONS = 9  # of a proposal
+
+
+def stacked(count: int) -> tuple[Any, Any]:
+    """Return a vector environment of eight proposals a frame, as Stable-Baselines3 has it, and one that stacks them."""
+    from stable_baselines3.common.vec_env import VecFrameStack
+
+    env = gym.make_vec(NAME, count, evaluations_per_frame=MAX_EVALUATIONS, errors=False)
+    vector = to_sb3_vec_env(ResizeObservation(env, SHOWN))
+    return vector, VecFrameStack(vector, STACKED)
+
+
+def committed(act: Callable[[Any], Array], count: int) -> Array:
+    """Return the costs (n, frames) that a policy commits in the first held-out tracks."""
+    vector, env = stacked(count)
+    vector.set_options({"instance": list(range(HELD_OUT, HELD_OUT + count))})
+    pictures, costs = env.reset(), []
+    for step in range(1, FRAMES * MAX_EVALUATIONS + 1):
+        pictures, _, _, infos = env.step(act(pictures))
+        if step % MAX_EVALUATIONS == 0:
+            costs.append([info["committed_cost"] for info in infos])
+    return np.array(costs).T
+
+
+def trained(seed: int, steps: int) -> Callable[[Any], Array]:
+    """Return the policy of a training, the mean of its distribution."""
+    model = ppo(stacked(ENVIRONMENTS)[1], seed)
+    model.learn(steps)
+    return lambda pictures: np.asarray(model.predict(pictures, deterministic=True)[0])
+
+
+def searched(name: str, budget: int, count: int) -> Array:
+    """Return the costs (n, frames) that an optimiser commits in the first held-out tracks."""
+    env, factory = gym.make_vec(NAME, count, evaluations_per_frame=2, errors=False), registry().optimiser(name)
+    env.reset(options={"instance": list(range(HELD_OUT, HELD_OUT + count))})
+    few = {"population_size": budget} if budget < 40 else {}  # one population of sapso
+    settings, costs = planned(factory, few, budget), []
+    for frame in range(FRAMES):
+        best = []
+        for number, problem in enumerate(env.unwrapped.problems):
+            optimiser = factory(problem.space, np.random.default_rng([frame, number]), **settings)
+            best.append(minimise(problem.evaluate, optimiser, budget, budget_known=True))
+        for _ in range(2):  # the fewest proposals that commit one
+            infos = env.step(np.array([minimum.proposal for minimum in best]))[-1]
+        costs.append(infos["committed_cost"])
+    return np.array(costs).T
+
+
+def row_of(agent: str, budget: int, seed: int, steps: int, count: int) -> dict[str, Any]:
+    """Return the costs (n, frames) that an agent or a search commits, and the CPU seconds until it can."""
+    begun = process_time()
+    if agent in SEARCHES:
+        return {"costs": searched(agent, budget, count), "cpu_seconds": process_time() - begun}
+    rng = np.random.default_rng(seed)
+    policy = trained(seed, steps) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (count, DIMENSIONS))
+    cpu = process_time() - begun
+    return {"costs": committed(policy, count), "cpu_seconds": cpu}
+
+
+def table(done: Mapping[tuple[str, int, int], Mapping[str, Any]], steps: int) -> Iterator[str]:
+    """Yield the table of rows under their agents, evaluations and seeds."""
+    groups: dict[tuple[str, int], list[Mapping[str, Any]]] = {}
+    for (agent, budget, _), row in done.items():
+        groups.setdefault((agent, budget), []).append(row)
+    costs = {key: np.array([row["costs"] for row in group]) for key, group in groups.items()}  # (seeds, n, frames)
+    blind = {name: {budget: float(costs[name, budget].mean()) for budget in BUDGETS} for name in SEARCHES}
+    cells = []
+    for (agent, budget), group in groups.items():
+        cpu = f"{np.mean([row['cpu_seconds'] for row in group]):.0f}"
+        training = [f"{steps:,}", cpu, str(len(group))] if agent == "PPO" else ["", "", ""]
+        all_costs = costs[agent, budget]
+        low, high = interval(all_costs.mean(axis=2))
+        figures = [f"{all_costs.mean():.1f}", f"{low:.1f} to {high:.1f}", f"{all_costs[..., 0].mean():.1f}"]
+        equal = [equivalent(blind[name], float(all_costs.mean())) if agent == "PPO" else "" for name in SEARCHES]
+        cells.append([agent, f"{budget:,}", *training, *figures, *equal])
+    heads = ["", "evaluations a frame", "steps", "CPU s", "seeds", "cost", "95 % interval", "of first frames"]
+    yield from markdown([*heads, "as SAPSO", "as CMA-ES"], cells)
+
+
+@click.command(cls=Command, help=__doc__)
+@click.option("--seeds", type=click.IntRange(1), default=SEEDS, show_default=True, help="Trainings.")
+@click.option("--steps", type=click.IntRange(1), default=STEPS, show_default=True, help="Of a training.")
+@click.option("--instances", type=click.IntRange(1, HELD_OUT), default=INSTANCES, show_default=True, help="Held out.")
+@WORKERS
+def main(seeds: int, steps: int, instances: int, workers: int | None) -> None:
+    check_learners()
+    turns = [("uniform", MAX_EVALUATIONS, 0)]
+    turns += [(name, budget, 0) for name in SEARCHES for budget in BUDGETS]
+    turns += [("PPO", MAX_EVALUATIONS, seed) for seed in range(seeds)]
+    jobs = {turn: partial(row_of, *turn, steps, instances) for turn in turns}
+    done = each(jobs, workers, bar)
+    for line in table({turn: done[turn] for turn in turns}, steps):
+        click.echo(line)
+
+
+if __name__ == "__main__":
+    main()
