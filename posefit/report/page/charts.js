@@ -149,7 +149,8 @@ function certainty() {
     column(`within ${percents(level)}`, ({ coverage }) => coverage[k], share, { about: within(level) }),
     column("mm", ({ width }) => width[k], whole, { about: "Mean radius of these balls" }),
   ]);
-  const about = "Expected calibration error of the likeliest mode's probability: the mean distance from how often it is right";
+  const about =
+    "Expected calibration error of the likeliest mode's probability: the mean distance from how often it is right";
   const error = column("calibration error", "ece", (value) => number(value, 3), { about });
   const rows = D.taking_part.flatMap((m, place) => (methods[place] ? [{ m, ...methods[place] }] : []));
   table($("sure"), [methodColumn("m"), ...columns, error], rows, { name: "Uncertainty" });
