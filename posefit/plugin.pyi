@@ -30,6 +30,7 @@ from posefit.fitting.tracker import Observation as Observation
 from posefit.fitting.tracker import Task as Task
 from posefit.fitting.tracker import Tracker as Tracker
 from posefit.fitting.weights import effective_sample_size as effective_sample_size
+from posefit.fitting.weights import systematic_rows as systematic_rows
 from posefit.fitting.weights import weigh as weigh
 from posefit.hooks import RegisterCommand as RegisterCommand
 from posefit.hooks import RegisterOptimiser as RegisterOptimiser

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.errors import InputError
+from posefit.fitting.tracker import Task
 from posefit.geometry import symmetry
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import JOINTS, Skeleton
@@ -232,6 +233,12 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
         average = replace(skeleton, offsets=average_skeleton().offsets)
         latest = _latest = key, Exemplars.of(motions, average, mirrored=mirrored)
     return latest[1]
+
+
+def exemplars_for(task: Task, mirrored: bool) -> Exemplars:
+    """Return the states that a task may learn from; one set of them serves both directions."""
+    training = [motion.reversed() for motion in task.training] if task.backwards else task.training
+    return exemplars_of(training, task.body.skeleton, mirrored)
 
 
 def mirror_image(motion: Motion) -> Motion:

@@ -23,7 +23,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.silhouette.cost import masks_of
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
-from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_of
+from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_for
 from posefit_exemplars.frame_costs import FrameCosts
 
 POSES = 2000  # drawn of the clips as `Exemplars.draw` does
@@ -131,13 +131,14 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
 class Lookup:
     """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones.
 
+    `exemplars` are those of the task, where a tracker has them already.
+
     Settings:
         mirrored: whether the mirror images of all clips are learned from as well.
     """
 
-    def __init__(self, task: Task, *, mirrored: bool = True) -> None:
-        training = [motion.reversed() for motion in task.training] if task.backwards else task.training
-        self.task, self.exemplars = task, exemplars_of(training, task.body.skeleton, mirrored)
+    def __init__(self, task: Task, exemplars: Exemplars | None = None, *, mirrored: bool = True) -> None:
+        self.task, self.exemplars = task, exemplars_for(task, mirrored) if exemplars is None else exemplars
 
     def nearest(
         self, observation: Observation, count: int, yaw: float | None = None

@@ -18,9 +18,10 @@ from posefit.plugin import (
     draw_population,
     positive,
     sample_normal,
+    systematic_rows,
     weigh,
 )
-from posefit_filters.weighting import sharpness, systematic_rows
+from posefit_filters.weighting import sharpness
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10

@@ -15,9 +15,9 @@ from posefit.plugin import (
     draw_population,
     positive,
     sample_normal,
+    systematic_rows,
     weigh,
 )
-from posefit_filters.weighting import systematic_rows
 
 EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost

@@ -1,21 +1,9 @@
-"""How sharply costs are weighed, and resampling by weights."""
-
-import numpy as np
-from numpy.typing import NDArray
+"""How sharply costs are weighed."""
 
 from posefit.plugin import Array, effective_sample_size, weigh
 
 TOLERANCE, MAX_STEPS = 1e-9, 100  # ours: of the share that survives, and steps towards it
 MAX_SHARPNESS = 1e12  # ours: where more particles than wanted share the lowest cost, none is sharp enough
-
-
-def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
-    """Return `count` rows, each as often as its weight times `count`, rounded up or down: systematic resampling.
-
-    `u` in [0, 1) is the offset of the evenly spaced points.
-    """
-    rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
-    return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
 
 
 def survival(costs: Array, beta: float) -> float:

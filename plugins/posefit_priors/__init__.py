@@ -5,8 +5,6 @@
 - `full.Full` is all joint angles that are free, within their limits.
 - `sklearn.Transformed` is a decomposition of scikit-learn that has an inverse: `sklearn:KernelPCA`.
 
-`arrays` has the checks and files.
-
 >>> import posefit
 >>> track = posefit.track("walk", method="@loose", frames=(0, 3))
 >>> track.summary["iou"] > 0.5

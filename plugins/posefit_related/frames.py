@@ -3,15 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.plugin import Array, Frame, Observation, Task, areas, mismatch, project
+from posefit import pose_costs
+from posefit.plugin import Array, Frame, Observation, Task, project
 
 YAW_REACH = np.radians(45.0)  # ours: of a known first yaw, to either side
 
 
 def costs_of(task: Task, observation: Observation, poses: Array, places: Array) -> Array:
-    """Return the costs (n,) of poses (n, 66) with their root at places (n, 3): the mean over the views. SAPSO (4)."""
-    views = zip(task.cameras, observation.silhouettes, strict=True)
-    return np.asarray(np.mean([mismatch(areas(task.body, *view, poses, places)) for view in views], axis=0))
+    """Return the costs (n,) of poses (n, 66) with their root at places (n, 3). SAPSO (4)."""
+    return pose_costs(task.body, task.cameras, observation.silhouettes, poses, places)[0]
 
 
 def training_poses(task: Task) -> Array:
@@ -40,9 +40,8 @@ def squared_distances(first: Array, second: Array) -> Array:
 
 def frame_of(task: Task, observation: Observation, pose: Array, place: Array, evaluations: int) -> Frame:
     """Return the frame of a pose (66,) at a place (3,), whose cost is one evaluation more."""
-    views = zip(task.cameras, observation.silhouettes, strict=True)
-    counts = np.stack([areas(task.body, *view, pose[None], place[None])[0] for view in views])
-    return Frame(pose, place, float(np.mean(mismatch(counts))), counts, evaluations + 1)
+    costs, counts = pose_costs(task.body, task.cameras, observation.silhouettes, pose[None], place[None])
+    return Frame(pose, place, float(costs[0]), counts[:, 0], evaluations + 1)
 
 
 def place_of(task: Task, observation: Observation, pose: Array, place: Array) -> tuple[Array, int]:

@@ -22,18 +22,12 @@ from posefit.plugin import (
     positive,
     repair,
     sample_normal,
+    systematic_rows,
     weigh,
 )
 from posefit_related.stages import EVALUATIONS
 
 CHI, PHI = 0.7298, 2.05  # Clerc and Kennedy 2002: the constriction, and the acceleration of either pull
-
-
-def systematic(weights: Array, u: float) -> Array:
-    """Return rows (n,), each about as often as n times its weight; `u` in [0, 1) shifts the evenly spaced points."""
-    n = len(weights)
-    rows = weights.cumsum().searchsorted((np.arange(n) + u) / n, side="right")
-    return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
 
 
 class PSOPF:
@@ -96,7 +90,7 @@ class PSOPF:
     def advance(self, space: Space) -> None:
         """Let the particles survive by the weights of where the swarm brought them, and move into the next frame."""
         weights = weigh(self._pbest_cost, self._sharpness)  # KRZESZOWSKI2010 (weights)
-        rows = systematic(weights, self._rng.random())
+        rows = systematic_rows(weights, self._rng.random(), len(weights))
         moved = converted(space, self._pbest[rows], self._space)
         self._space = space
         self._begin(sample_normal(space, self._rng, moved, np.full(space.dimensions, self._noise)))

@@ -15,9 +15,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, weigh
+from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, systematic_rows, weigh
 from posefit_related.frames import costs_of, first_poses, frame_of, training_poses
-from posefit_related.psopf import systematic
 
 HEAVIEST = 600  # ours: particles of a frame that are smoothed
 MIN_STEPS = np.array([np.radians(2.0), 0.005, 0.005, 0.005])  # ours: least deviations a frame of yaw and place
@@ -55,7 +54,7 @@ class Smoothing:
         likelihood = np.full(count, 1.0 / count)
         for observation in sequence:
             if states:
-                rows = systematic(likelihood, rng.random())
+                rows = systematic_rows(likelihood, rng.random(), len(likelihood))
                 here = here[rows] + self.steps * rng.standard_normal((count, len(self.steps)))
             if observation.translation is not None:
                 here[:, 1:4] = observation.translation

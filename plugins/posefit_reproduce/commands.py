@@ -24,6 +24,8 @@ def reproduce_group() -> None:
     """Repeat the experiments of the two publications."""
 
 
+QUICK: dict[str, Any] = {"seeds": 2, "frames": 15, "views": (0.0, 45.0), "around": (0.0, 45.0)}  # of a `Scale`
+
 OUT = click.option("--out", metavar="DIR", help="Folder of runs, tables and figures; continues an earlier one there.")
 WORKERS = click.option("--workers", type=int, default=2, show_default=True, metavar="N", help="Processes.")
 CLIPS = click.option(
@@ -49,15 +51,19 @@ def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> No
 @reproduce_group.command("sapso")
 @CLIPS
 @click.option("--seeds", type=int, default=10, show_default=True, help="Tracks of each method, motion and view.")
-@click.option("--quick", is_flag=True, help="30 frames from one view and two seeds.")
+@click.option(
+    "--quick",
+    is_flag=True,
+    help=f"{QUICK['frames']} frames, {len(QUICK['views'])} views and {QUICK['seeds']} seeds.",
+)
 @OUT
 @WORKERS
 @JSON
 def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, workers: int, as_json: bool) -> None:
     """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
-    from posefit_reproduce.sapso.experiment import QUICK, Scale
+    from posefit_reproduce.sapso.experiment import Scale
 
-    _print(paper_experiment(clips, QUICK if quick else Scale(seeds)), out, workers, as_json)
+    _print(paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers, as_json)
 
 
 def _print(experiment: "Experiment", out: str | None, workers: int, as_json: bool) -> None:
@@ -99,6 +105,7 @@ def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
     """Return the paper's experiment on CMU clips of a folder, or of the library. Raises InputError where clips lack."""
     from posefit_reproduce.experiment import Experiment
     from posefit_reproduce.sapso.experiment import loaded, perform
+    from posefit_reproduce.sapso.motions import digests
     from posefit_reproduce.sapso.tables import Analysis, paper_tables
 
     analysis = partial(Analysis, motions=loaded(clips, scale.frames))
@@ -107,6 +114,7 @@ def paper_experiment(clips: str | None, scale: Any) -> "Experiment":
         partial(perform, clips, scale),
         lambda results: paper_tables(analysis(results)),
         lambda results: import_module("posefit_reproduce.sapso.figures").paper_figures(analysis(results)),
+        {"frames": scale.frames, "iterations": scale.iterations, "clips": digests(clips)},
     )
 
 

@@ -8,7 +8,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -19,12 +19,16 @@ import cv2
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.cli.output import say
 from posefit.errors import InputError
 from posefit.files import new_file
+from posefit.output.identity import difference, digest_of
+from posefit.reading import parsed_json, read_text
 from posefit.statistics.means import Mean, mean_interval
 from posefit.version import posefit_build
 from posefit_reproduce.jobs import Progress, each
 
+RECORD, MAX_RECORD_BYTES = "runs.json", 100_000
 LEVEL = 0.95  # of an interval, or of all the intervals of a table of claims together
 Arrays = Mapping[str, Any]
 Verdict = Literal["holds", "fails", "not decided"]
@@ -150,13 +154,14 @@ class Experiment:
     perform: Callable[[Run], Arrays]
     tables: Callable[[Results], Iterable[Table]]
     figures: Callable[[Results], Iterable[tuple[str, Any]]]  # by names of files: matplotlib's figures, or images
+    shared: Mapping[str, Any] = field(default_factory=dict)  # what all runs depend on, beside their names
 
 
 def reproduce(experiment: Experiment, out: str | Path | None, workers: int, progress: Progress | None) -> list[Table]:
     """Return the tables of an experiment; with a folder, write them, the figures and report.json there, too.
 
-    Runs that the folder holds are not run again. Raises InputError where it holds something else or cannot be written,
-    and ImportError where the library that draws figures is not installed.
+    Runs that the folder holds are not run again. Raises InputError where it holds something else, or runs that depend
+    on something else, or cannot be written; and ImportError where the library that draws figures is not installed.
     """
     if out is not None:
         from posefit.report.figures import library
@@ -172,6 +177,7 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
             raise InputError(f"{folder}: expected a folder to write to, got {error.strerror}") from error
         files = {run: folder / "runs" / f"{run.file}.npz" for run in experiment.runs}
         jobs = {run: partial(_store, experiment.perform, run, file) for run, file in files.items() if not file.exists()}
+        _check_record(folder, experiment.shared, bool(jobs))
         if jobs:
             each(jobs, workers, progress)
         results = Results({run: _stored(file) for run, file in files.items()})
@@ -184,6 +190,31 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
                 else:
                     figure.savefig(folder / name, dpi=130)
     return tables
+
+
+def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None:
+    """Raise InputError where runs of a folder depend on something else; record what they do where none is there.
+
+    A build counts only where runs are added to others.
+    """
+    file = folder / RECORD
+    now = {name: digest_of(value) for name, value in {**shared, "build": posefit_build()}.items()}
+    if not file.exists():
+        if any((folder / "runs").iterdir()):
+            say(f"warning: {file}: there is none, so that what the runs depend on is not checked")
+        else:
+            file.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
+        return
+    try:
+        before = parsed_json(read_text(file, MAX_RECORD_BYTES))
+    except ValueError:
+        before = None
+    if not isinstance(before, dict) or not all(isinstance(value, dict) for value in before.values()):
+        raise InputError(f"{file}: expected what all runs have in common, got something else")
+    if not adding:
+        before, now = ({name: value[name] for name in value if name != "build"} for value in (before, now))
+    if changed := difference(before, now):
+        raise InputError(f"{folder}: {changed}")
 
 
 def _store(perform: Callable[[Run], Arrays], run: Run, file: Path) -> Path:

@@ -144,8 +144,8 @@ def _arguments(options: dict[str, Any], kind: "Kind | None" = None) -> dict[str,
     from posefit.tracking.defaults import completed
     from posefit.tracking.options import TrackOptions
 
-    source = options["source"] = options["source"] or ("walk",)
-    kind = kind or kind_of(source[0])
+    source = options["source"] or ("walk",)
+    options, kind = {**options, "source": source}, kind or kind_of(source[0])
     options["extraction"] = extraction_of(options, kind)
     if left_out := options.pop("without_subject"):
         chosen = TrackOptions(**{name: options[name] for name in ("method", "settings", "train")})

@@ -58,19 +58,19 @@ Table = dict[str, Array]  # (T,) a column, by the names of `FRAME`; NaN where a 
 
 
 def unseen(table: Table) -> set[int]:
-    """Return the numbers of the frames that were held or are called lost, whose places no file has."""
-    return set(np.flatnonzero((table["usable"] == 0.0) | (table["lost"] >= LOST)).tolist())
+    """Return the frames that were held or are called lost, whose places no file has: their numbers as filmed."""
+    return set(table["frame"][(table["usable"] == 0.0) | (table["lost"] >= LOST)].tolist())
 
 
 def evaluated(
-    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float, clock: Array
+    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array | None, beta: float, clock: Array
 ) -> tuple[Table, Measures]:
     """Return a column for each figure of a frame, and what the whole track is worth.
 
     Baselines have the true root and translation, which a tracker has not: `mean_pose`, the mean of the training poses
-    (n, 63); `persistence`, the true pose of the first frame; `nearest`, the training pose of least cost in each frame.
-    `prior_floor` is the truth's own projection into the prior, which is no floor where a prior is not linear. `clock`
-    (2,) is how many seconds and CPU seconds the track took.
+    (n, 63), which only the errors against a truth need; `persistence`, the true pose of the first frame; `nearest`, the
+    training pose of least cost in each frame. `prior_floor` is the truth's own projection into the prior, which is no
+    floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took.
     """
     held = np.array([not observation.usable for observation in scene.observations])
     cost, iou = np.array([frame.cost for frame in frames]), _iou(scene, frames)
@@ -115,10 +115,11 @@ def _iou(scene: Scene, frames: Sequence[Frame]) -> Array:
 
 
 def _errors(
-    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array, beta: float
+    scene: Scene, frames: Sequence[Frame], prior: Prior | None, training: Array | None, beta: float
 ) -> tuple[Table, dict[str, Any]]:
     if scene.truth is None:
         return {}, {}
+    assert training is not None
     truth, places, skeleton = scene.truth.poses, scene.truth.translations, scene.body.skeleton
     estimate = scene.motion(frames)
     poses, joints, true_joints = estimate.poses, estimate.joints, scene.truth.joints  # the given body may be another

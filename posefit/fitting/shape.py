@@ -16,7 +16,7 @@ from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES, kind
-from posefit.silhouette.cost import areas, mismatch
+from posefit.silhouette.cost import BETA, pose_costs
 
 LENGTHS = {
     "hips": ("hipjoint",),
@@ -138,24 +138,24 @@ def fit_shape(
     *,
     height: float | None = None,
     aligned: bool = True,
+    beta: float = BETA,
 ) -> Shape:
     """Return the shape that fits all observations best, fitted in turns with their poses.
 
     `follow` tracks the observations with a body. With a `height` in metres the person is so tall; one camera alone
-    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. How
-    uncertain the factors are is not known yet: their `spread` is that of all people.
+    cannot show how large a person is. Where poses are `aligned`, so are those of every body that is tried. `beta`
+    is that of the cost. How uncertain the factors are is not known yet: their `spread` is that of all people.
     """
 
     def cost(factors: Array) -> float:
-        """Return the mean mismatch over the frames, whose poses are held."""
+        """Return the mean cost of the frames, whose poses are held."""
         tried, total = shaped(body, factors, height), 0.0
         for frame, observation in zip(frames, observations, strict=True):
             pose, translation, silhouettes = frame.pose[None], frame.translation[None], observation.silhouettes
             if aligned:
                 translation = align(tried, cameras, silhouettes, pose, translation)
-            for camera, silhouette in zip(cameras, silhouettes, strict=True):
-                total += float(mismatch(areas(tried, camera, silhouette, pose, translation))[0])
-        return total / (len(observations) * len(cameras))
+            total += float(pose_costs(tried, cameras, silhouettes, pose, translation, beta)[0][0])
+        return total / len(observations)
 
     factors = np.ones(len(NAMES))
     for width, generations in ROUNDS:

@@ -1,6 +1,7 @@
-"""Weights of costs, how many samples they are worth, and probabilities of odds."""
+"""Weights of costs, how many samples they are worth, resampling by them, and probabilities of odds."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 
@@ -23,6 +24,15 @@ def weigh(costs: Array, sharpness: float) -> Array:
 def effective_sample_size(weights: Array) -> float:
     """Return how many equal weights are worth as much as these (n,): 1 over the sum of squares, where they sum to 1."""
     return float(weights.sum() ** 2 / (weights**2).sum())
+
+
+def systematic_rows(weights: Array, u: float, count: int) -> NDArray[np.int64]:
+    """Return `count` rows, each as often as its weight times `count`, rounded up or down: systematic resampling.
+
+    `u` in [0, 1) is the offset of the evenly spaced points.
+    """
+    rows = weights.cumsum().searchsorted((np.arange(count) + u) / count, side="right")
+    return np.asarray(np.minimum(rows, np.flatnonzero(weights)[-1]))
 
 
 def logistic(log_odds: Array) -> Array:

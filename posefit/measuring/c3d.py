@@ -25,13 +25,13 @@ _ICONS = {"Foot Strike": 1, "Foot Off": 2}
 
 
 def write_c3d(path: str | Path, motion: Motion, blank: Collection[int] = (), gait: Gait | None = None) -> None:
-    """Write the 27 joints of every frame as points named by `PLACES`, y up; of `blank` frames none.
+    """Write the 27 joints of every frame as points named by `PLACES`, y up; of `blank` frames, by number, none.
 
     Strikes and toe-offs of `gait` are the file's events, the first 255 of them.
     """
     joints = motion.joints * MILLIMETRES
     points = np.concatenate([joints, np.zeros((*joints.shape[:2], 1))], axis=2).astype("<f4")
-    points[sorted(blank)] = (0.0, 0.0, 0.0, -1.0)
+    points[[number - motion.first for number in blank]] = (0.0, 0.0, 0.0, -1.0)
     parameters, start = b"", 0
     while start != 2 + len(parameters) // BLOCK:  # where the points start is a parameter itself
         start = 2 + len(parameters) // BLOCK

@@ -93,7 +93,7 @@ class Gait:
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
-    """Return the gait of a motion; `unknown` frames, such as held or lost ones, count for nothing."""
+    """Return the gait of a motion; `unknown` frames, by number, such as held or lost ones, count for nothing."""
     if motion.fps < MIN_FPS:
         return Gait(why=f"fewer than {MIN_FPS:g} frames a second")
     events = gait_events(motion)
@@ -101,7 +101,7 @@ def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
         ((events.pelvis[1:] - events.pelvis[:-1]) * events.heading[1:]).sum() / max(len(motion) - 1, 1) * motion.fps
     )
     in_place = abs(speed) < MIN_SPEED
-    steps = list(_steps(events, motion.fps, motion.first, set(unknown), in_place))
+    steps = list(_steps(events, motion.fps, motion.first, {number - motion.first for number in unknown}, in_place))
     if why := _why_not(motion, events, steps, speed, (len(motion) - len(unknown)) / motion.fps):
         return Gait(steps=steps, why=why)
     left, right = (_of_foot([step for step in steps if step.foot == side]) for side in SIDES)
@@ -235,7 +235,7 @@ def stride_curves(motion: Motion, gait: Gait, angle: str) -> dict[str, Array]:
 
 
 def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np.bool_]:
-    """Return in which frames (T,) the root faces away from its way; `unknown` frames count for nothing.
+    """Return in which frames (T,) the root faces away from its way; `unknown` frames, by number, count for nothing.
 
     The way of a frame is that of the half second about it, over the ground, as far as all of it is known. A person who
     moves slower than 0.3 m/s has none. A heading is away from the way where it lies more than 90 degrees from it.
@@ -247,7 +247,7 @@ def walks_backwards(motion: Motion, unknown: Collection[int] = ()) -> NDArray[np
     yaws, ground = motion.poses[half : count - half, 0], motion.translations[:, [0, 2]]
     way = ground[2 * half :] - ground[: -2 * half]
     away = np.asarray((way * np.column_stack([np.sin(yaws), np.cos(yaws)])).sum(axis=1) < 0.0)
-    frame_known = np.isin(np.arange(count), [*unknown], invert=True)
+    frame_known = np.isin(motion.first + np.arange(count), [*unknown], invert=True)
     known = np.asarray(sliding_window_view(frame_known, 2 * half + 1).all(axis=1))
     fast = np.linalg.norm(way, axis=1) > MIN_TRAVEL_SPEED * 2 * half / motion.fps
     back[half : count - half] = away & fast & known

@@ -26,14 +26,14 @@ def import_pandas() -> Any:
 
 
 def write_angles(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
-    """Write one row a frame of the clinical angles in degrees; of `blank` frames nothing but the time."""
+    """Write one row a frame of the clinical angles in degrees; of those numbered in `blank` only the time."""
     angles = clinical_angles(motion.skeleton, motion.poses)
     with Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["frame", "seconds", *angles])
         for k, row in enumerate(np.column_stack(list(angles.values()))):
-            cells = ["" if k in blank or np.isnan(value) else f"{value:.3f}" for value in row]
             number = motion.first + k
+            cells = ["" if number in blank or np.isnan(value) else f"{value:.3f}" for value in row]
             writer.writerow([number, f"{number / motion.fps:.6f}", *cells])
 
 
@@ -47,7 +47,7 @@ def write_gait(path: str | Path, gait: Gait) -> None:
 
 
 def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> None:
-    """Write the 27 joints of every frame as markers, in metres and y up; of `blank` frames nothing but the time.
+    """Write the 27 joints of every frame as markers, in metres and y up; of those numbered in `blank` only the time.
 
     Markers are named by `PLACES`. OpenSim and similar programs take an empty field for an unobserved marker.
     """
@@ -63,7 +63,7 @@ def write_trc(path: str | Path, motion: Motion, blank: Collection[int] = ()) -> 
         "",
     ]
     for k, points in enumerate(motion.joints):
-        values = "\t".join("" if k in blank else f"{value:.6f}" for value in points.reshape(-1))
         number = motion.first + k
+        values = "\t".join("" if number in blank else f"{value:.6f}" for value in points.reshape(-1))
         lines.append(f"{number + 1}\t{number / motion.fps:.6f}\t{values}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

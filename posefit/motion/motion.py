@@ -83,13 +83,15 @@ class Motion:
         """Return the motion at another rate, over the times k / fps that lie within it.
 
         Where the old rate is a whole multiple k of the new one, every k-th frame is taken as it is. Elsewhere joint
-        angles and translations are interpolated linearly, and the root's rotation along the shortest arc.
+        angles and translations are interpolated linearly, and the root's rotation along the shortest arc. `first` is
+        the nearest whole number at the new rate.
         """
         fps = _rate(fps)
         ratio = self.fps / fps
-        step = round(ratio)
+        step, first = round(ratio), round(self.first / ratio)
         if step >= 1 and abs(ratio - step) < 1e-9 * step:
-            return replace(self, poses=self.poses[::step], translations=self.translations[::step], fps=fps)
+            poses, translations = self.poses[::step], self.translations[::step]
+            return replace(self, poses=poses, translations=translations, fps=fps, first=first)
         last = len(self) - 1
         if last / ratio >= LONGEST:
             came = f"{last / ratio:.3g} frames at {fps:g} fps"
@@ -97,7 +99,7 @@ class Motion:
         # in frames of this motion; the last time may be off by rounding
         times = np.minimum(np.arange(int(last / ratio + SAME_TIME) + 1) * ratio, last)
         if last == 0:
-            return replace(self, fps=fps)
+            return replace(self, fps=fps, first=first)
         poses, translations = at_frames(self.poses, times), at_frames(self.translations, times)
         from scipy.spatial.transform import Rotation, Slerp  # a quarter of a second to import
 
@@ -106,7 +108,7 @@ class Motion:
         angles = np.unwrap(root_angles_from_rotation(between), axis=0)
         turns = np.round((self.poses[0, :3] - angles[0]) / (2.0 * np.pi))
         poses[:, :3] = angles + 2.0 * np.pi * turns
-        return replace(self, poses=poses, translations=translations, fps=fps)
+        return replace(self, poses=poses, translations=translations, fps=fps, first=first)
 
 
 def at_frames(series: Array, times: Array | float) -> Array:

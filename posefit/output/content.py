@@ -35,7 +35,7 @@ class Content:
 
     @cached_property
     def blank(self) -> set[int]:
-        """The frames of which nothing is known."""
+        """The frames of which nothing is known: their numbers as filmed."""
         return unseen(self.table)
 
     @cached_property

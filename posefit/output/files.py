@@ -53,9 +53,10 @@ def _write_table(path: Path, content: Content) -> None:
         writer = csv.writer(file)
         writer.writerow([*content.table, "activity", *names])
         for k, (frame, points) in enumerate(zip(content.frames, content.motion.joints, strict=True)):
+            number = content.scene.first + k
             values = [column[k].item() for column in content.table.values()]
             cells = ["" if np.isnan(value) else value for value in values]
-            places = ("" if k in content.blank else f"{value:.6f}" for value in points.reshape(-1))
+            places = ("" if number in content.blank else f"{value:.6f}" for value in points.reshape(-1))
             writer.writerow([*cells, frame.activity, *places])
 
 

@@ -176,8 +176,8 @@ def _read_record(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
             break
         frames.append(frame)
         whole_lines.append(line)
-    if frames:
-        path.write_bytes(b"".join(whole_lines))
+    if (whole := b"".join(whole_lines)) != recorded:
+        path.write_bytes(whole)
     return frames, state, damage
 
 

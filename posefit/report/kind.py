@@ -13,7 +13,7 @@ from posefit.arrays import Array
 from posefit.report.columns import Column, Score
 from posefit.statistics.intervals import MIN_RESAMPLES, RESAMPLES
 from posefit.statistics.pairing import Shared
-from posefit.statistics.ranks import Comparison, wilcoxon
+from posefit.statistics.ranks import PairedTest, wilcoxon
 
 BOOTSTRAP_SEED = 2013
 WORK = 1e8  # numbers that the resamples of one study may come to
@@ -145,7 +145,7 @@ class Contest(Shared):
         return bool(min(self.tested_errors().shape[:2]) > 1)
 
     @cached_property
-    def comparisons(self) -> list[Comparison]:
+    def comparisons(self) -> list[PairedTest]:
         """The paired tests of all methods, by their places in `methods`; none where too few runs are shared."""
         return wilcoxon(self.tested_errors()) if self.testable else []
 

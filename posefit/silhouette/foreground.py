@@ -105,15 +105,15 @@ def mean_background(images: Iterable[Image]) -> Still:
 
 
 def median_background(images: Iterable[Image]) -> Still:
-    """Return the background that is the median of some images, before which a person may walk; at most 40 are kept.
+    """Return the background that is the median of some images, before which a person may walk.
 
-    Raises InputError where there is none.
+    All are in memory together. Raises InputError where there is none.
     """
-    kept = np.stack(list(images)) if not isinstance(images, np.ndarray) else images
-    if not len(kept):
+    stack = np.stack(list(images)) if not isinstance(images, np.ndarray) else images
+    if not len(stack):
         raise InputError("background must hold at least one frame, got none")
-    middle = np.median(kept, axis=0).astype(np.float32)
-    away = np.median(np.abs(kept.astype(np.float32) - middle), axis=0).max(axis=-1)
+    middle = np.median(stack, axis=0).astype(np.float32)
+    away = np.median(np.abs(stack.astype(np.float32) - middle), axis=0).max(axis=-1)
     return Still(middle, (1.4826 * away).astype(np.float32))
 
 

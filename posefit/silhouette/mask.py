@@ -76,6 +76,7 @@ class Silhouette:
     valid: Mask = field(repr=False)  # (height, width)
     scale: int = 1  # every so many pixels of every so many rows of the full-size silhouette
     device: str = "cpu"  # where poses are drawn to be compared with it
+    full_extent: tuple[float, ...] = field(default=(), repr=False)  # at full size, in these pixels; () where it is
 
     @classmethod
     def of(cls, mask: NDArray[np.generic], valid: NDArray[np.generic] | None = None) -> "Silhouette":
@@ -121,6 +122,9 @@ class Silhouette:
 
         Small pieces that lie apart are not the person: a stray pixel would move them by half its distance.
         """
+        if self.full_extent:
+            left, top, right, bottom = self.full_extent
+            return left, top, right, bottom
         if not self.mask.any():
             return (np.nan,) * 4
         left, top, right, bottom = box_of(without_small_pieces(self.mask))
@@ -153,10 +157,10 @@ def coarser_silhouette(silhouette: Silhouette, factor: int) -> Silhouette:
     """
     first = _first(factor, silhouette.size)
     mask, valid = (pixels[first::factor, first::factor] for pixels in (silhouette.mask, silhouette.valid))
-    coarse = replace(Silhouette.of(mask, valid), scale=silhouette.scale * factor, device=silhouette.device)
     # the full-size borders, so that poses aligned to them stand where they stand at full size
-    vars(coarse)["extent"] = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
-    return coarse
+    extent = tuple((np.array(silhouette.extent) - first - 0.5) / factor + 0.5)
+    scale, device = silhouette.scale * factor, silhouette.device
+    return replace(Silhouette.of(mask, valid), scale=scale, device=device, full_extent=extent)
 
 
 def _first(factor: int, size: tuple[int, int]) -> int:

@@ -26,7 +26,7 @@ _SHAPE = ("methods", "instances", "seeds")
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairedTest:
     """Two methods by Wilcoxon's signed ranks."""
 
     first: int
@@ -38,7 +38,7 @@ class Comparison:
     adjusted: float  # Holm's, for all comparisons made together
 
 
-def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) -> list[Comparison]:
+def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) -> list[PairedTest]:
     """Return two-sided paired comparisons of all, or of some, pairs of methods; errors (methods, instances, seeds).
 
     Blocks in which both are equal are ranked but count for neither (Pratt, 1959). The p-value is exact for up to 50
@@ -54,7 +54,7 @@ def wilcoxon(errors: ArrayLike, pairs: Sequence[tuple[int, int]] | None = None) 
     differences = [(array[first] - array[second]).ravel() for first, second in chosen]
     p_values = [_signed_rank(values) for values in differences]
     return [
-        Comparison(*pair, float(np.median(values)), *_median_interval(values), p_value, adjusted)
+        PairedTest(*pair, float(np.median(values)), *_median_interval(values), p_value, adjusted)
         for pair, values, p_value, adjusted in zip(chosen, differences, p_values, holm(p_values).tolist(), strict=True)
     ]
 

@@ -118,8 +118,8 @@ class TrackCell(Cell):
 
     @property
     def total_evaluations(self) -> int:
-        """The evaluations of all frames."""
-        return self.frames * self.evaluations
+        """The evaluations of all frames, by every hypothesis."""
+        return self.hypotheses * self.frames * self.evaluations
 
     def measure(self) -> CellResult:
         """Track the motion. Raises ValueError where a file has changed since it was planned."""

@@ -39,7 +39,8 @@ def evaluate(
     posteriors = [frame.posterior for frame in frames]
     posteriors = [None if each is None else replace(each, modes=modes_of(skeleton, each)) for each in posteriors]
     frames = [replace(frame, posterior=each) for frame, each in zip(frames, posteriors, strict=True)]
-    table, measures = evaluated(scene, frames, method.prior, task.angles, method.audit.beta, clock)
+    training = None if scene.truth is None else task.angles
+    table, measures = evaluated(scene, frames, method.prior, training, method.audit.beta, clock)
     trust = None
     if scene.truth is None:
         trust = trust_of(scene, tracked.frames, frames, table, measures.iou, task.training)
@@ -89,6 +90,6 @@ def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> S
 
 
 def _numbers(table: Table, name: str, least: float) -> list[int] | None:
-    """Return the frames that have so much or more in a column; None where all are unknown."""
+    """Return the frames that have so much or more in a column, by their numbers; None where all are unknown."""
     values = table[name]
     return None if np.isnan(values).all() else table["frame"][values >= least].tolist()

@@ -129,8 +129,6 @@ def _check_truth(options: TrackOptions, known: bool, motions: Sequence[Footage])
         return
     if options.asf is not None and not captured:
         raise InputError(f"asf must be given for .amc files and footage only, got {quoted(str(options.asf))}")
-    if options.restarts == 0:
-        raise InputError("restarts must be at least 1 for a motion, where it is 1 by default, got 0")
 
 
 def _identity(sources: Sequence[Footage], options: TrackOptions, train: Sequence[Source]) -> dict[str, Digest]:

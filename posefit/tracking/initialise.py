@@ -9,19 +9,27 @@ import numpy as np
 from posefit.arrays import Array
 from posefit.fitting.driving import clocks
 from posefit.fitting.shape import Shape, fit_shape
-from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
+from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
 from posefit.motion.motion import Motion
 from posefit.progress import Progress
-from posefit.reading import counted
 from posefit.settings import POPULATION_SIZE
+from posefit.silhouette.cost import BETA
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import TRIAL_STRIDE, Follow, best_restart, first_shown_whole, usable_observations
+from posefit.tracking.restarts import (
+    TRIAL_FRAMES,
+    TRIAL_STRIDE,
+    Follow,
+    best_restart,
+    first_shown_whole,
+    usable_observations,
+)
 
 MIN_BODY_FRAMES = 5
 WARM_UP_POPULATIONS = 8
+NEAR_SECONDS = 0.5  # ours: within which a walker hardly turns farther than a search reaches, 45 degrees
 
 
 def task_of(scene: Scene, options: TrackOptions, training: Sequence[Motion]) -> Task:
@@ -55,12 +63,8 @@ def initialise(
     _warm_up(method, task, scene)
     start, shape, body_frames = clocks(), None, options.body_frames
     if options.restarts:
-        first = usable_observations(scene.observations, 1)
-        modes = guessed_modes(task, first[0]) if first else []
-        tried = counted(min(len(modes), options.restarts), "pose")
-        where = f"around at most {tried} with such a silhouette" if modes else "anywhere"
-        progress.log(f"looking for the first pose {where}")
-        task, _ = best_restart(task, scene.observations, method.follow, options.restarts, options.seed)
+        searched = scene.observations, method.follow, options.restarts, options.seed
+        task, _ = best_restart(task, *searched, log=progress.log)
     if body_frames and (count := len(usable_observations(scene.observations, body_frames))) < MIN_BODY_FRAMES:
         few = f"{count} of them show enough of the person" if count < body_frames else f"{count} are too few"
         needed = f"at least {MIN_BODY_FRAMES} are needed; it is the average"
@@ -69,29 +73,50 @@ def initialise(
         progress.log(f"fitting the person's build to {body_frames} frames")
         alone = len(scene.cameras) == 1 and task.translation == "aligned"
         height = options.height or (task.body.stature if alone else None)
-        shape = fitted_build(task, scene.observations, method.follow, body_frames, height, options.seed)
+        fitted = scene.observations, method.follow, body_frames, height, options.seed
+        shape = fitted_build(task, *fitted, beta=method.audit.beta, restarts=options.restarts or 0)
         task = replace(task, body=shape.body)
     return task, shape, start
 
 
 def fitted_build(
-    task: Task, observations: Sequence[Observation], follow: Follow, frames: int, height: float | None, seed: int
+    task: Task,
+    observations: Sequence[Observation],
+    follow: Follow,
+    frames: int,
+    height: float | None,
+    seed: int,
+    *,
+    beta: float = BETA,
+    restarts: int = 0,
 ) -> Shape:
     """Return the person's build, from the first usable frames: every third, where there are so many.
 
-    It begins with the first frame that shows most: a person who comes in is cut, and visible to few cameras.
+    It begins with the first frame that shows most: a person who comes in is cut, and visible to few cameras. By then
+    they may have turned from the pose that the task begins with. Where that is longer ago than `NEAR_SECONDS`, the pose
+    is searched again, with so many `restarts`, or by the tracker itself.
     """
-    stride = TRIAL_STRIDE
-    chosen = usable_observations(observations, frames, stride, first_shown_whole(observations))
+    stride, whole = TRIAL_STRIDE, first_shown_whole(observations)
+    chosen = usable_observations(observations, frames, stride, whole)
     if len(chosen) < frames:
         chosen, stride = usable_observations(observations, frames), 1
+    elif whole - _first_usable(observations) > NEAR_SECONDS * task.fps:
+        task = replace(task, yaw=observations[whole].yaw, first_pose=None, modes=(), before=())
+        if restarts:
+            reach = min(whole + TRIAL_FRAMES * TRIAL_STRIDE, len(observations))
+            ahead = [observations[k] for k in range(whole, reach)]
+            task, _ = best_restart(task, ahead, follow, restarts, seed)
     task = replace(task, fps=task.fps / stride)
 
     def frames_of(body: Body) -> list[Frame]:
         return list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
 
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
-    return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned)
+    return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
+
+
+def _first_usable(observations: Sequence[Observation]) -> int:
+    return next((k for k, observation in enumerate(observations) if observation.usable), 0)
 
 
 def _warm_up(method: Method, task: Task, scene: Scene) -> None:

@@ -25,6 +25,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion.steadiness import runs
+from posefit.reading import counted
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.trajectory import Tracked, mean_cost, with_effort_of, with_total_effort
 from posefit.uncertainty.modes import Posterior
@@ -97,6 +98,7 @@ def best_restart(
     restarts: int,
     seed: int | Sequence[int],
     going_on: Task | None = None,
+    log: Callable[[str], None] = lambda _message: None,
 ) -> tuple[Task, list[Frame]]:
     """Return the task with the best of several restarts as the frame before the first, and all frames of the trial.
 
@@ -104,7 +106,7 @@ def best_restart(
     guessed, anywhere, at all yaws where none is known. It then follows the person through a few more
     frames. The least mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution,
     and the first frame is then searched once more in the whole one, around the best. A task that is `going_on` is
-    followed beside the restarts, and is returned where none of them is better.
+    followed beside the restarts, and is returned where none of them is better. `log` takes where they search.
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
@@ -122,6 +124,8 @@ def best_restart(
         tried += follow(on, compared, np.random.default_rng([*prefix, restarts + 1]))
         least = _trial_cost(tried)
     modes = [mode for weight, mode in guessed_modes(task, chosen[0])[:restarts] if weight >= MIN_WEIGHT]
+    where = f"around {counted(len(modes), 'pose')} with such a silhouette" if modes else "anywhere"
+    log(f"looking for the first pose {where}")
     for k, start in enumerate([around(trial, mode) for mode in modes] or [trial] * restarts):
         frames = list(follow(start, compared, np.random.default_rng([*prefix, k])))
         tried += frames

@@ -123,7 +123,7 @@ class Track:
 
     @property
     def unseen(self) -> set[int]:
-        """The numbers of the frames that were held or are called lost."""
+        """The frames that were held or are called lost: their numbers as filmed, as in `log.lost_frames`."""
         return unseen(self.table)
 
     @property
@@ -161,7 +161,7 @@ class Track:
         from posefit.measuring.angles import clinical_angles
 
         angles = clinical_angles(self.motion.skeleton, self.motion.poses)
-        blank = np.isin(np.arange(len(self)), list(self.unseen))
+        blank = np.isin(self.table["frame"], list(self.unseen))
         return {name: np.where(blank, np.nan, values) for name, values in angles.items()}
 
     def to_pandas(self) -> "pd.DataFrame":

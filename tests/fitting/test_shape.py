@@ -7,13 +7,13 @@ import pytest
 
 from posefit.fitting import shape
 from posefit.fitting.problem import align
-from posefit.fitting.shape import COVARIANCE, GIRTHS, LENGTHS, NAMES, PULL, fit_shape, shaped
+from posefit.fitting.shape import COVARIANCE, GIRTHS, LENGTHS, NAMES, PULL, Shape, fit_shape, shaped
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.body import Body, varied
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES
 from posefit.motion import built_in
-from posefit.silhouette.cost import project
+from posefit.silhouette.cost import pose_costs, project
 from posefit.silhouette.mask import Silhouette
 
 AVERAGE = Body.of(built_in.average_skeleton())
@@ -115,3 +115,24 @@ def test_one_camera_that_aligns_takes_the_height_as_known() -> None:
     frames, rng = frames_at(places), np.random.default_rng(0)
     shape = fit_shape(AVERAGE, [camera], observations, lambda _: frames, rng, height=1.55)
     assert shape.body.stature == pytest.approx(1.55)
+
+
+def test_a_camera_that_knows_nothing_does_not_count_and_beta_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("posefit.fitting.shape.ROUNDS", ((0.5, 1),))
+    cameras = [Camera.around(WALK.translations.mean(axis=0), azimuth, 3.5, (80, 60)) for azimuth in (0.0, np.pi / 2)]
+    nothing = Silhouette.of(*np.zeros((2, 60, 80), dtype=bool))
+    observations = observed(AVERAGE.scaled(1.2, 1.2), cameras[:1])
+    blind = [Observation([*observation.silhouettes, nothing]) for observation in observations]
+    frames = frames_at(PLACES)
+
+    def fit(count: int, observations: list[Observation], **known: float) -> Shape:
+        rng = np.random.default_rng(0)
+        return fit_shape(AVERAGE, cameras[:count], observations, lambda _: frames, rng, aligned=False, **known)
+
+    alone, both = fit(1, observations), fit(2, blind)
+    assert both.cost == alone.cost < 50.0
+    np.testing.assert_array_equal(both.factors, alone.factors)
+    missed = fit(1, observations, beta=1.0)
+    rows = zip(observations, POSES[:, None], PLACES[:, None], strict=True)
+    costs = [pose_costs(missed.body, cameras[:1], seen.silhouettes, pose, place, 1.0)[0] for seen, pose, place in rows]
+    assert missed.cost == pytest.approx(np.mean(costs))

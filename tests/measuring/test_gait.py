@@ -275,3 +275,13 @@ def test_a_track_of_no_walk_reports_why_and_a_single_frame_nothing() -> None:
     assert summary["gait"]["walk"] is False
     assert "no figures of gait: no strikes of a foot detected" in table(summary).splitlines()
     assert "gait" not in table(posefit.fit("walk", **quick).summary)
+
+
+def test_unknown_frames_have_their_numbers_as_filmed() -> None:
+    motion = walker(fps=30.0)
+    later = replace(motion, first=1000)
+    holed, shifted = gait_of(motion, {100}), gait_of(later, {1100})
+    assert figures(shifted) == figures(holed) != figures(gait_of(motion))
+    assert gait_of(later, {100}).left.steps == gait_of(motion).left.steps
+    back = turned(180.0)
+    np.testing.assert_array_equal(walks_backwards(replace(back, first=7), {37}), walks_backwards(back, {30}))

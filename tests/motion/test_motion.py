@@ -132,3 +132,10 @@ def test_the_lowest_place_of_the_feet_is_the_ground_wherever_that_is() -> None:
     rising = still(300)
     rising[..., 1] += 0.03 * np.arange(300)[:, None] / 30.0  # 30 cm in ten seconds: a track that drifts
     assert standing(rising, 30.0).all()
+
+
+@each(("fps", "first"), [(30.0, 25), (48.0, 40), (240.0, 200), (36.0, 30)])
+def test_a_resampled_part_begins_at_the_same_second(fps: float, first: int) -> None:
+    part = clip(120).frames(100, 120).resampled(fps)
+    assert (part.first, part.first / part.fps) == (first, pytest.approx(100 / 120.0))
+    assert clip(120).frames(100, 101).resampled(fps).first == first

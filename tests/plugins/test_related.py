@@ -10,8 +10,9 @@ import posefit
 from posefit.geometry.body import Body
 from posefit.plugin import Observation, check_optimiser, check_prior, check_tracker, contour_fit
 from posefit.registry import registry
+from posefit.silhouette.mask import Silhouette
 from posefit.testing.tracker_rules import scene
-from posefit_related.frames import place_of
+from posefit_related.frames import costs_of, frame_of, place_of
 from tests.cases import each
 
 METHODS = ["hpso@pca", "haga@pca", "psopf@pca", "local@pca", "sapso@isomap", "sapso@gplvm"]
@@ -95,3 +96,15 @@ def test_a_pose_is_moved_to_the_contours_of_its_masks() -> None:
     assert error(after) < error(pose)
     assert used == 12 * 27  # never more than twelve steps
     assert contour_fit(task, observations[0], (pose, place), (0.1, 0.003), 60)[2] == 2 * 27
+
+
+def test_a_camera_that_knows_nothing_does_not_count() -> None:
+    task, _, (observation, *_) = scene()
+    nothing = Silhouette.of(*np.zeros((2, task.cameras[0].height, task.cameras[0].width), dtype=bool))
+    blind = replace(observation, silhouettes=[observation.silhouettes[0], nothing])
+    pose, place = task.training[0].poses[:1], task.anchor[None]
+    costs = []
+    for cameras, seen in ((1, replace(observation, silhouettes=observation.silhouettes[:1])), (2, blind)):
+        part = replace(task, cameras=[task.cameras[0]] * cameras)
+        costs += [costs_of(part, seen, pose, place)[0], frame_of(part, seen, pose[0], place[0], 0).cost]
+    assert len(set(costs)) == 1

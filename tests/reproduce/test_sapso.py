@@ -72,7 +72,7 @@ def walk() -> PaperMotion:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Result]]:
     out = tmp_path_factory.mktemp("paper") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("posefit_reproduce.sapso.experiment.QUICK", TINY)
+        patch.setattr("posefit_reproduce.commands.QUICK", vars(TINY))
         yield out, run("--quick", "--out", out)
 
 
@@ -97,6 +97,7 @@ def test_the_folder_holds_runs_tables_and_figures_and_the_command_continues(writ
     assert result.exit_code == 0, result.output
     assert {path.name for path in out.iterdir()} == FIGURES | {f"{name}.md" for name in TABLES} | {
         "runs",
+        "runs.json",
         "report.json",
     }
     for name in FIGURES:
@@ -110,7 +111,7 @@ def test_the_folder_holds_runs_tables_and_figures_and_the_command_continues(writ
     (gone := out / "runs" / "track-walk-sapso_pca-45-1.npz").unlink()
     before = (out / "parts.md").read_text()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("posefit_reproduce.sapso.experiment.QUICK", TINY)
+        patch.setattr("posefit_reproduce.commands.QUICK", vars(TINY))
         assert run("--quick", "--out", out).exit_code == 0
     assert {path for path, time in files.items() if path.stat().st_mtime_ns != time} == {gone}
     assert (out / "parts.md").read_text() == before

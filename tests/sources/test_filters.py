@@ -7,11 +7,11 @@ import pytest
 
 from posefit import Start
 from posefit.arrays import Array
-from posefit.fitting.weights import weigh
+from posefit.fitting.weights import systematic_rows, weigh
 from posefit.testing.toy import Toy
 from posefit_filters.annealed import Annealed
 from posefit_filters.particle import Particle
-from posefit_filters.weighting import sharpness, survival, systematic_rows
+from posefit_filters.weighting import sharpness, survival
 
 
 def test_likelihood_is_an_exponential_of_the_cost() -> None:  # GORDON1993 (likelihood)

@@ -223,6 +223,7 @@ def test_a_cell_has_so_many_hypotheses() -> None:
     assert three["evaluations_used"] == 3 * one["evaluations_used"] == 3 * 2 * 80
     assert three["trace"]["evaluations"][-1] == 3 * one["trace"]["evaluations"][-1]
     assert three["spec"]["hypotheses"] == 3
+    assert cell_of({**SMALL, "hypotheses": 3}).total_evaluations == 3 * 2 * 80 == three["evaluations_used"]
 
 
 def test_a_cell_is_restored_from_its_rows_spec() -> None:

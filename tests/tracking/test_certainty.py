@@ -162,3 +162,17 @@ def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp
         np.testing.assert_allclose(estimate.posterior.poses, frame.posterior.poses, atol=1e-6)
         assert estimate.posterior.recalibration is not None
         np.testing.assert_array_equal(estimate.posterior.recalibration.joint_spreads, SPREAD.joint_spreads)
+
+
+def test_frames_of_which_nothing_is_known_have_their_numbers_as_filmed(scene: Scene, tmp_path: Path) -> None:
+    frames = [replace(frame, lost=0.9 if k == 4 else 0.1) for k, frame in enumerate(exact_frames(scene))]
+    later = replace(scene, first=100)
+    track = tracked(later, frames)
+    assert track.unseen == {104} == set(track.log.lost_frames or ())
+    assert np.flatnonzero(np.isnan(track.angles("left_knee_flexion"))).tolist() == [4]
+    track.save(tmp_path / "out")
+    for name, column in (("frames", "left_knee_x"), ("angles", "left_knee_flexion")):
+        with (tmp_path / "out" / f"{name}.csv").open(newline="") as file:
+            assert [row["frame"] for row in csv.DictReader(file) if row[column] == ""] == ["104"]
+    markers = [line.split("\t") for line in (tmp_path / "out" / "track.trc").read_text().splitlines()[6:]]
+    assert [marker[0] for marker in markers if set(marker[2:]) == {""}] == ["105"]  # which counts from 1

@@ -74,6 +74,22 @@ def test_different_values_have_different_digests(first: Any, second: Any) -> Non
     assert digest_of(first)["digest"] != digest_of(second)["digest"]
 
 
+def test_a_first_frame_that_was_being_written_is_cut_off(tmp_path: Path) -> None:
+    lines = written(tmp_path)["frames"].splitlines(keepends=True)
+    (unfinished,) = (tmp_path / "made").iterdir()
+    file, messages = unfinished / "frames.jsonl", list[str]()
+    file.write_bytes(lines[0][:-9])
+    folder = OutputFolder(tmp_path / "made" / "subject", False, True, SPEC, messages.append)
+    with suppress(KeyboardInterrupt), folder as output:
+        assert output.earlier() == ([], None)
+        with file.open("ab") as record:  # a frame that is tracked now
+            record.write(lines[0])
+        assert len(output.earlier()[0]) == 1
+        raise KeyboardInterrupt
+    assert file.read_bytes() == lines[0]
+    assert not [message for message in messages if message.startswith("warning")]
+
+
 @each(
     ("old", "new", "right", "reason"),
     [

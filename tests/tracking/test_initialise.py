@@ -21,6 +21,8 @@ from posefit.silhouette.mask import Silhouette
 from posefit.tracking.initialise import fitted_build, task_of
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import best_restart, first_shown_whole
+from posefit.uncertainty.modes import Posterior
+from posefit_exemplars.lookup import Lookup
 from tests.cases import each
 from tests.testing import planted
 from tests.tracking.scenes import frame_of, truth_of, walk
@@ -136,3 +138,53 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
     seen = [replace(observations[0], silhouettes=[one]) for one in (unknown, cut, cut, whole)]
     assert first_shown_whole(seen) == 3
     assert first_shown_whole([replace(seen[1], usable=False), seen[2]]) == 1
+
+
+@each(("late", "restarts"), [(10, 0), (20, 0), (20, 1)])
+def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: int) -> None:
+    scene = walk(50, [0.0, 90.0], (80, 60))
+    unknown = Silhouette.of(*np.zeros((2, 60, 80), dtype=bool))
+    observations = [scene.observations[k] for k in range(50)]
+    observations[:late] = [replace(seen, silhouettes=[seen.silhouettes[0], unknown]) for seen in observations[:late]]
+    frame = Frame(truth_of(scene).poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
+    first = replace(frame, pose=truth_of(scene).poses[0])
+    task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])
+    task = replace(task, yaw=0.5, first_pose=first.pose[3:], before=(first,))
+    starts: list[tuple[float | None, tuple[Frame, ...]]] = []
+
+    def follow(task: Task, chosen: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
+        starts.append((task.yaw, tuple(task.before)))
+        return iter([frame] * len(list(chosen)))
+
+    fitted_build(task, observations, follow, 5, None, 0, restarts=restarts)
+    assert scene.fps == 30.0
+    if late < 15:  # half a second
+        assert starts == [(0.5, (first,))] * 2
+    elif not restarts:
+        assert starts == [(None, ())] * 2
+    else:
+        assert starts[0] == (None, ())
+        assert starts[1:] == [(frame.pose[0], (frame,))] * 2
+
+
+def test_the_first_pose_is_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Observation] = []
+    posterior = Lookup.posterior
+
+    def counted(lookup: Lookup, observation: Observation) -> Posterior | None:
+        asked.append(observation)
+        return posterior(lookup, observation)
+
+    monkeypatch.setattr(Lookup, "posterior", counted)
+    scene = walk(2, [90.0], (120, 90))
+    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    posefit.track(masks, method="random@loose", evaluations=40, restarts=1, body_frames=0, smooth=False)
+    assert len(asked) == 2  # once more to compile what a search needs
+
+
+def test_footage_without_a_truth_needs_no_angles_of_the_whole_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Task, "angles", property(lambda task: pytest.fail("all angles were put together")))
+    scene = walk(2, [90.0], (120, 90))
+    masks = [observation.silhouettes[0].mask for observation in scene.observations]
+    track = posefit.track(masks, method="vsmm", evaluations=80, restarts=1, body_frames=0, smooth=False)
+    assert track.truth is None

@@ -197,6 +197,12 @@ def test_every_default_is_completed(motion: Any, options: dict[str, Any], **expe
     assert completed(done, motion) == done
 
 
+def test_what_is_the_default_may_be_given() -> None:
+    brief: dict[str, Any] = {"frames": (0, 2), "evaluations": 80, "size": (80, 60)}
+    default, given = posefit.track("walk", **brief), posefit.track("walk", restarts=0, **brief)
+    np.testing.assert_array_equal(given.motion.poses, default.motion.poses)
+
+
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
@@ -217,4 +223,4 @@ def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_p
     assert "fitting the person's build to 5 frames" in log
     more = {"train": ["walk-a"], "restarts": 1, "body_frames": 0}
     posefit.track(tmp_path / "masks.npz", evaluations=400, progress=Progress(log.append), **more)
-    assert "looking for the first pose around at most 1 pose with such a silhouette" in log
+    assert "looking for the first pose around 1 pose with such a silhouette" in log

@@ -48,7 +48,7 @@ MISUSES: list[tuple[dict[str, Any], str]] = [
     ({"settings": {"tracker.flor": 1.0}}, "a setting of tracker must be one of .*did you mean 'floor'"),
     ({"settings": {"tracker.relocalise_gap": -1}}, "relocalise_gap must be 0 or more, got -1"),
     ({"hypotheses": 0}, "hypotheses must be .* got 0"),
-    ({"restarts": 0}, "restarts must be at least 1 for a motion, where it is 1 by default, got 0"),
+    ({"restarts": -1}, "restarts must be 0 or more, got -1"),
 ]
 
 

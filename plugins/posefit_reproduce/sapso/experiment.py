@@ -78,9 +78,6 @@ class Scale:
                 yield Run(kind, motion, method, view, seed)
 
 
-QUICK = Scale(seeds=2, frames=15, views=(0.0, 45.0), around=(0.0, 45.0))
-
-
 @lru_cache(maxsize=2)
 def loaded(clips: str | Path | None, frames: int) -> Mapping[str, PaperMotion]:
     """Return the motions of `paper_motions`, read once a process."""

@@ -15,6 +15,7 @@ from posefit.footage.masks import Range
 from posefit.footage.scene import Scene, synthetic
 from posefit.motion.clips import load_motion
 from posefit.motion.motion import Motion
+from posefit.sweep.cell import digest_of
 
 SIZE = (320, 240)  # pixels
 FPS = 60.0  # not in the paper; at this rate a clip of a walk has more than the 100 frames, and of a run nearly
@@ -57,6 +58,14 @@ def paper_motions(clips: str | Path | None, frames: int) -> dict[str, PaperMotio
         followed = first.frames(FIRST[name], min(FIRST[name] + frames, len(first)))
         motions[name] = PaperMotion(followed, [motion.frames(1, len(motion)) for motion in others])
     return motions
+
+
+def digests(clips: str | Path | None) -> str | list[str]:
+    """Return what clips are: `library`, or digests of the files of a folder that are read."""
+    if clips is None:
+        return "library"
+    paths = [Path(clips) / f"{clip}.amc" for test, training in CLIPS.values() for clip in (test, *training)]
+    return [digest_of(file)[:8] for path in paths for file in (path, *sorted(path.parent.glob("*.asf")))]
 
 
 def _clip(folder: str | Path | None, clip: str) -> Motion:
