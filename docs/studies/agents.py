@@ -103,13 +103,13 @@ def episodes(policy: Policy, training: Training, count: int, proposals: int = MA
 
 def row_of(training: Training, start: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return a row: the best costs on held-out instances, the proposals, and what the training took."""
-    begun, row = process_time(), training._asdict() | {"curve": [], "proposals": None}
+    start_time, row = process_time(), training._asdict() | {"curve": [], "proposals": None}
     if training.agent in (*SEARCHES, STARTED):
         row["costs"] = searched(training, start)
-        return row | {"cpu_seconds": round(process_time() - begun, 1)}
+        return row | {"cpu_seconds": round(process_time() - start_time, 1)}
     learns = training.agent in LEARNERS
     policy = trained(training, row["curve"]) if learns else constant(training)
-    row["cpu_seconds"] = round(process_time() - begun, 1)
+    row["cpu_seconds"] = round(process_time() - start_time, 1)
     count = MAX_EVALUATIONS if learns or training.agent == "uniform" else 1
     actions, costs = episodes(policy, training, training.instances, count)
     row["costs"] = costs.min(axis=0).tolist()
@@ -173,7 +173,7 @@ def trained(training: Training, curve: list[Any]) -> Policy:
     def act(pictures: Any) -> Array:
         return np.asarray(model.predict(pictures, deterministic=True)[0], dtype=np.float64)
 
-    begun, learning = process_time(), training.budget
+    start_time, learning = process_time(), training.budget
     if "cloning" in training.agent:
         steps = min(CLONING_STEPS, training.budget)
         cloned(model, made(training, ENVIRONMENTS), steps)
@@ -184,7 +184,7 @@ def trained(training: Training, curve: list[Any]) -> Policy:
         def _on_rollout_start(self) -> None:
             if self.num_timesteps >= learning * len(curve) // LOOKS:
                 cost = episodes(act, training, CURVE_INSTANCES)[1].min(axis=0).mean()
-                curve.append([training.budget - learning + self.num_timesteps, cost, process_time() - begun])
+                curve.append([training.budget - learning + self.num_timesteps, cost, process_time() - start_time])
 
         def _on_step(self) -> bool:
             return True

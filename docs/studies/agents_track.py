@@ -92,12 +92,12 @@ def searched(name: str, budget: int, count: int) -> Array:
 
 def row_of(agent: str, budget: int, seed: int, steps: int, count: int) -> dict[str, Any]:
     """Return the costs (n, frames) that an agent or a search commits, and the CPU seconds until it can."""
-    begun = process_time()
+    start = process_time()
     if agent in SEARCHES:
-        return {"costs": searched(agent, budget, count), "cpu_seconds": process_time() - begun}
+        return {"costs": searched(agent, budget, count), "cpu_seconds": process_time() - start}
     rng = np.random.default_rng(seed)
     policy = trained(seed, steps) if agent == "PPO" else lambda _: rng.uniform(-1.0, 1.0, (count, DIMENSIONS))
-    cpu = process_time() - begun
+    cpu = process_time() - start
     return {"costs": committed(policy, count), "cpu_seconds": cpu}
 
 

@@ -145,7 +145,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
     @property
     def episodes(self) -> list[Episode]:
         """What each environment searches. Raises gymnasium.error.ResetNeeded before the first reset."""
-        self._check_begun()
+        self._check_reset()
         return [self._episode(i) for i in range(self.num_envs)]
 
     @property
@@ -167,20 +167,20 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         The option "reset_mask" selects the environments that begin; the others go on.
         """
         check_options(options, ("instance", "reset_mask"))
-        begun = len(self._episodes) == self.num_envs
-        seeds, mask = _seeds(seed, self.num_envs), _reset_mask(options, self.num_envs, begun)
+        running = len(self._episodes) == self.num_envs
+        seeds, mask = _seeds(seed, self.num_envs), _reset_mask(options, self.num_envs, running)
         numbers = _chosen_instances(options, self.num_envs)
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._generators[i] = seeding.np_random(seeds[i])
             self._begin(i, numbers[i])
         observations, infos = self._opened(mask)
-        return observations, self._with_begun(_masked_infos(mask, infos, {}), mask)
+        return observations, self._with_started(_masked_infos(mask, infos, {}), mask)
 
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
         """Step each environment; one whose episode has ended resets instead, or at once by SAME_STEP."""
         actions = self._validator.check(actions, self._shape)
-        self._check_begun()
+        self._check_reset()
         stepping = ~self._ended
         for i in np.flatnonzero(self._ended).tolist():
             self._begin(i, None)
@@ -206,7 +206,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             if going[i]:
                 infos = self._add_info(infos, row, i)
         rewards = np.where(stepping, outcome.rewards, 0.0)
-        return observations, rewards, outcome.terminated, truncated, self._with_begun(infos, ~going)
+        return observations, rewards, outcome.terminated, truncated, self._with_started(infos, ~going)
 
     def _begin(self, i: int, chosen: int | None) -> None:
         """Begin the next episode of environment i, with a chosen instance or another."""
@@ -219,7 +219,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             self._generators[i] = seeding.np_random(None)
         return self._generators[i][0]
 
-    def _check_begun(self) -> None:
+    def _check_reset(self) -> None:
         if len(self._episodes) < self.num_envs:
             raise error.ResetNeeded(NOT_BEGUN)
 
@@ -242,9 +242,9 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
             infos["error_degrees"] = np.degrees(np.abs(wrapped(self._truths - poses))).mean(axis=1)
         return infos
 
-    def _with_begun(self, infos: Infos, begun: Flags) -> Infos:
-        """Return infos with those that only the environments have whose episode has just begun."""
-        for i in np.flatnonzero(begun).tolist():
+    def _with_started(self, infos: Infos, started: Flags) -> Infos:
+        """Return infos with those that only the environments have whose episode has just started."""
+        for i in np.flatnonzero(started).tolist():
             infos = self._add_info(infos, self._begun_infos(i), i)
         return infos
 
@@ -257,14 +257,14 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         """Make environment i begin with an instance."""
 
     @abstractmethod
-    def _opened(self, begun: Flags) -> tuple[Any, Infos]:
+    def _opened(self, started: Flags) -> tuple[Any, Infos]:
         """Return observations (n, ...) after a reset of some environments, and the infos (n, ...) of those by name."""
 
     @abstractmethod
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:
         """Return the outcome of actions (n, ...) in [-1, 1].
 
-        `rows` are the environments that step, where `stepping` (n,) is true; the others have just begun.
+        `rows` are the environments that step, where `stepping` (n,) is true; the others have just started.
         """
 
     @abstractmethod
@@ -399,18 +399,18 @@ def _chosen_instances(options: Mapping[str, Any] | None, count: int) -> list[int
     return [instance_number(number) for number in chosen]
 
 
-def _reset_mask(options: Mapping[str, Any] | None, count: int, begun: bool) -> Flags:
+def _reset_mask(options: Mapping[str, Any] | None, count: int, running: bool) -> Flags:
     """Return which environments (count,) a reset is for: all, or those of the option "reset_mask".
 
     Raises gymnasium.error.Error where the mask does not fit, gymnasium.error.ResetNeeded where the others have not
-    `begun`.
+    `running`.
     """
     if not options or options.get("reset_mask") is None:
         return np.ones(count, dtype=bool)
     mask = np.asarray(options["reset_mask"])
     if mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
         raise error.Error(f"reset_mask must be {count} booleans, at least one of them true, got {mask!r}")
-    if not begun and not mask.all():
+    if not running and not mask.all():
         raise error.ResetNeeded("the first reset must be of all environments")
     return mask
 

@@ -31,7 +31,7 @@ class FitImageVectorEnv(SearchVectorEnv):
         self._episodes[i] = partial(first_episode, self.world, number, self._budget)
         self._best[i] = np.inf
 
-    def _opened(self, begun: Flags) -> tuple[Image, Infos]:
+    def _opened(self, started: Flags) -> tuple[Image, Infos]:
         return self._stage.pictures(), {"instance": self._numbers.copy()}
 
     def _begun_infos(self, i: int) -> Infos:

@@ -77,8 +77,8 @@ class RaceVectorEnv(SearchVectorEnv):
         self._best_costs[i, search] = self._costs[i, search] = np.inf
         self._slopes[i, search], self._used[i, search] = MAX_SLOPE, 0
 
-    def _opened(self, begun: Flags) -> tuple[NDArray[np.float32], Infos]:
-        self._evaluate_first(np.flatnonzero(begun))
+    def _opened(self, started: Flags) -> tuple[NDArray[np.float32], Infos]:
+        self._evaluate_first(np.flatnonzero(started))
         return self._states(), self._infos()
 
     def _evaluate_first(self, rows: Rows) -> None:
@@ -121,15 +121,15 @@ class RaceVectorEnv(SearchVectorEnv):
     def _remember(self, rows: Rows, chosen: NDArray[np.int64], proposals: Array, costs: Array) -> None:
         """Update what is observed of chosen searches (k,) by their proposals (k, m, d) and costs (k, m)."""
         at, each = (rows, chosen), np.arange(len(rows))
-        before, begun = self._costs[at], self._used[at] > 0
+        before, searched = self._costs[at], self._used[at] > 0
         bests, best_costs = self._bests[at], self._best_costs[at]
         better = costs < best_costs
         bests[better], best_costs[better] = proposals[better], costs[better]
         after, leaders = best_costs.min(axis=1), bests[each, best_costs.argmin(axis=1)]
-        falls = log_improvement(np.where(begun, before, after), after)
+        falls = log_improvement(np.where(searched, before, after), after)
         slopes = self._slopes[at] + SMOOTHING * (falls - self._slopes[at])
         self._bests[at], self._best_costs[at], self._costs[at] = bests, best_costs, after
-        self._slopes[at] = np.where(begun, slopes, MAX_SLOPE)
+        self._slopes[at] = np.where(searched, slopes, MAX_SLOPE)
         self._spreads[at] = bests.std(axis=1).mean(axis=1)
         self._used[at] += 1
         better = after < self._best[rows]

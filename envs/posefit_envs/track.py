@@ -48,7 +48,7 @@ class TrackVectorEnv(SearchVectorEnv):
         self._enter(i, made.episode(frame, self._predictors[i].space(made.observations[frame])))
         self._frames[i], self._used[i], self._best[i] = frame, 0, np.inf
 
-    def _opened(self, begun: Flags) -> tuple[Image, Infos]:
+    def _opened(self, started: Flags) -> tuple[Image, Infos]:
         return self._stage.pictures(), {"instance": self._numbers.copy(), "frame": np.zeros_like(self._frames)}
 
     def _advance(self, actions: Array, stepping: Flags, rows: Rows) -> Outcome:

@@ -28,7 +28,9 @@ COLOUR = 1.0  # what 100 grey levels of another colour count, in heights
 AREA = 0.5  # what an area e times as large counts, in heights
 
 Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
-Choice = int | tuple[float, float]  # a person by their number, 1 the longest seen, or by where they are seen first
+Choice = (
+    int | tuple[float, float]
+)  # a person by their number, 1 the longest visible, or by where they are visible first
 
 
 def cut_out(mask: Mask) -> Cut:
@@ -62,7 +64,7 @@ class _Blob:
 
 
 class Individual:
-    """One person of a film, from where they are seen first until they are lost."""
+    """One person of a film, from where they are visible first until they are lost."""
 
     def __init__(self, blob: _Blob, frame: int) -> None:
         self.sights: dict[int, tuple[Cut, Cut | None]] = {}  # by frame: their mask, and what is unknown of a blob
@@ -206,7 +208,7 @@ class People:
             return persons[0], ""
         spots = [f"{scale * across:.0f},{scale * down:.0f} in {name(frame)}" for frame, across, down in where]
         listed = "; ".join(f"{k} at {spot}" for k, spot in enumerate(spots, 1))
-        words = f"{len(persons)} people, first seen: {listed}; person {number} is followed, --person N another"
+        words = f"{len(persons)} people, first visible: {listed}; person {number} is followed, --person N another"
         return persons[number - 1], words
 
 

@@ -228,8 +228,8 @@ class TrackOptions:
     )
     person: "Choice | None" = option(
         None,
-        "Of several people: the number that the warning gives them, 1 the longest seen, or X,Y where they are first "
-        "seen.",
+        "Of several people: the number that the warning gives them, 1 the longest visible, or X,Y where they are first "
+        "visible.",
         _person,
         "N|X,Y",
         parse=text_person,

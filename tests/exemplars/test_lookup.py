@@ -32,7 +32,7 @@ def camera_at(azimuth: float, elevation: float = 0.0, roll: float = 0.0) -> Came
     return Camera(160, 160, np.full(2, 200.0), np.full(2, 80.0), rolled, straight.translation)
 
 
-def seen(cameras: list[Camera], pose: Array) -> Observation:
+def observed_by(cameras: list[Camera], pose: Array) -> Observation:
     return Observation([Silhouette.of(project(BODY, camera, pose, PLACE)) for camera in cameras])
 
 
@@ -60,20 +60,20 @@ def yaws_off(task: Task, observation: Observation, pose: Array) -> Array:
 @each("seed", range(12))
 def test_a_mode_faces_as_the_walker_does(seed: int) -> None:
     pose, cameras = turned(seed), [camera_at(0.4)]
-    assert yaws_off(task_of(cameras), seen(cameras, pose), pose)[:3].min() < np.radians(30.0)
+    assert yaws_off(task_of(cameras), observed_by(cameras, pose), pose)[:3].min() < np.radians(30.0)
 
 
 @each("seed", range(6))
 @each(("elevation", "roll"), [(0.0, 0.0), (np.radians(25.0), 0.0), (0.0, np.radians(90.0))])
 def test_two_cameras_of_any_attitude_decide(seed: int, elevation: float, roll: float) -> None:
     pose, cameras = turned(seed), [camera_at(0.4, elevation, roll), camera_at(0.4 + np.pi / 2.0, elevation, roll)]
-    assert yaws_off(task_of(cameras), seen(cameras, pose), pose)[0] < np.radians(30.0)
+    assert yaws_off(task_of(cameras), observed_by(cameras, pose), pose)[0] < np.radians(30.0)
 
 
 def test_a_known_yaw_leaves_out_the_others() -> None:
     cameras = [camera_at(0.0)]
     for yaw in (-2.0, 0.3, 1.5):
-        posterior = Lookup(task_of(cameras, yaw)).posterior(seen(cameras, turned(0)))
+        posterior = Lookup(task_of(cameras, yaw)).posterior(observed_by(cameras, turned(0)))
         assert posterior is None or np.abs(wrapped(posterior.poses[:, 0] - yaw)).max() < np.radians(50.0) + YAW_STEP
 
 
@@ -83,20 +83,20 @@ def test_a_silhouette_like_none_of_the_clips_is_refused() -> None:
     dog |= (np.abs(rows - 100) < 20) & ((np.abs(columns - 40) < 5) | (np.abs(columns - 115) < 5))
     lying = turned(0).copy()
     lying[1] = np.pi / 2.0
-    for observation in (Observation([Silhouette.of(dog)]), seen(cameras, lying)):
+    for observation in (Observation([Silhouette.of(dog)]), observed_by(cameras, lying)):
         assert Lookup(task_of(cameras)).posterior(observation) is None
 
 
 def test_a_silhouette_that_is_cut_is_refused() -> None:
     camera = replace(camera_at(0.0), centre=np.array([80.0, 150.0]))
-    observation = seen([camera], turned(0))
+    observation = observed_by([camera], turned(0))
     assert observation.silhouettes[0].mask[-1].any()
     assert Lookup(task_of([camera])).posterior(observation) is None
 
 
 def test_the_same_silhouette_has_the_same_modes() -> None:
     cameras = [camera_at(0.0)]
-    one, two = (Lookup(task_of(cameras)).posterior(seen(cameras, turned(1))) for _ in range(2))
+    one, two = (Lookup(task_of(cameras)).posterior(observed_by(cameras, turned(1))) for _ in range(2))
     assert one is not None
     assert two is not None
     np.testing.assert_array_equal(one.poses, two.poses)
@@ -119,7 +119,7 @@ def test_a_camera_is_straightened_to_where_it_stands(azimuth: float, elevation: 
 @each("optimiser", ["sapso", "cma"])
 def test_a_search_that_looks_faces_the_right_way(optimiser: str) -> None:
     pose, cameras = turned(3), [camera_at(0.4), camera_at(2.0)]
-    masks = [mask.mask[None] for mask in seen(cameras, pose).silhouettes]
+    masks = [mask.mask[None] for mask in observed_by(cameras, pose).silhouettes]
     options = {"train": TRAINING, "evaluations": 840, "height": BODY.stature, "camera": cameras}
     fitted = posefit.fit(masks, method=f"{optimiser}@pca", **options)
     assert abs(wrapped(fitted.pose[:1] - pose[:1])[0]) < np.radians(30.0)

@@ -134,5 +134,7 @@ def test_a_camera_that_knows_nothing_does_not_count_and_beta_does(monkeypatch: p
     np.testing.assert_array_equal(both.factors, alone.factors)
     missed = fit(1, observations, beta=1.0)
     rows = zip(observations, POSES[:, None], PLACES[:, None], strict=True)
-    costs = [pose_costs(missed.body, cameras[:1], seen.silhouettes, pose, place, 1.0)[0] for seen, pose, place in rows]
+    costs = [
+        pose_costs(missed.body, cameras[:1], views.silhouettes, pose, place, 1.0)[0] for views, pose, place in rows
+    ]
     assert missed.cost == pytest.approx(np.mean(costs))

@@ -104,7 +104,7 @@ def test_a_camera_that_knows_nothing_does_not_count() -> None:
     blind = replace(observation, silhouettes=[observation.silhouettes[0], nothing])
     pose, place = task.training[0].poses[:1], task.anchor[None]
     costs = []
-    for cameras, seen in ((1, replace(observation, silhouettes=observation.silhouettes[:1])), (2, blind)):
+    for cameras, views in ((1, replace(observation, silhouettes=observation.silhouettes[:1])), (2, blind)):
         part = replace(task, cameras=[task.cameras[0]] * cameras)
-        costs += [costs_of(part, seen, pose, place)[0], frame_of(part, seen, pose[0], place[0], 0).cost]
+        costs += [costs_of(part, views, pose, place)[0], frame_of(part, views, pose[0], place[0], 0).cost]
     assert len(set(costs)) == 1

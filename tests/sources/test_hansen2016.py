@@ -267,12 +267,12 @@ def test_b_2_axes_are_decomposed_every_so_many_generations() -> None:  # HANSEN2
 
 
 def test_b_3_a_search_ends_where_nothing_changes_any_more_or_it_diverges() -> None:  # HANSEN2016 (B.3)
-    def begun() -> Strategy:
+    def initial() -> Strategy:
         strategy = Strategy(np.array([0.3, -0.2]), np.array([0.1, 0.1]), 6)
         assert not strategy.ended()
         return strategy
 
-    flat, still, far, fixed, thin = (begun() for _ in range(5))
+    flat, still, far, fixed, thin = (initial() for _ in range(5))
     for _ in range(2 * (10 + 10)):  # TolFun: 10 + 30 d / lambda generations cost the same
         assert flat.generation <= 20 or flat.ended()
         flat.learn(flat.sample(np.random.default_rng(flat.generation), 6), np.ones(6))

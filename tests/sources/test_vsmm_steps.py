@@ -362,7 +362,7 @@ def telling(name: str, switching: Switching) -> Callable[[Array], Measurement]:
     return measure
 
 
-def begun(switching: Switching) -> Belief:
+def initial(switching: Switching) -> Belief:
     walk = built_in.motion("walk")
     return switching.start(encode(walk.poses[:1], walk.translations[:1])[0], 0.01 * np.eye(ERROR))
 
@@ -371,7 +371,7 @@ def begun(switching: Switching) -> Belief:
 def test_after_some_cycles_over_all_models_the_most_probable_group_stays(variant: str, cycles: int) -> None:  # VSMM 5
     for model, group in (("walk", "G1"), ("squat", "G3")):
         switching = running(variant=variant)
-        state, covariance = begun(switching).states[0], 0.01 * np.eye(ERROR)
+        state, covariance = initial(switching).states[0], 0.01 * np.eye(ERROR)
         belief, measure = switching.start(state, covariance), telling(model, switching)
         for _ in range(cycles - 1):
             belief = switching.cycle(belief, measure, NOBODY)
@@ -384,7 +384,7 @@ def test_after_some_cycles_over_all_models_the_most_probable_group_stays(variant
 
 def test_a_new_models_prediction_has_its_noise_as_covariance_to_the_letter() -> None:  # VSMM 8.2
     switching = running(variant="patent")
-    belief = replace(begun(switching), log_probabilities=np.log(np.full(6, 1.0 / 6.0)))
+    belief = replace(initial(switching), log_probabilities=np.log(np.full(6, 1.0 / 6.0)))
     belief = switching._only("G1", belief)
     old = switching.active
     both = PatentForm().joined(switching, belief, "G3")

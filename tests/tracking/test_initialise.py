@@ -127,17 +127,24 @@ def test_a_build_is_fitted_to_every_third_frame_if_there_are_so_many_from_where_
     assert all_of_them == (list(range(11)), scene.fps)
     unknown = Silhouette.of(np.zeros((90, 120), dtype=bool), np.zeros((90, 120), dtype=bool))
     observations = [scene.observations[k] for k in range(40)]
-    observations[:10] = [replace(seen, silhouettes=[seen.silhouettes[0], unknown]) for seen in observations[:10]]
+    observations[:10] = [
+        replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:10]
+    ]
     few, many = frames_of_builds(scene, observations, 5, 11)  # too many for those that come after
     assert few[0] == [10, 13, 16, 19, 22]
     assert many[0] == list(range(11))
     assert first_shown_whole(observations) == 10
-    assert first_shown_whole([replace(seen, silhouettes=seen.silhouettes[:1]) for seen in observations]) == 0
+    assert (
+        first_shown_whole(
+            [replace(observation, silhouettes=observation.silhouettes[:1]) for observation in observations]
+        )
+        == 0
+    )
     whole = observations[0].silhouettes[0]
     cut = Silhouette.of(np.roll(whole.mask, -int(whole.extent[0]) - 5, axis=1))  # a part of it at the other edge
-    seen = [replace(observations[0], silhouettes=[one]) for one in (unknown, cut, cut, whole)]
-    assert first_shown_whole(seen) == 3
-    assert first_shown_whole([replace(seen[1], usable=False), seen[2]]) == 1
+    observations = [replace(observations[0], silhouettes=[one]) for one in (unknown, cut, cut, whole)]
+    assert first_shown_whole(observations) == 3
+    assert first_shown_whole([replace(observations[1], usable=False), observations[2]]) == 1
 
 
 @each(("late", "restarts"), [(10, 0), (20, 0), (20, 1)])
@@ -145,7 +152,9 @@ def test_a_build_that_begins_late_looks_for_the_pose_again(late: int, restarts: 
     scene = walk(50, [0.0, 90.0], (80, 60))
     unknown = Silhouette.of(*np.zeros((2, 60, 80), dtype=bool))
     observations = [scene.observations[k] for k in range(50)]
-    observations[:late] = [replace(seen, silhouettes=[seen.silhouettes[0], unknown]) for seen in observations[:late]]
+    observations[:late] = [
+        replace(observation, silhouettes=[observation.silhouettes[0], unknown]) for observation in observations[:late]
+    ]
     frame = Frame(truth_of(scene).poses[40], scene.anchor, 0.0, np.zeros((2, 3), np.int64), 0)
     first = replace(frame, pose=truth_of(scene).poses[0])
     task = task_of(scene, TrackOptions(evaluations=80, translation="known"), [built_in.motion("walk")])
