@@ -28,9 +28,8 @@ COLOUR = 1.0  # what 100 grey levels of another colour count, in heights
 AREA = 0.5  # what an area e times as large counts, in heights
 
 Cut = tuple[tuple[slice, slice], NDArray[np.uint8]]  # a box of a mask, and its bits
-Choice = (
-    int | tuple[float, float]
-)  # a person by their number, 1 the longest visible, or by where they are visible first
+# a person by their number, 1 the longest visible, or by a point of where they are visible first
+Choice = int | tuple[float, float]
 
 
 def cut_out(mask: Mask) -> Cut:
