@@ -10,6 +10,7 @@ import numpy as np
 from posefit import settings
 from posefit.errors import InputError
 from posefit.fitting.box import Space
+from posefit.fitting.check import one_of
 from posefit.fitting.driving import Audit, drive
 from posefit.fitting.optimiser import NextFrame, Optimiser
 from posefit.fitting.prior import Prior
@@ -140,7 +141,9 @@ def prepare(options: TrackOptions, task: Task) -> Method:
 
 def start_of(name: str | None = None) -> InitialiserFactory | None:
     """Return what guesses first poses, by its name; the default one where it is installed; None for "blind"."""
-    if name == BLIND or (name is None and DEFAULT_START not in registry().offers["start"]):
+    offered = registry().offers["start"]
+    one_of("start", name or BLIND, [BLIND, *sorted(offered)])
+    if name == BLIND or (name is None and DEFAULT_START not in offered):
         return None
     factory: InitialiserFactory = registry().offer("start", name or DEFAULT_START).factory
     return factory

@@ -126,5 +126,5 @@ def test_a_search_that_looks_faces_the_right_way(optimiser: str) -> None:
 
 
 def test_an_unknown_start_is_refused_with_those_that_are_known() -> None:
-    with pytest.raises(ValueError, match="start must be one of lookup, got 'nowhere'"):
+    with pytest.raises(ValueError, match="start must be one of blind, lookup, got 'nowhere'"):
         posefit.fit("walk", method="sapso@pca", settings={"tracker.start": "nowhere"})
