@@ -16,13 +16,13 @@ from posefit.errors import InputError
 from posefit.silhouette.foreground import RIVAL_AREA, Image
 from posefit.silhouette.mask import Mask, padded_box
 
-LEAP = 1.0  # times the height: farther from where they are expected a person is not
-FORGOTTEN_SECONDS = 1.0  # without a sight, after which a person is another one
+MAX_STEP = 1.0  # times the height: farther from where they are expected a person is not
+MAX_GAP_SECONDS = 1.0  # without a detection, after which a person is another one
 MEMORY = 0.8  # of the last step, size and colours that is kept with each frame
 COVERED = 0.3  # of where a person is expected: a blob that covers so much shows them, too
 SLACK = 0.04  # of the height: so far around where they are expected people may be
 LARGE = 0.2  # of the picture's height: what is longer may be a person, and no noise
-MIN_SIGHTS = 8  # frames of a person alone; what shows in fewer may be noise
+MIN_DETECTIONS = 8  # frames of a person alone; what shows in fewer may be noise
 MIN_SCORE = 0.1  # of the best person's: less is noise
 COLOUR = 1.0  # what 100 grey levels of another colour count, in heights
 AREA = 0.5  # what an area e times as large counts, in heights
@@ -62,11 +62,11 @@ class _Blob:
             self.colours = np.concatenate([cv2.mean(image, half.astype(np.uint8))[:3] for half in halves])
 
 
-class Individual:
+class Tracklet:
     """One person of a film, from where they are visible first until they are lost."""
 
     def __init__(self, blob: _Blob, frame: int) -> None:
-        self.sights: dict[int, tuple[Cut, Cut | None]] = {}  # by frame: their mask, and what is unknown of a blob
+        self.detections: dict[int, tuple[Cut, Cut | None]] = {}  # by frame: their mask, and what is unknown of a blob
         self.rows: dict[int, dict[str, Any]] = {}  # by frame, of `FrameQuality`
         self.quality: Any = None
         self.first, self.height = (frame, *blob.place.tolist()), blob.height
@@ -77,11 +77,11 @@ class Individual:
         """Return where (2,) their middle is expected."""
         return np.asarray(self.latest.place + (frame - self.last) * self._step)
 
-    def unlike(self, blob: _Blob, frame: int) -> float:
-        """Return how unlike a blob is, in heights; infinite where it is too far away."""
+    def distance(self, blob: _Blob, frame: int) -> float:
+        """Return how far a blob is from what is expected, in heights; infinite where it is too far away."""
         away = float(np.linalg.norm(blob.place - self.expected(frame))) / self.height
         colour = float(np.abs(blob.colours - self.colours).mean()) / 100.0
-        return away + COLOUR * colour + AREA * abs(np.log(blob.area / self.area)) if away <= LEAP else np.inf
+        return away + COLOUR * colour + AREA * abs(np.log(blob.area / self.area)) if away <= MAX_STEP else np.inf
 
     def outline(self, frame: int) -> Mask:
         """Return where they are expected, and a little around."""
@@ -90,7 +90,7 @@ class Individual:
         moved = cv2.warpAffine(mask, shift, mask.shape[::-1], flags=cv2.INTER_NEAREST)
         return cv2.dilate(moved, np.ones((width, width), dtype=np.uint8)) > 0
 
-    def see(self, blob: _Blob, frame: int) -> None:
+    def update(self, blob: _Blob, frame: int) -> None:
         """Take a blob that shows them alone."""
         if frame > self.last:
             step = (blob.place - self.latest.place) / (frame - self.last)
@@ -100,19 +100,19 @@ class Individual:
                 setattr(self, name, MEMORY * getattr(self, name) + (1.0 - MEMORY) * getattr(blob, name))
         self.alone, self.last, self.latest = self.alone + 1, frame, blob
         self._large = self._large or self.height > LARGE * len(blob.mask)
-        self.sights[frame] = cut_out(blob.mask), None
+        self.detections[frame] = cut_out(blob.mask), None
 
-    def proven(self, least: float = MIN_SIGHTS) -> bool:
-        """Return whether they are seen so often, and as a person, that they are no noise."""
-        return self._large and (self._usable if self.rows else self.alone) >= min(MIN_SIGHTS, least)
+    def confirmed(self, least: float = MIN_DETECTIONS) -> bool:
+        """Return whether they are visible so often, and as a person, that they are no noise."""
+        return self._large and (self._usable if self.rows else self.alone) >= min(MIN_DETECTIONS, least)
 
-    def judge(self, frame: int, row: dict[str, Any]) -> None:
+    def add_row(self, frame: int, row: dict[str, Any]) -> None:
         """Take the row of `FrameQuality` of a frame."""
         self.rows[frame], self._usable = row, self._usable + row["usable"]
 
     @property
     def score(self) -> float:
-        """How long and steadily they are seen, times their height: 0 where they are never usable."""
+        """How long and steadily they are visible, times their height: 0 where they are never usable."""
         return (self._usable if self.rows else self.alone) * self.height
 
 
@@ -120,75 +120,76 @@ class People:
     """Who is who in the frames of a film, which come one after the other."""
 
     def __init__(self, fps: float) -> None:
-        self.individuals: list[Individual] = []
-        self.alive: list[Individual] = []  # those who may be in the next frame
-        self._frame, self._patience = -1, FORGOTTEN_SECONDS * fps
+        self.tracklets: list[Tracklet] = []
+        self.active: list[Tracklet] = []  # those who may be in the next frame
+        self._frame, self._patience = -1, MAX_GAP_SECONDS * fps
 
-    def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Individual]:
+    def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Tracklet]:
         """Return who is in the next frame, of which the blobs (height, width) are the largest first."""
         from scipy.optimize import linear_sum_assignment  # takes a tenth of a second to import
 
         self._frame += 1
         frame, blobs = self._frame, [_Blob(mask, image) for mask in masks]
-        for one in self.alive:
-            if frame - max(one.sights) > self._patience:  # memory does not grow with noise
-                one.latest.mask, one.quality = (
-                    np.empty((0, 0), dtype=bool),
-                    None,
-                )  # so that memory does not grow with noise
-        alive = [one for one in self.alive if one.latest.mask.size]
-        unlike = np.array([[one.unlike(blob, frame) for blob in blobs] for one in alive])
-        owners: dict[int, Individual] = {}
-        if unlike.size:
-            for row, column in zip(*linear_sum_assignment(np.minimum(unlike, 1e6)), strict=True):
-                if np.isfinite(unlike[row, column]):
-                    owners[int(column)] = alive[row]
-        proven = [one for one in alive if one.proven() and one not in owners.values()]
-        outlines = [one.outline(frame) for one in proven] if blobs else []
+        for tracklet in self.active:
+            if frame - max(tracklet.detections) > self._patience:  # memory does not grow with noise
+                tracklet.latest.mask, tracklet.quality = np.empty((0, 0), dtype=bool), None
+        active = [tracklet for tracklet in self.active if tracklet.latest.mask.size]
+        distances = np.array([[tracklet.distance(blob, frame) for blob in blobs] for tracklet in active])
+        owners: dict[int, Tracklet] = {}
+        if distances.size:
+            for row, column in zip(*linear_sum_assignment(np.minimum(distances, 1e6)), strict=True):
+                if np.isfinite(distances[row, column]):
+                    owners[int(column)] = active[row]
+        confirmed = [tracklet for tracklet in active if tracklet.confirmed() and tracklet not in owners.values()]
+        outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []
         present = []
         for k, blob in enumerate(blobs):
             hidden = [
-                one
-                for one, outline in zip(proven, outlines, strict=True)
-                if one.area >= RIVAL_AREA * blob.area and (outline & blob.mask).sum() > COVERED * outline.sum()
+                tracklet
+                for tracklet, outline in zip(confirmed, outlines, strict=True)
+                if tracklet.area >= RIVAL_AREA * blob.area and (outline & blob.mask).sum() > COVERED * outline.sum()
             ]
             owner = owners.get(k)
             if owner is None and not hidden:
-                owner = Individual(blob, frame)
-                self.individuals.append(owner)
-                alive.append(owner)
+                owner = Tracklet(blob, frame)
+                self.tracklets.append(owner)
+                active.append(owner)
             if owner is not None and not hidden:
-                owner.see(blob, frame)
+                owner.update(blob, frame)
                 present.append(owner)
             else:
                 group = hidden if owner is None else [*hidden, owner]
                 _share(blob, group, frame)
                 present += group
-        self.alive = alive
+        self.active = active
         return present
 
-    def persons(self) -> list[list[Individual]]:
+    def persons(self) -> list[list[Tracklet]]:
         """Return the people, the longest and steadiest first: those parts of each that follow each other in time."""
-        persons: list[list[Individual]] = []
-        for one in sorted(self.individuals, key=lambda one: one.score, reverse=True):
-            apart = [person for person in persons if not any(one.sights.keys() & part.sights.keys() for part in person)]
+        persons: list[list[Tracklet]] = []
+        for tracklet in sorted(self.tracklets, key=lambda tracklet: tracklet.score, reverse=True):
+            apart = [
+                person
+                for person in persons
+                if not any(tracklet.detections.keys() & part.detections.keys() for part in person)
+            ]
             if apart:
-                min(apart, key=lambda person: min(_apart(one, part) for part in person)).append(one)
+                min(apart, key=lambda person: min(_distance(tracklet, part) for part in person)).append(tracklet)
             else:
-                persons.append([one])
+                persons.append([tracklet])
         scores, least = [sum(part.score for part in person) for person in persons], 0.5 * (self._frame + 1)
-        proven = [
+        confirmed = [
             k
             for k, person in enumerate(persons)
-            if scores[k] >= MIN_SCORE * max(scores) and any(part.proven(least) for part in person)
+            if scores[k] >= MIN_SCORE * max(scores) and any(part.confirmed(least) for part in person)
         ]
-        if not proven:  # whatever there is
+        if not confirmed:  # whatever there is
             return [[part for person in persons for part in person]] if persons else []
-        return [persons[k] for k in sorted(proven, key=lambda k: -scores[k])]
+        return [persons[k] for k in sorted(confirmed, key=lambda k: -scores[k])]
 
     def chosen(
         self, choice: Choice | None, name: Callable[[int], str], scale: float = 1.0
-    ) -> tuple[list[Individual], str]:
+    ) -> tuple[list[Tracklet], str]:
         """Return the parts of the person who is followed, and what there is to say where there are several.
 
         `name` names a frame, and `scale` is that of a pixel in words. Raises InputError where nobody has the number.
@@ -211,10 +212,10 @@ class People:
         return persons[number - 1], words
 
 
-def _apart(one: Individual, other: Individual) -> float:
+def _distance(tracklet: Tracklet, other: Tracklet) -> float:
     """Return how far two parts of a film are from being one person's, in heights."""
-    first, second = sorted((one, other), key=lambda part: min(part.sights))
-    start = min(second.sights)
+    first, second = sorted((tracklet, other), key=lambda part: min(part.detections))
+    start = min(second.detections)
     _, *place = second.first
     colour = float(np.abs(first.colours - second.colours).mean()) / 100.0
     away = float(np.linalg.norm(np.array(place) - first.latest.place)) / first.height
@@ -222,33 +223,33 @@ def _apart(one: Individual, other: Individual) -> float:
     return COLOUR * colour + size + away / (1.0 + (start - first.last) / 30.0)
 
 
-def _share(blob: _Blob, group: Sequence[Individual], frame: int) -> None:
+def _share(blob: _Blob, group: Sequence[Tracklet], frame: int) -> None:
     """Give each of a group in a blob what lies where they alone are expected; the rest of it is unknown."""
-    outlines = [one.outline(frame) for one in group]
+    outlines = [tracklet.outline(frame) for tracklet in group]
     count = np.sum(outlines, axis=0)
-    for one, outline in zip(group, outlines, strict=True):
-        mine = blob.mask & outline & (count == 1)
-        one.sights[frame] = cut_out(mine), cut_out(blob.mask & ~mine)
+    for tracklet, outline in zip(group, outlines, strict=True):
+        clear = blob.mask & outline & (count == 1)
+        tracklet.detections[frame] = cut_out(clear), cut_out(blob.mask & ~clear)
 
 
-def part_at(parts: Sequence[Individual], frame: int) -> Individual | None:
+def part_at(parts: Sequence[Tracklet], frame: int) -> Tracklet | None:
     """Return the part of a person that a frame shows; of several, which are noise, that of the largest box."""
-    shown = [part for part in parts if frame in part.sights]
-    return max(shown, key=lambda part: part.sights[frame][0][1].size, default=None)
+    shown = [part for part in parts if frame in part.detections]
+    return max(shown, key=lambda part: part.detections[frame][0][1].size, default=None)
 
 
-def planes_of(parts: Sequence[Individual], others: Sequence[Individual], frame: int, known: Mask) -> tuple[Mask, Mask]:
+def planes_of(parts: Sequence[Tracklet], others: Sequence[Tracklet], frame: int, known: Mask) -> tuple[Mask, Mask]:
     """Return the mask of a person in a frame, and which pixels are known: none of the others', or of those before them.
 
     `known` are those that the picture shows.
     """
     mask, unknown = np.zeros_like(known), np.zeros_like(known)
     if (part := part_at(parts, frame)) is not None:
-        own, hidden = part.sights[frame]
-        paste(own, mask)
+        shown, hidden = part.detections[frame]
+        paste(shown, mask)
         if hidden is not None:
             paste(hidden, unknown)
     for other in others:
-        if frame in other.sights:
-            paste(other.sights[frame][0], unknown)
+        if frame in other.detections:
+            paste(other.detections[frame][0], unknown)
     return mask, (known | mask) & ~(unknown & ~mask)

@@ -19,7 +19,7 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span, unpacked
-from posefit.footage.people import LARGE, Choice, Individual, People, part_at, planes_of
+from posefit.footage.people import LARGE, Choice, People, Tracklet, part_at, planes_of
 from posefit.footage.quality import MIN_FRAMES, PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
@@ -230,7 +230,7 @@ class Segmentation:
         self._people, self._choice = People(video.fps), how.person
         if isinstance(self._choice, tuple):
             self._choice = self._choice[0] * self._segmenter.scale, self._choice[1] * self._segmenter.scale
-        # rows of nobody, and of the largest blobs, who are one person where nobody else is there
+        # rows of empty masks, and of the largest blobs, which are the person where there is one only
         self._blanks, self._largest = list[dict[str, Any]](), list[dict[str, Any]]()
         self._qualities: tuple[FrameQuality, FrameQuality] | None = None  # of both
         self._missing = max(0, video.claimed - count)
@@ -272,20 +272,20 @@ class Segmentation:
             self._masks[k], self._valid[k] = np.packbits(found[0].mask), np.packbits(known)
             present = self._people.add([person.mask for person in found if person.area], image)
             self._qualities = self._qualities or (self._segmenter.quality(), self._segmenter.quality())
-            nobody, largest = self._qualities
+            blank, largest = self._qualities
             empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
-            for one in self._people.alive:
-                one.quality = one.quality or deepcopy(nobody)
+            for tracklet in self._people.active:
+                tracklet.quality = tracklet.quality or deepcopy(blank)
                 person = empty
-                if one in present:
-                    others = [other for other in present if other is not one and other.proven()]
-                    mask, valid = planes_of([one], others, k, known)
-                    whole = next((person for person in found if person.mask is one.latest.mask), found[0])
+                if tracklet in present:
+                    others = [other for other in present if other is not tracklet and other.confirmed()]
+                    mask, valid = planes_of([tracklet], others, k, known)
+                    whole = next((person for person in found if person.mask is tracklet.latest.mask), found[0])
                     person = replace(whole, mask=mask, valid=valid, area=int(mask.sum()))
                     pieces = max(min(1, person.pieces), person.pieces - len(others))
                     person = replace(person, pieces=pieces, touches_border=touches_border(mask))
-                one.judge(k, self._row(one.quality, image, person, k))
-            self._blanks.append(self._row(nobody, image, empty, k))
+                tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
+            self._blanks.append(self._row(blank, image, empty, k))
             self._largest.append(self._row(largest, image, found[0], k))
 
     def _row(self, quality: FrameQuality, image: Image, person: Person, k: int) -> dict[str, Any]:
@@ -293,12 +293,12 @@ class Segmentation:
         return row | {"usable": int(row["usable"] and self.video.is_filmed(self.start + k))}
 
     @cached_property
-    def _parts(self) -> tuple[list[Individual], list[Individual], str]:
+    def _parts(self) -> tuple[list[Tracklet], list[Tracklet], str]:
         """The parts of the person who is followed so far, those of the others, and what there is to say of it."""
         parts, words = self._people.chosen(
             self._choice, lambda frame: f"frame {self.start + frame}", 1.0 / self._segmenter.scale
         )
-        return parts, [one for person in self._people.persons() for one in person if one not in parts], words
+        return parts, [part for person in self._people.persons() for part in person if part not in parts], words
 
     @property
     def rows(self) -> list[dict[str, Any]]:

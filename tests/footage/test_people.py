@@ -79,7 +79,7 @@ def test_memory_of_noise_is_given_back() -> None:
         row, column = rng.integers(0, 50), rng.integers(0, 70)
         mask[row : row + 6, column : column + 4] = True
         people.add([mask])
-    assert len(people.individuals) > 20
-    assert len(people.alive) < 20
-    assert sum(one.latest.mask.size > 0 for one in people.individuals) == len(people.alive)
+    assert len(people.tracklets) > 20
+    assert len(people.active) < 20
+    assert sum(tracklet.latest.mask.size > 0 for tracklet in people.tracklets) == len(people.active)
     assert people.chosen(None, str)[1] == ""
