@@ -24,6 +24,7 @@ class Recalibration:
     # standard deviations of joints (metres, each axis) and angles (radians) about every pose
     joint_spreads: Array = field(default_factory=lambda: np.zeros(len(JOINTS)), repr=False)  # (27,)
     angle_spreads: Array = field(default_factory=lambda: np.zeros(ANGLES), repr=False)  # (66,)
+    place_spreads: Array = field(default_factory=lambda: np.zeros(len(JOINTS)), repr=False)  # (27,) in the world
     # factors of the intervals of each level
     joint_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), len(JOINTS))), repr=False)
     angle_factors: Array = field(default_factory=lambda: np.ones((len(LEVELS), ANGLES)), repr=False)
@@ -32,8 +33,8 @@ class Recalibration:
     none: float = 0.0  # the probability that no mode is right
 
     def __post_init__(self) -> None:
-        for name in ("joint_spreads", "angle_spreads", "joint_factors", "angle_factors"):
-            length = len(JOINTS) if name.startswith("joint") else ANGLES
+        for name in ("joint_spreads", "angle_spreads", "place_spreads", "joint_factors", "angle_factors"):
+            length = ANGLES if name.startswith("angle") else len(JOINTS)
             value = frozen(name, getattr(self, name), (length,) if name.endswith("spreads") else (len(LEVELS), length))
             if value.min() < 0.0:
                 raise InputError(f"{name} must be 0 or more, got {value.min():g}")
