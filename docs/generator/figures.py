@@ -1,4 +1,4 @@
-"""The page of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
+"""The list of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
 
 from collections.abc import Iterable, Mapping
 
