@@ -7,11 +7,13 @@ The motions of the library's people, each left out of it, get bodies with other 
 correlations of adults, other girths, and flesh that is not centred on the joints. One, two or four cameras at eight
 metres, whose calibrations are a little wrong, film them; the masks are damaged as a segmenter does. A half of the
 films by one camera has landmarks that exchange left and right at times. Each track is kept in the folder, which the
-same command continues. The report learns what intervals lack from even bodies, and has the figures of odd ones.
+same command continues. The report says what intervals lack, learned from all bodies,
+and judges each body by what the others teach.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -57,10 +59,9 @@ from posefit.tracking.result import Track
 from posefit.uncertainty.calibration import LEVELS, MAIN_LEVEL, Recalibration
 from posefit.uncertainty.intervals import quantiles
 from posefit.uncertainty.modes import nearer_mirrored
-from posefit.uncertainty.shared import DEPTH, PARTS, shared_spreads
+from posefit.uncertainty.shared import DEPTH, PARTS, STATURE, shared_spreads
 from table import earlier, kept, markdown, percent
 
-STATURE_SPREAD = 0.054  # of adults, docs/studies/proportions.py
 GIRTH = 0.1  # that a part of the body may be thicker or thinner than the average's
 # Standard deviations in metres of the flesh's middle from the joints: to the side, upwards, forwards. Ours.
 OFFSETS: Mapping[str, tuple[float, float, float]] = {
@@ -168,7 +169,7 @@ def body_of(number: int) -> tuple[Body, Body, Array]:
     """Return a body, its flesh as a body of its own, and how far the flesh's root is off (3,)."""
     rng, average = np.random.default_rng([62, number]), Body.of(built_in.average_skeleton())
     logs, lengths = np.zeros(len(NAMES)), slice(1, 1 + len(LENGTHS))
-    logs[0] = STATURE_SPREAD * rng.standard_normal()
+    logs[0] = STATURE * rng.standard_normal()
     logs[lengths] = rng.multivariate_normal(np.zeros(len(LENGTHS)), COVARIANCE[lengths, lengths])
     girths = 1.0 + rng.uniform(-GIRTH, GIRTH, len(BONES))
     height = average.stature * np.exp(logs[0])
@@ -339,87 +340,64 @@ def keep(path: Path, result: Track, who: Person) -> None:
 
 
 class Film(NamedTuple):
-    """A row, what was kept of it, and the radii of intervals (grid, T, levels, 27) with more and more shared error."""
+    """Of a film: its body and cameras, the shares of each joint held (body or world, grid, levels, 27), and depths."""
 
-    row: Mapping[str, Any]
-    kept: Mapping[str, Array]
-    radii: Array
-
-    def inside(self, joints: Sequence[int], shared: float, level: int, depth: float | None) -> float:
-        """Return the share of joints that their intervals hold, in the world where a deviation of `depth` is given."""
-        radii = self.radii[int(np.argmin(np.abs(GRID - shared))), :, level][:, joints]
-        true, estimate = (self.kept[name][::STRIDE] for name in ("true", "joints"))
-        if depth is None:
-            return float((joint_distances(true, estimate)[:, joints] <= radii).mean())
-        far = depth * self.kept["depths"][::STRIDE, None] * ndtri(0.5 + 0.5 * LEVELS[level])
-        return float((np.linalg.norm(true - estimate, axis=2)[:, joints] <= np.hypot(radii, far)).mean())
+    body: int
+    views: int
+    held: Array
+    depths_off: Array  # (T,) as shares
 
 
 def film_of(folder: Path, row: Mapping[str, Any]) -> Film:
-    """Return a film that a folder keeps."""
+    """Return how often the intervals of a kept track hold, with each shared error of the grid."""
     with np.load(folder / f"{row['name']}.npz") as stored:
-        kept = {name: stored[name].astype(np.float64) for name in stored}
-    frames = range(0, len(kept["true"]), STRIDE)
-    radii = [
-        [
-            kept["factors"][k]
-            * quantiles(kept["distances"][k], kept["weights"][k], np.hypot(kept["spreads"][k], shared), 3)
-            for k in frames
-        ]
-        for shared in GRID
-    ]
-    return Film(row, kept, np.array(radii))
+        kept = {name: stored[name][::STRIDE].astype(np.float64) for name in stored}
+    off = joint_distances(kept["true"], kept["joints"]), np.linalg.norm(kept["true"] - kept["joints"], axis=2)
+    far = DEPTH * (row["views"] == 1) * kept["depths"][:, None, None] * ndtri(0.5 + 0.5 * np.array(LEVELS))[:, None]
+    held = np.empty((2, len(GRID), len(LEVELS), len(JOINTS)))
+    arrays = [kept[name] for name in ("distances", "weights", "spreads", "factors")]
+    for k, shared in enumerate(GRID):
+        frames = zip(*arrays, strict=True)
+        radii = np.array(
+            [f * quantiles(away, weights, np.hypot(spread, shared), 3) for away, weights, spread, f in frames]
+        )
+        for where, widened in enumerate((radii, np.hypot(radii, far))):
+            held[where, k] = (off[where][:, None] <= widened).mean(axis=0)
+    return Film(row["body"], row["views"], held, kept["depths"] / kept["true_depths"] - 1.0)
 
 
-def depth_deviation(films: Sequence[Film]) -> float:
-    """Return the standard deviation of the depth by one camera, a share of it, by the level of 80 %."""
-    off = np.concatenate([np.abs(film.kept["depths"] / film.kept["true_depths"] - 1.0) for film in films])
-    return float(np.quantile(off, LEVELS[MAIN_LEVEL]) / ndtri(0.5 + 0.5 * LEVELS[MAIN_LEVEL]))
-
-
-def learned(films: Sequence[Film], depth: float | None) -> dict[str, float]:
-    """Return the least shared deviation of each part with which 80 % hold 80 %."""
-    deviations = {}
-    for name, joints in JOINTS_OF.items():
-        held = [np.mean([film.inside(joints, shared, MAIN_LEVEL, depth) for film in films]) for shared in GRID]
-        enough = np.flatnonzero(np.array(held) >= LEVELS[MAIN_LEVEL])
-        deviations[name] = float(GRID[enough[0] if len(enough) else -1])
-    return deviations
+def least_shared(films: Sequence[Film], where: int, joints: Sequence[int]) -> int:
+    """Return the place in the grid of the least shared error with which 80 % hold 80 % of some joints."""
+    held = np.mean([film.held[where, :, MAIN_LEVEL][:, joints] for film in films], axis=(0, 2))
+    enough = np.flatnonzero(held >= LEVELS[MAIN_LEVEL])
+    return int(enough[0]) if len(enough) else len(GRID) - 1
 
 
 def intervals_lines(films: Sequence[Film]) -> Iterator[str]:
-    """Yield the deviations that even bodies have, and how often the package's intervals hold for odd ones."""
-    heads = ["cameras", "in", *(f"{100 * level:.0f} %" for level in LEVELS), *(f"80 %, {name}" for name in JOINTS_OF)]
-    cells = []
-    for views in PLACES:
-        some = [film for film in films if film.row["views"] == views]
-        halves = [[film for film in some if film.row["body"] % 2 == odd] for odd in (0, 1)]
-        off = depth_deviation(halves[0]) if views == 1 else 0.0
-        for where, depth, spreads in (
-            ("body", None, shared_spreads(views)),
-            ("world", off, shared_spreads(views, world=True)),
-        ):
-            yield f"{views}, {where}: { ({k: round(1e3 * v) for k, v in learned(halves[0], depth).items()}) } {off:.3f}"
-            package = None if depth is None else DEPTH * (views == 1)
-            held = np.array(
-                [
-                    [
-                        np.mean([film.inside(joints, spreads[joints[0]], k, package) for film in halves[1]])
-                        for k in range(len(LEVELS))
-                    ]
-                    for joints in JOINTS_OF.values()
-                ]
-            )
-            weights = np.array([len(joints) for joints in JOINTS_OF.values()]) * (np.arange(len(JOINTS_OF)) > 0)
-            cells.append(
-                [
-                    str(views),
-                    where,
-                    *(percent(x, 0) for x in weights @ held / weights.sum()),
-                    *(percent(x, 0) for x in held[:, MAIN_LEVEL]),
-                ]
-            )
+    """Yield what all films teach, and how often intervals hold for each body, learned from films of the others."""
+    alone = np.abs(np.concatenate([film.depths_off for film in films if film.views == 1]))
+    yield f"depth by one camera: {np.quantile(alone, LEVELS[MAIN_LEVEL]) / ndtri(0.5 + 0.5 * LEVELS[MAIN_LEVEL]):.3f}"
+    yield ""
+    heads = ["cameras", "in the", *(f"{100 * level:.0f} %" for level in LEVELS), *(f"80 % of {part}" for part in PARTS)]
+    cells, unwidened = [], []
+    for views, (where, name) in product(PLACES, enumerate(("body", "world"))):
+        some = [film for film in films if film.views == views]
+        alike = [film for film in films if (film.views > 1) == (views > 1)]
+        taught = {part: int(1e3 * GRID[least_shared(alike, where, joints)]) for part, joints in JOINTS_OF.items()}
+        yield f"{views} cameras, in the {name}, mm: {taught}"
+        held = np.empty((len(some), len(LEVELS), len(JOINTS)))
+        for film, shares in zip(some, held, strict=True):
+            others = [other for other in alike if other.body != film.body]
+            for joints in JOINTS_OF.values():
+                shares[:, joints] = film.held[where, least_shared(others, where, joints)][:, joints]
+        parts = [percent(float(held[:, MAIN_LEVEL, joints].mean()), 0) for joints in JOINTS_OF.values()]
+        cells.append([str(views), name, *(percent(float(x), 0) for x in held[..., 1:].mean(axis=(0, 2))), *parts])
+        bare = np.mean([film.held[where, 0, :, 1:] for film in some], axis=(0, 2))
+        unwidened.append([str(views), name, *(percent(float(x), 0) for x in bare)])
+    yield ""
     yield from markdown(heads, cells, 2)
+    yield ""
+    yield from markdown([*heads[: 2 + len(LEVELS)]], unwidened, 2)
 
 
 def accuracy_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
-from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.shared import depth_halves
 
@@ -48,7 +48,7 @@ class Content:
         """
         if all(frame.posterior is None for frame in self.frames):
             return {}
-        skeleton, cameras = self.scene.body.skeleton, self.scene.cameras
+        skeleton, camera = self.scene.body.skeleton, self.scene.cameras[0]
         radii, places = np.full((2, len(self.frames), len(LEVELS), len(JOINTS)), np.nan)
         halves = np.full((len(self.frames), len(LEVELS), ANGLES), np.nan)
         for k, frame in enumerate(self.frames):
@@ -56,7 +56,8 @@ class Content:
                 radii[k], in_world = (
                     joint_intervals(skeleton, frame.posterior, frame.pose, world) for world in (False, True)
                 )
-                places[k] = np.hypot(in_world, depth_halves(cameras, frame.translation))
+                model = frame.posterior.recalibration or Recalibration()
+                places[k] = np.hypot(in_world, depth_halves(model, camera, frame.translation))
                 halves[k] = angle_intervals(frame.posterior, frame.pose)
         intervals = {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
         return intervals | ({"place_radii": places} if self.scene.truth is None else {})

@@ -37,7 +37,7 @@ def evaluate(
     from the first mask that was read. The build is that of `scene`; that of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
-    posteriors = [frame.posterior and _finished(scene, frame.posterior) for frame in frames]
+    posteriors = [frame.posterior and _finished(scene, frame.posterior, options.height is not None) for frame in frames]
     frames = [replace(frame, posterior=each) for frame, each in zip(frames, posteriors, strict=True)]
     training = None if scene.truth is None else task.angles
     table, measures = evaluated(scene, frames, method.prior, training, method.audit.beta, clock)
@@ -69,11 +69,11 @@ def evaluate(
     return Track(motion, frames, table, measures, trust, gait, setup, log, modes, scene)
 
 
-def _finished(scene: Scene, posterior: Posterior) -> Posterior:
+def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posterior:
     """Return a posterior with its modes, and less sure where footage leaves more open than single frames show."""
     model = posterior.recalibration
     if scene.truth is None and model is not None:
-        model = in_footage(model, len(scene.cameras))
+        model = in_footage(model, len(scene.cameras), height_known)
     return replace(posterior, modes=modes_of(scene.body.skeleton, posterior), recalibration=model)
 
 

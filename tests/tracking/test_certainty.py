@@ -85,10 +85,11 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) 
 
 
 def test_footage_has_intervals_in_the_world_too_which_are_wider(scene: Scene) -> None:
-    posterior = Posterior(np.zeros((1, 66)), np.zeros((1, 3)), np.ones(1), recalibration=in_footage(SPREAD, 1))
+    model = in_footage(SPREAD, 1, True)
+    posterior = Posterior(np.zeros((1, 66)), np.zeros((1, 3)), np.ones(1), recalibration=model)
     frames = [replace(frame, pose=np.zeros(66), posterior=posterior) for frame in exact_frames(scene)]
     intervals = Content(replace(scene, truth=None), frames, {}, Gait(), {}).intervals
-    depth = depth_halves(scene.cameras, frames[0].translation)
+    depth = depth_halves(model, scene.cameras[0], frames[0].translation)
     for name, least in (("joint_radii", 0.0), ("place_radii", depth)):
         spreads = np.hypot(0.02, shared_spreads(1, world=name == "place_radii"))
         expected = np.hypot(np.outer([*MAXWELL.values()], spreads), least)

@@ -13,7 +13,7 @@ from posefit.motion.built_in import average_skeleton
 from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import Posterior
-from posefit.uncertainty.shared import DEPTH, depth_halves, in_footage, shared_spreads
+from posefit.uncertainty.shared import DEPTH, STATURE, depth_halves, in_footage, shared_spreads
 from tests.cases import each
 
 SKELETON = average_skeleton()
@@ -62,7 +62,7 @@ def test_factors_multiply_the_intervals() -> None:
 
 
 def test_errors_of_footage_add_by_squares() -> None:
-    model = in_footage(Recalibration(joint_spreads=np.full(27, 0.03)), 2)
+    model = in_footage(Recalibration(joint_spreads=np.full(27, 0.03)), 2, True)
     np.testing.assert_allclose(model.joint_spreads**2, 0.03**2 + shared_spreads(2) ** 2)
     np.testing.assert_allclose(model.place_spreads**2, 0.03**2 + shared_spreads(2, world=True) ** 2)
     some = yawed([0, 10, 20], [0.5, 0.3, 0.2], model)
@@ -71,19 +71,23 @@ def test_errors_of_footage_add_by_squares() -> None:
     np.testing.assert_array_equal(radii, joint_intervals(SKELETON, other, STILL))
 
 
-def test_footage_is_less_sure_by_fewer_cameras() -> None:
-    for world in (False, True):
-        one, two, four = (shared_spreads(cameras, world) for cameras in (1, 2, 4))
-        assert one.mean() >= two.mean() >= four.mean() > 0.0
-        np.testing.assert_array_equal(shared_spreads(3, world), four)
-        assert (two[0] > 0.0) == world  # the root
+def test_the_root_is_off_in_the_world_alone() -> None:
+    for cameras in (1, 2, 4):
+        about, world = shared_spreads(cameras), shared_spreads(cameras, world=True)
+        assert about[0] == 0.0
+        assert world[0] > 0.0
+    np.testing.assert_array_equal(shared_spreads(2), shared_spreads(4))
 
 
 def test_one_camera_alone_does_not_show_the_depth() -> None:
-    cameras = [Camera.around(np.zeros(3), azimuth, 8.0, (640, 360), 0.6) for azimuth in (0.0, 1.0)]
-    halves = DEPTH * 8.0 * np.array([[0.6745], [1.2816], [1.96]])
-    np.testing.assert_allclose(depth_halves(cameras[:1], np.zeros(3)), halves, rtol=1e-4)
-    np.testing.assert_array_equal(depth_halves(cameras, np.zeros(3)), 0.0)
+    camera = Camera.around(np.zeros(3), 1.0, 8.0, (640, 360), 0.6)
+    given, guessed, several = (
+        depth_halves(in_footage(Recalibration(), *known), camera, np.zeros(3))
+        for known in ((1, True), (1, False), (2, False))
+    )
+    np.testing.assert_allclose(given, DEPTH * 8.0 * np.array([[0.6745], [1.2816], [1.96]]), rtol=1e-4)
+    np.testing.assert_allclose(guessed, np.hypot(DEPTH, STATURE) / DEPTH * given)
+    np.testing.assert_array_equal(several, 0.0)
 
 
 def test_angles_are_circular() -> None:
