@@ -84,5 +84,5 @@ def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: An
     """
     from posefit.report.write import leaderboard_lines, write_report
 
-    summary = write_report(ledger, out, warn=say, **others)
+    summary = write_report(ledger, out, **others)
     print_result(leaderboard_lines(summary), summary, as_json)

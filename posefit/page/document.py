@@ -10,7 +10,7 @@ import numpy as np
 from posefit.arrays import Array
 
 PART = "<!--part-->"  # in the markup: the places of style, data and script
-SHARED = ("base", "chart", "body", "play")  # scripts of every page, in this order
+SHARED = ("base", "chart")  # scripts of every page, in this order
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 

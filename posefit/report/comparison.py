@@ -45,10 +45,10 @@ class Comparison:
 
     def report(self, path: str | Path) -> dict[str, Any]:
         """Write the report, one page, and return what it says as a mapping."""
-        return write_report(str(self.ledger.path), str(path), warn=interactive().log)
+        return write_report(str(self.ledger.path), str(path))
 
     def __str__(self) -> str:
-        return "\n".join(leaderboard_lines(write_report(str(self.ledger.path), None, warn=interactive().log)))
+        return "\n".join(leaderboard_lines(write_report(str(self.ledger.path), None)))
 
 
 def compare(

@@ -1,6 +1,6 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,6 @@ def write_report(
     *,
     figures: str | None = None,
     csv: str | None = None,
-    warn: Callable[[str], None],
 ) -> dict[str, Any]:
     """Write the report of a ledger, or of several together, to a file, and return what the command prints.
 
@@ -47,7 +46,7 @@ def write_report(
     runs = runs_of(ledger)
     if runs.kind.name == "search" and figures is not None:
         raise InputError("--figures must be given with a sweep of tracks, got one of single searches")
-    data = data_of(ledger, runs, warn)
+    data = data_of(ledger, runs)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
             page = document(data)

@@ -7,12 +7,11 @@ and `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only ones th
 are sorted by what the spec says, not by when they were finished.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posefit.errors import InputError
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
 from posefit.settings import settings_text
@@ -70,18 +69,6 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         else:
             flat[name] = "; ".join(value) if isinstance(value, list) else value
     return flat
-
-
-def search_runs(rows: Iterable[Mapping[str, Any]], path: object) -> Iterator[SuiteRun]:
-    """Yield the runs of a ledger's rows. Raises ValueError, naming its path, where there are none, or other ones."""
-    count = 0
-    for row in rows:
-        if row["spec"]["kind"] != "search":
-            raise InputError(f"{path}: expected a ledger of single searches, got one of tracks: posefit report")
-        count += 1
-        yield search_run(row)
-    if not count:
-        raise InputError(f"{path}: expected a ledger with finished rows, got one with none")
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 
 from posefit.evaluation.measures import BASELINES, MEASURES
-from posefit.report.tracks import Tracks
+from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import run_cell
 from tests.report.contests import FIRST
 
-COLUMNS = Tracks.columns
+COLUMNS = TRACKS.columns
 CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=80)
 
 

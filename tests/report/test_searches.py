@@ -83,7 +83,7 @@ def test_instances_that_one_method_lacks_are_named(tmp_path: Path) -> None:
 
 def test_curves_and_running_times_are_those_of_the_traces(tmp_path: Path) -> None:
     results = Ledger(searched(tmp_path / "r", {"cma": 9}, problems([1, 5], [9], 2)))  # 9 + 2 and 9; 9 and 9 + 1
-    data = data_of(results, runs_of(results), print)
+    data = data_of(results, runs_of(results))
     assert [chart["title"] for chart in data["charts"]] == ["All functions", "1 single image", "5 sequence"]
     together, first, _ = (chart["lines"][0]["y"] for chart in data["charts"])
     evaluations = data["charts"][0]["lines"][0]["x"]

@@ -18,10 +18,10 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import stride_curves
 from posefit.motion.motion import Motion
 from posefit.output.content import Content
+from posefit.output.page.bodies import camera_from_origin, in_16_bits
 from posefit.output.page.stills import Stills
 from posefit.output.picture import MIN_OTHER_WEIGHT
 from posefit.output.text import brief, gait_line, gait_rows, held_frames, undetermined
-from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
 
