@@ -23,10 +23,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
-from posefit.geometry.skeleton import JOINTS
 from posefit.reading import counted, cut, quoted
 from posefit.sweep.cell import Cell, CellResult, cell_from
-from posefit.sweep.row import checked_row
+from posefit.sweep.check import checked_row
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
@@ -129,18 +128,14 @@ class Ledger:
         try:
             ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                unpacked = sum(member.file_size for member in archive.infolist())
-            if unpacked <= MAX_JOINTS_BYTES:
-                with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-                    joints: dict[str, Any] = {
-                        name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")
-                    }
-                shapes = {array.shape for array in joints.values() if np.isfinite(array).all()}
-                if len(shapes) == 1 and (shape := shapes.pop())[1:] == (len(JOINTS), 3) and shape[0]:
-                    return joints
+                if sum(member.file_size for member in archive.infolist()) > MAX_JOINTS_BYTES:
+                    raise ValueError("more than a cell has")
+            with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+                return {name: stored[name] for name in ("estimate", "truth")}
         except Exception:  # whatever a hostile archive raises
-            pass
-        raise InputError(f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones")
+            raise InputError(
+                f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones"
+            ) from None
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""

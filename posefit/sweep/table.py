@@ -31,18 +31,8 @@ _TEXTS = (
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     pandas = import_pandas()
-    columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
-    count = 0
-    for row in rows:
-        for name, value in flat(row).items():
-            column = columns.setdefault(name, [])
-            column.extend([None] * (count - len(column)))
-            column.append(value)
-        count += 1
-    for values in columns.values():
-        values.extend([None] * (count - len(values)))
-    table: pd.DataFrame = pandas.DataFrame({name: pandas.Series(values) for name, values in columns.items()})
-    return table.sort_values(list(ORDER), ignore_index=True) if count else table
+    table = pandas.DataFrame([{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows])
+    return table.sort_values(list(ORDER), ignore_index=True) if len(table) else pandas.DataFrame(columns=list(_TEXTS))
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -74,8 +74,8 @@ SPEC = cells(1)[0].spec
 @each(
     ("column", "change", "reason"),
     [
-        ("row", {"cost": "low"}, "cost must be what posefit writes, got 'low'"),
-        ("row", {"cost": 10**400}, "cost must be what"),
+        ("row", {"cost": "low"}, "cost must be a number that a cell can measure, got 'low'"),
+        ("row", {"cost": 10**400}, "cost must be a number"),
         ("row", {"cost": float("nan")}, "finite numbers"),
         ("row", {"error_degrees": {"mean": "x"}}, "error_degrees must be"),
         ("row", {"trace": {"evaluations": [1, 1], "cost": [2, 1]}}, "trace must be rising evaluations"),
@@ -83,7 +83,7 @@ SPEC = cells(1)[0].spec
         ("row", {"joint_errors_mm": [0.0] * 26}, "joint_errors_mm must be 27 numbers"),
         ("row", {"warnings": "none"}, "warnings must be"),
         ("row", {"warnings": ["\ud800"]}, "whole characters"),
-        ("row", {"mode_reliability": [[1, -1.0, 0.5]]}, "mode_reliability triples"),
+        ("row", {"mode_reliability": [[1, -1.0, 0.5]]}, "the probability of mode_reliability must lie in 0 to 1"),
         ("spec", {"seed": "0\nEND\nrm -r x"}, "seed must be"),
         ("spec", {"frames": 10**7}, "frames must lie in 1 to 100000"),
         ("spec", {"settings": {"a": {}}}, "settings must be"),
