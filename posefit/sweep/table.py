@@ -31,8 +31,10 @@ _TEXTS = (
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     pandas = import_pandas()
-    table = pandas.DataFrame([{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows])
-    return table.sort_values(list(ORDER), ignore_index=True) if len(table) else pandas.DataFrame(columns=list(_TEXTS))
+    table: pd.DataFrame = pandas.DataFrame([{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows])
+    if table.empty:
+        return table.reindex(columns=list(_TEXTS))
+    return table.sort_values(list(ORDER), ignore_index=True)
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
