@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options, track_flags
+from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options, track_flags, under
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
@@ -18,13 +18,14 @@ from posefit.progress import Progress
 if TYPE_CHECKING:
     from posefit.footage.source import Kind
 
+_OF_FILES = ("source", "out", "force", "resume")
 COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
 
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
 @FRAMES
-@click.option(
+@under("What is seen")(
     "--live", metavar="DEVICE|URL|-", help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures."
 )
 def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options: Any) -> None:
@@ -54,7 +55,9 @@ def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
-@click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
+@under("What is seen")(
+    "--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling."
+)
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
 
@@ -79,9 +82,10 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progre
         raise InputError(f"SOURCE must be left out with --live, got {' '.join(options['source'])}")
     if useless := [name for name in ("force", "resume", "without_subject") if options[name]]:
         raise InputError(f"--{useless[0].replace('_', '-')} must be left out with --live")
-    given = _arguments(options, "video")
-    kept = {name: given[name] for name in given if name not in ("source", "out", "force", "resume")}
-    frames, out = track_live(live, progress=shown, **kept), options["out"]
+    out = options["out"]
+    # frames that come are taken as those of a video
+    chosen = {name: value for name, value in _arguments(options, "video").items() if name not in _OF_FILES}
+    frames = track_live(live, progress=shown, **chosen)
     summary = write_live(frames, out, (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None)
     latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
     shown.log(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
