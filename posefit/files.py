@@ -26,20 +26,20 @@ _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to
 
 
 def check_new(path: str | Path) -> None:
-    """Return nothing. Raises InputError where `path` exists, be it a link that leads nowhere."""
+    """Raise InputError where `path` exists, be it a link that leads nowhere."""
     if os.path.lexists(path):
         raise _exists(path)
 
 
 def check_place(path: str | Path) -> None:
-    """Return nothing. Raises InputError where `path` is in no folder, or in one that cannot be written to."""
+    """Raise InputError where `path` is in no folder, or in one that cannot be written to."""
     parent = Path(path).resolve().parent
     if not parent.is_dir() or not os.access(parent, os.W_OK):
         raise InputError(f"{path}: expected a place to write to, got one in {parent}, which is none")
 
 
 def check_free(path: str | Path | None) -> None:
-    """Return nothing. Raises InputError as `check_new` and `check_place` do, where there is a path."""
+    """Raise InputError as `check_new` and `check_place` do, where there is a path."""
     if path is not None:
         check_new(path)
         check_place(path)

@@ -94,7 +94,7 @@ def memory(gigabytes: float) -> Iterator[None]:
 
 
 def check_decoded(name: str, size: int) -> None:
-    """Return nothing. Raises InputError where masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES allows.
+    """Raise InputError where masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES allows.
 
     They take time rather than memory, where they become bits frame by frame.
     """

@@ -17,6 +17,7 @@ from posefit.progress import Progress
 
 if TYPE_CHECKING:
     from posefit.footage.source import Kind
+    from posefit.output.content import Content
 
 _OF_FILES = ("source", "out", "force", "resume")
 COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
@@ -50,7 +51,7 @@ def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options
         result = run(progress=shown, **_arguments(options))
     shown.log("took " + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()))
     hint = "open track.html, watch overlay.mp4, look at summary.png"
-    _print(result.summary, as_json, {}, options["out"], verbose, hint)
+    _print(result.content, as_json, {}, options["out"], verbose, hint)
 
 
 @click.command(cls=TrackCommand)
@@ -72,7 +73,7 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
         result = run(progress=Progress() if quiet else Progress(say), **_arguments(options))
     degrees = [round(math.degrees(angle), 6) for angle in result.pose]
     more = {"pose_degrees": degrees}
-    _print(result.summary, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
+    _print(result.track.content, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
 
 
 def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progress) -> None:
@@ -92,19 +93,19 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progre
 
 
 def _print(
-    summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
+    content: "Content", as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
 ) -> None:
-    """Print a track's summary: as JSON with something more, in three lines, or whole."""
+    """Print what a track is: as JSON with something more, in three lines, or whole."""
     from posefit.output.text import brief, table
 
     if as_json:
-        click.echo(json.dumps({**summary, **more}))
+        click.echo(json.dumps({**content.summary, **more}))
         return
     if verbose:
-        click.echo(table(summary))
+        click.echo(table(content))
     else:
-        worth, *work = brief(summary)
-        grade = "good" if summary["trust"] is None else summary["trust"]["grade"]
+        worth, *work = brief(content)
+        grade = "good" if content.trust is None else content.trust.grade
         click.secho(worth, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(work))
     if out or not verbose:

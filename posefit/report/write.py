@@ -17,7 +17,6 @@ from posefit.sweep.ledger import Ledger
 from posefit.sweep.table import flat
 
 SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
-WRITTEN = 1_000_000  # characters of a page that are encoded together
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
 
@@ -49,9 +48,7 @@ def write_report(
     data = data_of(ledger, runs)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
-            page = document(data)
-            with building.open("w", encoding="utf-8", newline="\n") as file:  # at once it takes thrice the memory
-                file.writelines(page[start : start + WRITTEN] for start in range(0, len(page), WRITTEN))
+            building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         write_figures(runs, figures)
     if csv is not None:

@@ -67,7 +67,6 @@ class Ledger:
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
-        self._paths = paths
         self.files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
         self._open = [(file, _reader(file)) for file in self.files]
         # of cells in several files the first finished one counts, or the first
@@ -76,9 +75,6 @@ class Ledger:
             for key, status in self._query(k, "SELECT key, status FROM cells WHERE status != 'planned'"):
                 if key not in self._places or (status == "done" and not self._places[key][1]):
                     self._places[key] = k, status == "done"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Ledger, tuple(Path(path).absolute() for path in self._paths)
 
     def __len__(self) -> int:
         return sum(done for _, done in self._places.values())

@@ -38,14 +38,6 @@ def test_every_figure_has_its_place_in_a_row(row):
     assert {name: values[name] for name in expected} == expected
 
 
-def test_a_row_that_lacks_a_figure_has_nan(row):
-    for column in COLUMNS.values():
-        without = {name: value for name, value in row.items() if name != column.path[0]}
-        assert math.isnan(column.value(without)), column.name
-        assert math.isnan(column.value({**row, column.path[0]: None})), column.name
-    assert math.isnan(COLUMNS["skill_nearest"].value({**row, "skill": {"nearest": None}}))
-
-
 def test_a_row_has_how_often_the_likeliest_mode_was_right(row):
     counts, probabilities, right = zip(*row["mode_reliability"], strict=True)
     assert sum(counts) == 3

@@ -11,10 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.report.write import write_report
 from posefit.sweep.cell import CellResult
-from posefit.sweep.ledger import FILE
-from tests.effort import effort
 from tests.report.browser import ledger, result, row_of
 from tests.sweep.fake import cells
 
@@ -43,20 +40,6 @@ def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellRes
                 trace: dict[str, Any] = {"evaluations": PROPOSED, "cost": np.round(FALLING + error, 4).tolist()}
                 cell = replace(first, method=f"m{m}@pca", instance=i, seed=s)
                 yield CellResult(row_of(cell, error, trace=trace), picture)
-
-
-@counted
-@pytest.mark.slow
-def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(tmp_path: Path) -> None:
-    efforts = []
-    for instances, seeds in ((3, 5), (5, 5), (10, 5), (20, 5)):  # the first imports what the others need
-        made = ledger(tmp_path / f"{instances}", rows(instances, seeds))
-        page = tmp_path / f"{instances}.html"
-        efforts.append(effort(lambda made=made, page=page: write_report(made, page)))  # type: ignore[misc]
-        size = (made / FILE).stat().st_size
-        assert instances == 3 or efforts[-1].read < 6.0 * size
-    calls = [taken.calls for taken in efforts]
-    assert calls[3] - calls[2] < 1.2 * 2.0 * (calls[2] - calls[1])
 
 
 @pytest.mark.slow

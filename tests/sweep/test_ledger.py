@@ -2,7 +2,6 @@
 
 import json
 import os
-import pickle
 import signal
 import sqlite3
 import subprocess
@@ -287,13 +286,6 @@ def test_a_version_is_another_one_where_any_part_of_it_is_not_the_installed_one(
     versions = [f"{posefit_build()}, {swarm}", f"{posefit_build()}, posefit_swarm 0ld", f"posefit 0.0.9 a1, {swarm}"]
     versions += [f"{posefit_build()}, posefit_elsewhere 1.0"]  # a plugin that is not installed here
     assert [v for v in versions if any(map(other_version, v.split(", ")))] == versions[1:3]
-
-
-def test_a_ledger_is_pickled_as_the_places_of_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(filled(tmp_path / "results", 2).parent)
-    pickled = pickle.dumps(ledger := Ledger("results"))
-    monkeypatch.chdir("/")
-    assert list(pickle.loads(pickled).rows()) == list(ledger.rows())
 
 
 def test_a_ledger_is_read_while_its_driver_writes(tmp_path: Path) -> None:

@@ -106,9 +106,6 @@ function leaderboard() {
   ];
   const columns = [
     ...first.filter(({ value }) => D.leaderboard.some((row) => given(value(row)))),
-    further(
-      textColumn("group", "letters", String, { about: "Methods that share a letter do not differ significantly" }),
-    ),
     ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [further(figure(one))])),
     further(column("runs", "runs", whole, { down: true })),
   ];
