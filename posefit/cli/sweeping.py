@@ -64,7 +64,7 @@ def sweep(
 @click.command()
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
-@click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
+@click.option("--figures", metavar="DIR", help="New folder for figures of a paper; needs posefit[figures].")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @JSON
 def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:

@@ -1,4 +1,4 @@
-r"""The report of a ledger: a page that any browser opens, figures and tables for papers, files for other tools.
+r"""The report of a ledger: a page that any browser opens, figures for papers, rows for other tools.
 
     from posefit.report.leaderboard import contest_of, leaderboard
     from posefit.report.runs import runs_of
@@ -21,8 +21,7 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | the sentences of the first screen | summary.py |
 | the data of the page, by two lists of sections | content.py |
 | the page: markup, style and scripts as one document | page/ |
-| charts by matplotlib, and the folder of a paper's figures and tables | figures.py |
-| LaTeX and CSV | export.py |
+| charts by matplotlib, and the folder of a paper's figures | figures.py |
 | the command that runs one row again | repeat.py |
 
 Statistics are in `posefit.statistics`.

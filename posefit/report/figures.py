@@ -1,4 +1,4 @@
-"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures and tables.
+"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures.
 
 `methods` (m,) are names: a method has the same colour in every figure with the same names.
 """
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from posefit.errors import InputError
 from posefit.files import new_folder
 from posefit.report.charts import Chart, track_charts
-from posefit.report.export import latex_table, write_csv
 from posefit.report.kind import Runs
 from posefit.report.leaderboard import contest_of, leaderboard
+from posefit.sweep.table import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,7 +59,7 @@ def library(name: str) -> Any:
 
 
 def write_figures(runs: Runs, path: str | Path) -> None:
-    """Write a new folder of figures, as PNG and PDF, and the leaderboard as LaTeX and CSV.
+    """Write a new folder of figures, as PNG and PDF, and the leaderboard as CSV.
 
     Figures are left out where the runs do not have the data. Raises ValueError where no run has an error, or where the
     folder exists or cannot be written.
@@ -77,6 +77,4 @@ def write_figures(runs: Runs, path: str | Path) -> None:
         for name, figure in figures.items():
             for kind in ("png", "pdf"):
                 save(figure, folder / f"{name}.{kind}")
-        latex = latex_table(list(table), [list(row.values()) for row in rows])
-        (folder / "leaderboard.tex").write_text(latex, encoding="utf-8")
         write_csv(rows, folder / "leaderboard.csv")

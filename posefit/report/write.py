@@ -10,11 +10,10 @@ from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.content import data_of
-from posefit.report.export import write_csv
 from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.table import flat
+from posefit.sweep.table import flat, write_csv
 
 SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
@@ -31,7 +30,7 @@ def write_report(
 
     That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
     `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
-    figures (PNG, PDF) and tables (LaTeX, CSV), `csv` a new file of all rows.
+    figures (PNG, PDF) and the leaderboard (CSV), `csv` a new file of all rows.
     Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
     need matplotlib: before anything is written, if possible.
     """

@@ -6,8 +6,8 @@ Cells are in the table `cells`: key, kind ("track" or "search"), spec (JSON: wha
 "quarantined"), faults (JSON: the reasons of failed attempts), losses (times that something outside ended it), row
 (JSON: the figures) and arrays (an .npz). The view `runs` has what queries ask for most as columns.
 
-One driver writes a file: it holds a transaction open in a second one beside it, FILE.driver, which names its process.
-SQLite and the operating system drop that lock when the process ends in any way.
+One driver writes a file: it holds a lock on a second one beside it, FILE.driver, which names its process. The operating
+system drops that lock when the process ends in any way.
 """
 
 import io
@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
+from posefit.files import lock
 from posefit.reading import counted, cut, quoted
 from posefit.sweep.cell import Cell, CellResult, cell_from
 from posefit.sweep.check import checked_row
@@ -108,14 +109,6 @@ class Ledger:
         yield from self.rows()
         yield from self.quarantined()
 
-    def row(self, key: str) -> dict[str, Any]:
-        """Return the row of a cell. Raises KeyError where there is none."""
-        if key not in self:
-            raise KeyError(key)
-        k, _ = self._places[key]
-        (values,) = self._query(k, f"{SELECT} WHERE key = ?", key)
-        return self._checked(k, *values)
-
     def joints(self, key: str) -> dict[str, "Array"]:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
         import numpy as np
@@ -183,8 +176,8 @@ class Writer:
         _check_place(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(self.path)
             self._db = sqlite3.connect(self.path, timeout=BUSY_SECONDS, isolation_level=None)
+            self._lock = _locked(self.path)
         except (OSError, sqlite3.Error) as error:
             raise _unwritable(self.path, error) from None
         try:
@@ -210,9 +203,8 @@ class Writer:
 
     def close(self) -> None:
         """Let others drive it."""
-        for database in (getattr(self, "_db", None), self._lock):
-            if database is not None:
-                database.close()
+        self._db.close()
+        os.close(self._lock)
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -334,29 +326,22 @@ def _check_place(path: Path) -> None:
         raise InputError(f"{folder}: expected a new folder or a ledger, got one with {names[0]}")
 
 
-def _locked(path: Path) -> sqlite3.Connection:
-    """Return what says, as long as it is open, that this process drives a file. Raises InputError where one does."""
-    database = sqlite3.connect(f"{path}{DRIVER}", timeout=0.0, isolation_level=None)
-    try:
-        database.execute("BEGIN IMMEDIATE")
-        database.execute("CREATE TABLE IF NOT EXISTS driver (process INTEGER, host TEXT)")
-        database.execute("DELETE FROM driver")
-        database.execute("INSERT INTO driver VALUES (?, ?)", [os.getpid(), socket.gethostname()])
-        database.execute("COMMIT")
-        database.execute("BEGIN IMMEDIATE")
-    except sqlite3.OperationalError as error:
-        if "locked" not in str(error):
-            raise
-        try:
-            process, host = database.execute("SELECT process, host FROM driver").fetchone()
-        except (sqlite3.Error, TypeError):
-            process, host = "another", "this disk"
-        database.close()
+def _locked(path: Path) -> int:
+    """Return an open file that says, as long as it is locked, that this process drives another.
+
+    Raises InputError where another process does.
+    """
+    file = os.open(f"{path}{DRIVER}", os.O_RDWR | os.O_CREAT, 0o666)
+    if not lock(file):
+        driver = os.read(file, 1000).decode(errors="replace") or "another process"
+        os.close(file)
         raise InputError(
-            f"{path}: expected a ledger that no other sweep writes to, got one that process {process} of {host} "
-            "drives; --shard I/N writes to a file of its own"
-        ) from None
-    return database
+            f"{path}: expected a ledger that no other sweep writes to, got one that {cut(driver)} drives; "
+            "--shard I/N writes to a file of its own"
+        )
+    os.ftruncate(file, 0)
+    os.write(file, f"process {os.getpid()} of {socket.gethostname()}".encode())
+    return file
 
 
 def _damaged(file: Path, error: Exception) -> InputError:

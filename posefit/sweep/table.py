@@ -1,4 +1,4 @@
-"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it; or as runs of a suite.
+"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it; as CSV; or as runs of a suite.
 
 Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
 `corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
@@ -7,11 +7,15 @@ and `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only ones th
 are sorted by what the spec says, not by when they were finished.
 """
 
+import csv
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from posefit.errors import InputError
+from posefit.files import new_file
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
 from posefit.settings import settings_text
@@ -61,6 +65,21 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         else:
             flat[name] = "; ".join(value) if isinstance(value, list) else value
     return flat
+
+
+def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
+    """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order of their first row.
+
+    Missing values are left empty. Raises ValueError where there is no row, and where the file exists or cannot be
+    written.
+    """
+    table = list(rows)
+    if not table:
+        raise InputError("rows must be at least one, got none")
+    with new_file(path) as building, building.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in table for name in row)), restval="")
+        writer.writeheader()
+        writer.writerows(table)
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:

@@ -13,6 +13,7 @@ import pytest
 
 from posefit.page.document import embedded, plain
 from posefit.report.page import MARK
+from posefit.sweep.table import write_csv
 from tests.commands import error_of, run
 from tests.report.browser import data_in, ledger, result, sure
 from tests.report.contests import FIRST, full
@@ -134,8 +135,7 @@ def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> Non
     written(results, "--figures", figures, "--csv", rows)
     names = ("convergence", "profile")
     drawn = {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
-    assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.tex", "leaderboard.csv"}
-    assert "sapso@pca & 1.06" in (figures / "leaderboard.tex").read_text()
+    assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.csv"}
     with rows.open(newline="", encoding="utf-8") as file:
         statuses = [row["status"] for row in csv.DictReader(file)]
     assert sorted(statuses) == ["done"] * 8 + ["quarantined"]
@@ -216,3 +216,24 @@ def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
     assert plain({"a": np.arange(2), "b": np.array([0.5, np.nan]), "c": (np.int64(2**60), True, None)}) == {
         "a": [0, 1], "b": [0.5, None], "c": [2**60, True, None],
     }  # fmt: skip
+
+
+def test_csv_is_read_back_with_what_would_break_it(tmp_path: Path) -> None:
+    rows = [{"method": 'a,"b"\nc', "error": 0.1 + 0.2}, {"method": "Ä", "lost": None, "error": 1}]
+    write_csv(rows, tmp_path / "rows.csv")
+    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
+    assert read == [
+        {"method": 'a,"b"\nc', "error": "0.30000000000000004", "lost": ""},
+        {"method": "Ä", "error": "1", "lost": ""},
+    ]
+
+
+def test_csv_without_rows_or_over_a_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="rows must be at least one, got none"):
+        write_csv([], tmp_path / "rows.csv")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "rows.csv").write_text("mine")
+    with pytest.raises(ValueError, match="rows.csv: expected a new name to write to, got one that exists"):
+        write_csv([{"a": 1}], tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_text() == "mine"
