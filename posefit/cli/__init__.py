@@ -83,11 +83,11 @@ def run() -> None:
         say(f"posefit: standard output: expected room to write results to, got {error.strerror}")
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
-        others = (one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread())
-        left = [one for one in others if not one.name.startswith(f"{POOL}_")]
-        for thread in left:
-            thread.join(THREAD_SECONDS / len(left))
-        names = ", ".join(sorted({thread.name for thread in left if thread.is_alive()}))
+        others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
+        running = [thread for thread in others if not thread.daemon and not thread.name.startswith(f"{POOL}_")]
+        for thread in running:
+            thread.join(THREAD_SECONDS / len(running))
+        names = ", ".join(sorted({thread.name for thread in running if thread.is_alive()}))
         if names:
             say(f"posefit: not waiting for what a plugin left running: {cut(names)}")
             sys.stdout.flush()

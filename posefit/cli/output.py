@@ -79,10 +79,10 @@ def results_alone() -> Iterator[None]:
     """Send to stderr what anything prints in the body, compiled code and other processes too: stdout is for results."""
     sys.stdout.flush()
     with redirect_stdout(sys.stderr):
-        kept = os.dup(1)
+        stdout_copy = os.dup(1)
         os.dup2(2, 1)
         try:
             yield
         finally:
-            os.dup2(kept, 1)
-            os.close(kept)
+            os.dup2(stdout_copy, 1)
+            os.close(stdout_copy)

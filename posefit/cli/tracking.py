@@ -170,22 +170,22 @@ def extraction_of(options: dict[str, Any], kind: "Kind", settings: Sequence[str]
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
-    given = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
-    given = {name: value for name, value in given.items() if value is not None}
+    values = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
+    values = {name: value for name, value in values.items() if value is not None}
     if kind not in ("video", "pictures"):
-        for name, value in given.items():
+        for name, value in values.items():
             raise useless_for(kind, name, value, "video")
         return None
-    if "extraction" in given:
-        given["method"] = given.pop("extraction")
-    name = segmenter_name(given.get("method"), given.get("background"))
+    if "extraction" in values:
+        values["method"] = values.pop("extraction")
+    name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
         texts = options["settings"]
         settings = [text for text in texts if text.partition(".")[0] == name]
         options["settings"] = tuple(text for text in texts if text not in settings)
     if settings:
-        given["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, settings)
-    return Extraction(**given) if given else None
+        values["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, settings)
+    return Extraction(**values) if values else None
 
 
 def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:

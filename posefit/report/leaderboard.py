@@ -28,16 +28,16 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     more = runs.kind.board(contest)
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
-        own = contest.rows_of(m)
+        rows = contest.rows_of(m)
         row = {
             "method": m,
             "name": name,
-            "runs": len(own),
+            "runs": len(rows),
             "failed": runs.failed[m],
-            "warned": sum(k in runs.warnings for k in own.tolist()),
+            "warned": sum(k in runs.warnings for k in rows.tolist()),
             "taking_part": m in contest.methods,
         }
-        row |= {figure: column.average(runs.figures[figure][own]) for figure, column in runs.kind.columns.items()}
+        row |= {figure: column.average(runs.figures[figure][rows]) for figure, column in runs.kind.columns.items()}
         board.append({**row, **more[m]})
     sign = -1.0 if score.down else 1.0
     worst = [math.inf if row[score.name] is None else sign * row[score.name] for row in board]

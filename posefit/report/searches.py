@@ -89,7 +89,7 @@ def _board(contest: Contest) -> dict[int, dict[str, Any]]:
 def _baseline_rows(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for random search, the best of its variants that take part; none if there is none."""
     random = [k for k, m in enumerate(contest.methods) if contest.runs.variants[m]["method"] == RANDOM]
-    shares = [float(own.mean()) for own in contest.of("reached")[random]]
+    shares = [float(shares_of_runs.mean()) for shares_of_runs in contest.of("reached")[random]]
     return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
 
 

@@ -130,18 +130,18 @@ def _board(contest: Contest) -> dict[int, dict[str, Any]]:
     shared = {row["baseline"]: row["error"] for row in _baseline_rows(contest)}
     board = {}
     for m in range(len(contest.runs.methods)):
-        own = contest.rows_of(m)
-        error = interquartile_mean(figures["error"][own])
-        theirs = {name: interquartile_mean(figures[f"baseline_{name}"][own]) for name in BASELINES}
-        board[m] = ends.get(m, {"low": None, "high": None}) | _skills(error, shared if m in ends else theirs)
-        board[m]["lost_tracks"] = int((figures["lost"][own] > 0.0).sum())
+        rows = contest.rows_of(m)
+        error = interquartile_mean(figures["error"][rows])
+        unshared = {name: interquartile_mean(figures[f"baseline_{name}"][rows]) for name in BASELINES}
+        board[m] = ends.get(m, {"low": None, "high": None}) | _skills(error, shared if m in ends else unshared)
+        board[m]["lost_tracks"] = int((figures["lost"][rows] > 0.0).sum())
     return board
 
 
 def _baseline_rows(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for each baseline, on the same runs as the methods: means over the methods that have a value."""
     values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
-    errors = {name: interquartile_mean(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
+    errors = {name: interquartile_mean(errors.mean(axis=0).filled(np.nan)) for name, errors in values.items()}
     return [{"baseline": name, "error": error, **_skills(error, errors)} for name, error in errors.items()]
 
 

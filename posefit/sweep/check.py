@@ -76,8 +76,8 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
 def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry of a list of optimisers with its settings, checked, by their names alone."""
     method = _name("method", entry.get("method"))
-    given = flattened("settings", entry.get("settings", {})).items()
-    chosen = {name.rpartition(".")[2]: value for name, value in given}
+    entered = flattened("settings", entry.get("settings", {})).items()
+    chosen = {name.rpartition(".")[2]: value for name, value in entered}
     return {**entry, "settings": settings.check(method, registry().optimiser(method), chosen)}
 
 

@@ -81,7 +81,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "rows": {name: table[name][::step].tolist() for name in curves},
         "marks": {name: np.unique(np.flatnonzero(marked(table)) // step).tolist() for name, marked in MARKS.items()},
         "angles": {
-            "names": [name for name, there in zip(ANGLE_NAMES, free, strict=True) if there],
+            "names": [name for name, is_free in zip(ANGLE_NAMES, free, strict=True) if is_free],
             "values": in_16_bits(angles[:, free], UNIT),
             "truth": None
             if truth is None
