@@ -5,7 +5,7 @@ Options of a track are checked by their one declaration, all other fields here.
 
 import json
 import os
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import fields
 from functools import lru_cache, partial
 from math import inf
@@ -14,7 +14,7 @@ from typing import Any
 
 from posefit import settings
 from posefit.errors import InputError
-from posefit.fitting.check import between, finite_number, one_of, whole
+from posefit.fitting.check import between, one_of, whole
 from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
@@ -25,7 +25,7 @@ from posefit.suites.functions import DIMENSIONS, SUITES, checked_address, suite_
 from posefit.suites.problem import INFEASIBLE
 from posefit.sweep.cell import ALL_AROUND, DROPPED, KINDS, SearchCell, TrackCell, digest_of, json_of
 from posefit.tracking.method import method_names, parsed_settings, places_of
-from posefit.tracking.options import TrackOptions, declared
+from posefit.tracking.options import Check, TrackOptions, choice, declared, within
 
 FIELDS = tuple(field.name for field in fields(TrackCell) if field.name not in ("files", "version"))
 MAX_VIEWS, MAX_FRAMES = 100, 100_000  # of a cell
@@ -209,7 +209,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
     for kind in value:
         if kind not in kinds:
             raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}")
-    strengths = {kind: _within(1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
+    strengths = {kind: within(0.0, 1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
 
@@ -227,16 +227,7 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
     return flat
 
 
-def _within(high: float) -> Callable[[str, Any], float]:
-    def check(field: str, value: Any) -> float:
-        number = finite_number(field, value)
-        between(field, number, 0.0, high)
-        return number
-
-    return check
-
-
-def _whole(least: int, most: float = inf) -> "Check":
+def _whole(least: int, most: float = inf) -> Check:
     def check(field: str, value: Any) -> int:
         between(field, number := whole(field, value, least), least, most)
         return number
@@ -244,16 +235,7 @@ def _whole(least: int, most: float = inf) -> "Check":
     return check
 
 
-def _choice(*choices: object) -> "Check":
-    def checked(field: str, value: Any) -> Any:
-        one_of(field, value, choices)
-        return value
-
-    return checked
-
-
 _OPTIONS = {option.name: check for option in fields(TrackOptions) if (check := declared(option).check) is not None}
-Check = Callable[[str, Any], Any]
 Checks = Mapping[str, Check]
 CHECKS: Checks = {
     **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
@@ -266,18 +248,18 @@ CHECKS: Checks = {
     "instance": _whole(0),
     "name": _label,
     "frames": _whole(1, MAX_FRAMES),
-    "yaw_off_degrees": _within(ALL_AROUND),
-    "body_off_percent": _within(MAX_BODY_OFF),
+    "yaw_off_degrees": within(0.0, ALL_AROUND),
+    "body_off_percent": within(0.0, MAX_BODY_OFF),
 }
 SEARCH_CHECKS: Checks = {
-    "suite": _choice(*SUITES),
+    "suite": choice(*SUITES),
     "method": _name,
     "function": lambda _, value: suite_function(value).number,
-    "dimension": _choice(*DIMENSIONS),
+    "dimension": choice(*DIMENSIONS),
     "instance": _whole(0),
     "budget": _whole(1),
     "settings": flattened,
-    "infeasible": _choice(*INFEASIBLE),
+    "infeasible": choice(*INFEASIBLE),
     "seed": _whole(0),
     "name": _label,
 }
