@@ -52,28 +52,34 @@ class Bridge(Adapter):
         super().__init__(space, draw_population(space, rng, 1)[0])
         self._library, self._seed = library, int(rng.integers(2**63))
         self._costs: list[Array] = []  # of all populations so far
-        self._proposals: Proposals | None = None
-        self._asked = self.propose()  # at once, as the library checks its settings at first
+        self._begin()
+
+    def _begin(self) -> None:
+        """Start the library, which checks its settings at first."""
+        self._proposals = self._library(self._space, np.random.default_rng(self._seed))
+        self._population = next(self._proposals, np.empty((0, self._space.dimensions)))
+        self._sent = 0  # costs that the library has had
 
     def propose(self) -> Array:
         """Return the library's next population (n, d); an empty one once it has ended."""
         try:
-            if self._proposals is not None:
-                return self._proposals.send(self._costs[-1])
-            self._proposals = self._library(self._space, np.random.default_rng(self._seed))
-            population = next(self._proposals)
-            for costs in self._costs:
-                population = self._proposals.send(costs)
-            return population
+            while self._sent < len(self._costs):
+                self._sent += 1
+                self._population = self._proposals.send(self._costs[self._sent - 1])
         except StopIteration:
-            return np.empty((0, self._space.dimensions))
+            self._population = self._population[:0]
+        return self._population
 
     def learn(self, proposals: Array, costs: Array) -> None:
         """Pass the costs (n,) on."""
         self._costs.append(costs)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_proposals": None, "_asked": None}
+        return {**self.__dict__, "_proposals": None, "_population": None, "_asked": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._begin()
 
 
 def bridge(library: Callable[..., Proposals]) -> Callable[..., Bridge]:

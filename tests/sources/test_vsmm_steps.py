@@ -351,13 +351,17 @@ def test_process_noise_is_a_multiple_of_the_models_own() -> None:  # Interpretat
 NOBODY = np.zeros((len(POINTS), 2))  # points that ask for no group
 
 
+def as_likely(log_likelihoods: Array) -> Measurement:
+    """Return a measurement that moves no state, by which states (r,) are so likely, but for a common factor."""
+    count, residuals = len(log_likelihoods), np.sqrt(2.0 * (log_likelihoods.max() - log_likelihoods))
+    return Measurement(residuals[:, None], np.zeros((count, 1, ERROR)), np.eye(1))
+
+
 def telling(name: str, switching: Switching) -> Callable[[Array], Measurement]:
     """Return a measurement of nothing, but that the model's prediction is the most likely."""
 
     def measure(states: Array) -> Measurement:
-        likelihoods = np.array([0.0 if model == name else -3.0 for model in switching.active])
-        count = len(states)
-        return Measurement(np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0)), likelihoods)
+        return as_likely(np.array([0.0 if model == name else -3.0 for model in switching.active]))
 
     return measure
 
@@ -503,9 +507,7 @@ def test_the_cycle_over_both_groups_is_run_again_and_judged_in_the_frame_of_the_
 
         def measure(states: Array, sign: float = sign, state: Array = state) -> Measurement:
             near = np.abs(states[:, 7:] - state[7:]).sum(axis=1)  # the old group's models keep near to the state
-            count = len(states)
-            nothing = np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0))
-            return Measurement(*nothing, -100.0 * sign * near)
+            return as_likely(-100.0 * sign * near)
 
         for points in swinging([[2.0, 2.0, 3.0, 3.0], [4.1, 4.1, 3.0, 3.0]]):
             assert (switching.group, switching.candidate_group) == ("G1", None)
@@ -536,8 +538,7 @@ def test_the_cycle_that_is_run_again_starts_from_the_frame_before(variant: str) 
 
 def nothing(states: Array) -> Measurement:
     """Return a measurement of nothing, by which all models are equally likely."""
-    count = len(states)
-    return Measurement(np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0)), np.zeros(count))
+    return as_likely(np.zeros(len(states)))
 
 
 def test_a_new_model_is_as_probable_as_the_most_probable_one() -> None:  # VSMM 8.1
