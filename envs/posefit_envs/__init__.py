@@ -8,9 +8,9 @@
 
 `FitImage-v0` is the pose in one silhouette, by few proposals; `Track-v0` follows a sequence; `Race-v0` says which of
 several searches goes on. Their docstrings are their manual. Importing this package registers them; the environments
-themselves are imported when they are made. `drive` runs an optimiser against an environment or a vector of them, `drive_each` one in every
-environment of a vector, `track_reference` returns what a tracker would commit in Track-v0, and `to_sb3_vec_env` adapts
-a vector environment to Stable-Baselines3.
+themselves are imported when they are made. `drive` runs an optimiser against an environment or a vector of them,
+`drive_each` one in every environment of a vector, `track_reference` returns what a tracker would commit in Track-v0,
+and `to_sb3_vec_env` adapts a vector environment to Stable-Baselines3.
 
 | looking for | file |
 |---|---|

@@ -22,7 +22,6 @@ Rows = NDArray[np.int64]
 _BODY = np.uint16(BODY)
 CAMERA_VALUES = ("rotation", "translation", "focal", "centre")
 LARGEST_REMEMBERED = 2 * 64 * 64  # pixels of an instance whose values are remembered, in about 5 kB
-_READ_ONLY = ("radii", "rotations", "places", "focals", "centres")
 
 
 class Evaluation(NamedTuple):
@@ -96,7 +95,6 @@ class Stage:
             np.empty((rows, views), dtype=np.int64),
             np.empty((rows, height, width, views), dtype=np.uint16),
         )
-        self._frozen: Scenes | None = None
         self._joint_radii, self._borders = np.empty((rows, len(JOINTS))), np.empty((rows, views, 4))
         self._first = 6 if world.translation == "searched" else 3
         d = self._first + len(self._prior.low)
@@ -150,8 +148,7 @@ class Stage:
         """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), those of some rows aligned."""
         poses, translations = self._unpacked(proposals)
         if self._aligned:
-            scenes = self._read_only()
-            align_scenes(self._chain, scenes, self._joint_radii, self._borders, rows, poses, translations)
+            align_scenes(self._chain, self._scenes, self._joint_radii, self._borders, rows, poses, translations)
         return poses, translations
 
     def poses(self, proposals: Array) -> Array:
@@ -175,7 +172,7 @@ class Stage:
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        at = self._chain, self._read_only()
+        at = self._chain, self._scenes
         values = poses, translations, areas, _BODY, pictures
         shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
         if shares == 1:
@@ -186,15 +183,3 @@ class Stage:
             work_through(parts, self.threads, lambda _: (), lambda part: draw_scenes(*at, rows[part], *values))
         costs = mean_over_views([mismatch(view) for view in areas.reshape(views, n * k, 3)])  # every pixel is known
         return costs.reshape(n, k), areas
-
-    def _read_only(self) -> Scenes:
-        """Return the scenes as the inner loops are compiled for elsewhere; for writeable arrays they would be again."""
-        if self._frozen is None:
-            frozen = {name: getattr(self._scenes, name).view() for name in _READ_ONLY}
-            for array in frozen.values():
-                array.flags.writeable = False
-            self._frozen = self._scenes._replace(**frozen)
-        return self._frozen
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_frozen": None}  # views of a copy would not be views of its scenes

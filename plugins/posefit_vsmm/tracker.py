@@ -15,7 +15,7 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter, rules
+from posefit_vsmm.joints import JointFilter, default_rules, patent_rules
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import Lines, lines_of
@@ -50,10 +50,10 @@ class TrackFilter:
         patent = tracker.variant == "patent"
         fps = CLIP_FPS if patent else task.fps  # Interpretation V6
         models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
-        form = PatentForm() if patent else DefaultForm()
+        form, rules = (PatentForm(), patent_rules()) if patent else (DefaultForm(), default_rules())
         self.switching = Switching(models, tracker.topology, form, tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
-        self._cameras = JointCameras(task.body, task.cameras, self._dependent, rules(patent), tracker.joint_noise)
+        self._cameras = JointCameras(task.body, task.cameras, self._dependent, rules, tracker.joint_noise)
         self._imputes = patent  # Interpretation V9
         self._recovers = not patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
         self._latest: Frame | None = task.before[-1] if task.before else None

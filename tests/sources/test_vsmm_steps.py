@@ -16,7 +16,17 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit_vsmm.groups import Topology, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import _TIPS, JointFilter, _knees, _tips, detect, nearest_crossings, rules, two_crossings
+from posefit_vsmm.joints import (
+    _TIPS,
+    JointFilter,
+    _knees,
+    _tips,
+    default_rules,
+    detect,
+    nearest_crossings,
+    patent_rules,
+    two_crossings,
+)
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import MotionModels, library, lifted, ridge, without_heading
 from posefit_vsmm.preprocess import Lines, lines_of
@@ -38,7 +48,6 @@ from posefit_vsmm.tracker import VSMM, TrackFilter
 from tests.cases import each
 
 SIZE = (240, 320)  # rows, columns
-NO_BIAS = np.zeros((len(POINTS), 2))
 
 
 def canvas() -> np.ndarray:
@@ -106,14 +115,13 @@ def detection() -> tuple[dict[str, Array], dict[str, float], Array]:
     """Return the points detected in the stick figure, the rules' confidence, and where points were expected."""
     image, places = figure()
     expected = places + np.random.default_rng(0).normal(0.0, 6.0, places.shape)
-    points, confidence = joints_in(image, expected)
+    points, confidence, _ = joints_in(image, expected)
     return dict(zip(POINTS, points, strict=True)), dict(zip(POINTS, confidence, strict=True)), expected
 
 
-def joints_in(image: np.ndarray, expected: Array, **how: Any) -> tuple[Array, Array]:
-    return detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules(**how)._replace(bias=NO_BIAS))[
-        :2
-    ]
+def joints_in(image: np.ndarray, expected: Array) -> tuple[Array, Array, int]:
+    rules = default_rules()._replace(bias=np.zeros((len(POINTS), 2)))
+    return detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules)
 
 
 def test_the_head_is_where_a_ring_catches_most_of_the_contour() -> None:  # VSMM 2.1
@@ -147,9 +155,7 @@ def test_an_end_point_out_of_reach_is_not_assigned() -> None:  # Interpretation 
     image, places = figure()
     expected = places.copy()
     expected[AT["left hand"]] += [0.0, 60.0]
-    points, sure, unassigned = detect(
-        lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules()._replace(bias=NO_BIAS)
-    )
+    points, sure, unassigned = joints_in(image, expected)
     assert sure[AT["left hand"]] == 0.0
     assert np.array_equal(points[AT["left hand"]], expected[AT["left hand"]])
     assert unassigned == 1
@@ -161,16 +167,16 @@ def test_to_the_letter_the_nearest_end_point_is_taken_first_and_by_one_joint() -
     _, expected = figure()
     ends = np.array([[130.0, 215.0], [60.0, 215.0]])
     expected[AT["left foot"]], expected[AT["right foot"]] = (128.0, 215.0), (131.0, 215.0)
-    for nearest in (False, True):
+    for nearest, rules in enumerate((default_rules(), patent_rules())):
         gates = np.full(len(POINTS), 1e3 if nearest else 30.0)
-        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], rules(nearest).pairs)
+        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], rules.pairs)
         assert np.array_equal(tips["right foot"], ends[0])
         assert (("left foot" in tips), unassigned) == (nearest, not nearest)
     assert np.array_equal(tips["left foot"], ends[1])
 
 
 def test_plain_joint_errors_are_unbiased_and_the_torsos_are_the_roots() -> None:  # Interpretation V8
-    (bias, deviation, *_), (plain_bias, plain_deviation, *_) = rules(), rules(patent=True)
+    (bias, deviation, *_), (plain_bias, plain_deviation, *_) = default_rules(), patent_rules()
     assert bias.any()
     assert not plain_bias.any()
     assert (deviation[AT["torso"]] > deviation[AT["root"]]).all()
@@ -215,9 +221,9 @@ def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM
     np.testing.assert_allclose(knees["right knee"], [80.0, 144.0], atol=1.1)
     together = np.array([[50.0, y] for y in range(100, 201)])  # both legs are one line, with one crossing
     wide = np.full(len(POINTS), 90.0)
-    for nearest in (False, True):
-        one_line = Lines(together, together, together, legs[:0])
-        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, rules(nearest).crossings) == {}
+    one_line = Lines(together, together, together, legs[:0])
+    for rules in (default_rules(), patent_rules()):
+        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, rules.crossings) == {}
 
 
 def test_to_the_letter_the_knees_are_two_crossings_also_where_both_are_expected_at_one() -> None:  # Interpretation V15
