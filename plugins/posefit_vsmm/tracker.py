@@ -1,9 +1,9 @@
 """The variable-structure multiple-model tracker: its settings, a first pose from one frame, and each frame."""
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Literal, final
+from typing import Any, Literal, NamedTuple, final
 
 import numpy as np
 
@@ -15,12 +15,12 @@ from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter, default_rules, patent_rules
+from posefit_vsmm.joints import JointFilter, Rules, default_rules, patent_rules
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import Lines, lines_of
 from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, decode, encode, free_errors, minus, plus
-from posefit_vsmm.switching import DefaultForm, PatentForm, Structure, Switching
+from posefit_vsmm.switching import DefaultForm, Form, PatentForm, Structure, Switching
 
 # The first pose: typical poses at several yaws, then draws around the best so far
 YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # where the yaw is about known
@@ -40,22 +40,36 @@ MISSING_DEVIATION = np.radians(15.0)  # that each of its joints then gains a fra
 _LIMBS = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}  # bones whose turns a limb's end depends on
 
 
+class Variant(NamedTuple):
+    """What a variant is made of: the letter of the patent, or what tracks better."""
+
+    form: Form  # Interpretations V4 and V11
+    rules: Callable[[], Rules]  # Interpretations V8 and V15
+    shrunk_to: Literal["identity", "zero"]  # Interpretation V5
+    fps: float | None  # of a step of the models; None is the task's. Interpretation V6
+    imputes: bool  # whether a hidden joint counts as measured where its own filter has it. Interpretation V9
+    recovers: bool  # Interpretation V14
+
+
+VARIANTS = {
+    "default": Variant(DefaultForm(), default_rules, "identity", None, imputes=False, recovers=True),
+    "patent": Variant(PatentForm(), patent_rules, "zero", CLIP_FPS, imputes=True, recovers=False),
+}
+
+
 @final
 class TrackFilter:
     """One track, as far as it has come."""
 
     def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
-        task, library = tracker.task, tracker.library
+        task, library, variant = tracker.task, tracker.library, VARIANTS[tracker.variant]
         self._task, self._rng = task, rng
-        patent = tracker.variant == "patent"
-        fps = CLIP_FPS if patent else task.fps  # Interpretation V6
-        models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
-        form, rules = (PatentForm(), patent_rules()) if patent else (DefaultForm(), default_rules())
-        self.switching = Switching(models, tracker.topology, form, tracker.structure)
+        models = library.models.fitted_to(task.body.skeleton, variant.fps or task.fps, tracker.process_noise)
+        self.switching = Switching(models, tracker.topology, variant.form, tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
-        self._cameras = JointCameras(task.body, task.cameras, self._dependent, rules, tracker.joint_noise)
-        self._imputes = patent  # Interpretation V9
-        self._recovers = not patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
+        self._cameras = JointCameras(task.body, task.cameras, self._dependent, variant.rules(), tracker.joint_noise)
+        self._imputes = variant.imputes
+        self._recovers = variant.recovers if tracker.recovery is None else tracker.recovery
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
         self._belief: Belief | None = None
@@ -215,7 +229,7 @@ class VSMM:
         choices(VSMM, vars(self))
         positive("process_noise", self.process_noise)
         positive("joint_noise", self.joint_noise)
-        self.library = library(self.variant == "patent")
+        self.library = library(VARIANTS[self.variant].shrunk_to)
         self.topology = read_topology(self.groups, self.library.models.names)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
