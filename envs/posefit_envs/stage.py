@@ -1,6 +1,5 @@
 """Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
-from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, final
@@ -8,7 +7,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit import PoseProblem, Silhouette
+from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cost import mean_over_views, mismatch
@@ -34,18 +33,15 @@ class Evaluation(NamedTuple):
     pictures: Image  # (n, height, width, 2 views)
 
 
-def box_of(problem: PoseProblem) -> tuple[Array, Array, Array]:
-    """Return the box of a problem's proposals, as a stage stores it: centre (d,), half (d,) and anchor (3,)."""
-    return problem.space.centre, problem.space.half, problem.space.anchor
-
-
 def values_of(problem: PoseProblem) -> tuple[NDArray[Any], ...]:
     """Return everything of a problem that a stage stores: its masks as bits, its box, and the rest in order."""
-    cameras, silhouettes, body = problem.cameras, problem.silhouettes, problem.body
+    cameras, silhouettes, body, space = problem.cameras, problem.silhouettes, problem.body, problem.space
     masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
     return (
         np.packbits(masks, axis=1),
-        *box_of(problem),
+        space.centre,
+        space.half,
+        space.anchor,
         body.skeleton.chain.offsets,
         body.radii,
         *(np.array([getattr(camera, name) for camera in cameras]) for name in CAMERA_VALUES),
@@ -82,7 +78,6 @@ class Stage:
         self._width, self._height, self.threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
         self._chain = body_of(world.motion[0]).skeleton.chain
-        self._silhouettes: list[Sequence[Silhouette]] = [()] * rows
         self._scenes = Scenes(
             np.empty((rows, bones, 3)),
             np.empty((rows, bones, 2)),
@@ -99,28 +94,18 @@ class Stage:
         self._first = 6 if world.translation == "searched" else 3
         d = self._first + len(self._prior.low)
         self._centres, self._halves, self._anchors = np.empty((rows, d)), np.empty((rows, d)), np.empty((rows, 3))
-        self._boxes = self._centres, self._halves, self._anchors
-        self._columns = *self._boxes, *self._scenes[:-1], self._joint_radii, self._borders
+        boxes = self._centres, self._halves, self._anchors
+        self._columns = *boxes, *self._scenes[:-1], self._joint_radii, self._borders
         self.all_rows: Rows = np.arange(rows)
 
-    def set_problem(self, row: int, problem: PoseProblem) -> None:
-        """Make a row this problem, one of the world's."""
-        if self._silhouettes[row] is problem.silhouettes:
-            for array, value in zip(self._boxes, box_of(problem), strict=True):
-                array[row] = value
-        else:
-            self.set_values(row, values_of(problem))
-            self._silhouettes[row] = problem.silhouettes
-
     def set_values(self, row: int, values: tuple[NDArray[Any], ...]) -> None:
-        """Make a row the problem that these are the values of."""
+        """Make a row the problem, one of the world's, that these are the values of."""
         masks, *others = values
         backdrop = self._scenes.backdrops[row]
         backdrop[:] = np.unpackbits(masks, axis=1, count=self._width)
         backdrop *= OBSERVED
         for array, value in zip(self._columns, others, strict=True):
             array[row] = value
-        self._silhouettes[row] = ()
 
     def pictures(self) -> Image:
         """Return the pictures (n, height, width, 2 views) before the first proposals."""
