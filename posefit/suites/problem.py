@@ -64,7 +64,6 @@ class Problem:
 
     number_of_objectives = 1
     number_of_constraints = 0
-    number_of_integer_variables = 0
     evaluations_constraints = 0
 
     def __init__(
@@ -84,7 +83,7 @@ class Problem:
         self.index = 0  # in a `Suite`
         self.id_function = function.number
         self.instance = self.id_instance = made.number
-        self.dimension = self.number_of_variables = d = len(made.truth)
+        self.dimension = d = len(made.truth)
         # without blanks, as in posefit-2026.3_f001_i00017_d09; and in words
         self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
         self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"

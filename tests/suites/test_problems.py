@@ -312,7 +312,7 @@ def test_a_loop_like_cocos_has_the_same_trace(traces) -> None:
         suite = posefit.Suite("posefit-2026.3", functions=[function], dimensions=[dimension], instances=[instance])
         for problem in suite:  # as in COCO's example experiment
             assert problem.evaluations == 0
-            assert len(problem.lower_bounds) == len(problem.upper_bounds) == problem.number_of_variables == dimension
+            assert len(problem.lower_bounds) == len(problem.upper_bounds) == problem.dimension == dimension
             one_by_one(problem, swarm(problem.space), BUDGET)
             assert problem.evaluations == BUDGET
             assert not problem.final_target_hit
