@@ -16,7 +16,7 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, Segmenter
 from posefit.silhouette.mask import Mask
 from posefit.testing import common
-from posefit.testing.common import PluginCase, check_speed, left_alone, unchanged
+from posefit.testing.common import PluginCase, check_speed, unchanged
 from posefit.testing.results import SkippedError, expect
 
 SIZE = (320, 240)
@@ -162,13 +162,6 @@ def landmarks(case: Case) -> str:
     return ""
 
 
-def global_randomness(case: Case) -> None:
-    """The global random generators are left alone."""
-    segmenter = case.build()
-    with left_alone():
-        segmenter.segment(painted()[0].images[20])
-
-
 def speed(case: Case) -> str:
     """A picture of 320 x 240 takes less than a second."""
     segmenter, images = case.build(), painted()[0].images[16:20]
@@ -183,7 +176,7 @@ RULES = [
     inputs,
     background,
     landmarks,
-    global_randomness,
+    common.global_randomness,
     common.silence,
     common.nonsense_settings,
     speed,
