@@ -87,7 +87,7 @@ class Case(PluginCase):
         for image in painted()[0].frames(stop=EMPTY, step=4):
             segmenter.segment(image)
 
-    def segment(self) -> list[tuple[Mask, Mask]]:
+    def use_fully(self) -> list[tuple[Mask, Mask]]:
         """Return the masks and shadows of every fourth frame, in order."""
         segmenter, pairs = self.build(), list[tuple[Mask, Mask]]()
         for image in painted()[0].frames(step=4):
@@ -100,8 +100,8 @@ class Case(PluginCase):
 
     @cached_property
     def masks(self) -> list[tuple[Mask, Mask]]:
-        """What `segment` returns, once for all rules."""
-        return self.segment()
+        """What `use_fully` returns, once for all rules."""
+        return self.use_fully()
 
 
 def masks(case: Case) -> None:
@@ -126,7 +126,7 @@ def overlap(case: Case) -> str:
 
 def same_again(case: Case) -> None:
     """The same film gives the same masks."""
-    same = np.array_equal(case.masks, case.segment())
+    same = np.array_equal(case.masks, case.use_fully())
     expect(same, "two segmenters of one film must give the same masks, got others")
 
 
