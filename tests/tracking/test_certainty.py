@@ -13,8 +13,6 @@ from posefit.evaluation.measures import Measures
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.symmetry import mirrored_poses, turned_poses
-from posefit.measuring.gait import Gait
-from posefit.output.content import Content
 from posefit.output.folder import OutputFolder
 from posefit.output.text import table
 from posefit.uncertainty.calibration import Recalibration
@@ -88,13 +86,14 @@ def test_footage_has_intervals_in_the_world_too_which_are_wider(scene: Scene) ->
     model = in_footage(SPREAD, 1, True)
     posterior = Posterior(np.zeros((1, 66)), np.zeros((1, 3)), np.ones(1), recalibration=model)
     frames = [replace(frame, pose=np.zeros(66), posterior=posterior) for frame in exact_frames(scene)]
-    intervals = Content(replace(scene, truth=None), frames, {}, Gait(), {}).intervals
+    content = replace(tracked(scene, exact_frames(scene)).content, frames=frames)
+    intervals = replace(content, scene=replace(scene, truth=None)).intervals
     depth = depth_halves(model, scene.cameras[0], frames[0].translation)
     for name, least in (("joint_radii", 0.0), ("place_radii", depth)):
         spreads = np.hypot(0.02, shared_spreads(1, world=name == "place_radii"))
         expected = np.hypot(np.outer([*MAXWELL.values()], spreads), least)
         np.testing.assert_allclose(intervals[name][0], expected, rtol=0.01)
-    assert "place_radii" not in Content(scene, frames, {}, Gait(), {}).intervals
+    assert "place_radii" not in content.intervals
 
 
 def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:
@@ -138,7 +137,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
     assert summary["unknown_sides"] == [2, 3, 4]
     assert summary["lost_frames"] == [4]
     assert summary["lost_flagged_rate"] == pytest.approx(1 / 6)
-    assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.summary)
+    assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.content)
 
 
 def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(scene: Scene) -> None:
@@ -150,8 +149,8 @@ def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(sce
     assert track.summary["modes"] == pytest.approx([0.75, 0.25])
     assert track.modes[0].poses.shape == (FRAMES, 66)
     # a body that faces the other way has its left where its right was
-    assert "left and right: unknown in 6 of 6 frames" in table(track.summary)
-    assert "frames lost" not in table(track.summary)
+    assert "left and right: unknown in 6 of 6 frames" in table(track.content)
+    assert "frames lost" not in table(track.content)
     apart = tracked(scene, uncertain_frames(scene, CERTAIN, turned=0.25))  # whose posteriors are no trajectories
     assert len(apart.frames[0].modes) == 2
     assert (apart.modes, apart.summary["modes"]) == ([], None)
