@@ -7,20 +7,17 @@
 | values to bits | `ValueCounts.classifier`, `_above` |
 
 Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file does not show which, so the values of
-all files are counted before any pixel is decided. An image is decoded once: its values wait, compressed, in a temporary
-file, which is on the disk where they are many.
+all files are counted before any pixel is decided: an image is decoded once to count, and once to decide.
 """
 
 import re
-import tempfile
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import cv2
 import numpy as np
@@ -28,7 +25,7 @@ from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, IMAGES, PIXELS, page_count, read_marks
+from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, page_count, read_marks
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
@@ -36,7 +33,6 @@ from posefit.reading import existing, quoted
 from posefit.silhouette.mask import Mask
 
 NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
-SPOOLED = 64_000_000  # bytes of compressed values that are kept in memory; more are on the disk
 PACKED = 2_000_000_000  # bytes of an .npz file
 MAX_FPS = 1000.0
 _KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
@@ -140,66 +136,46 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
     files, guesses = numbered(images, name)
     every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
     chosen = every[slice(*span(frames, len(every)))]
-    known = [file is not None for file, _ in chosen]
-    with tempfile.SpooledTemporaryFile(SPOOLED) as temporary:
-        masks, size, kind = _image_masks(chosen, name, label, _Spool(temporary))
+    known = np.array([file is not None for file, _ in chosen])
+    counts, size = ValueCounts(), (0, 0)
+    for marks in _marks(chosen, name, label):
+        counts.add(marks.values, marks.soft)
+        size = marks.values.shape[1], marks.values.shape[0]
+    is_person, kind = counts.classifier(label, name)
+    masks = empty_planes(len(chosen), size)
+    masks[~known] = 0
+    for k, marks in zip(np.flatnonzero(known), _marks(chosen, name, label), strict=True):
+        masks[k] = np.packbits(is_person(marks.values))
     valid = None
-    if not all(known):
+    if not known.all():
         valid = empty_planes(len(chosen), size)
         valid[:] = np.where(known, 255, 0)[:, None]
     paged = {file for file, page in chosen if page}
     names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
-    return PackedMasks(names, size, masks, valid, np.array(known), guesses=[*guesses, *kind])
+    return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
 
 
-def _image_masks(
-    images: Sequence[tuple[Path | None, int]], name: str, label: int | None, spool: "_Spool"
-) -> tuple[Planes, tuple[int, int], list[str]]:
-    """Return the masks of images, files and pages, none of it for None; their size, and what was guessed of values."""
-    counts, known = ValueCounts(), sum(file is not None for file, _ in images)
-    for file, group in groupby(((file, page) for file, page in images if file is not None), key=itemgetter(0)):
-        wanted = len(spool) + len(pages := [page for _, page in group])
+def _marks(images: Sequence[tuple[Path | None, int]], name: str, label: int | None) -> Iterator[Marks]:
+    """Yield how each of the images, files and pages but None, marks a person. Raises InputError where one does not."""
+    known = [(file, page) for file, page in images if file is not None]
+    first: Marks | None = None
+    for file, group in groupby(known, key=itemgetter(0)):
+        pages = [page for _, page in group]
+        remaining = len(pages)
         for marks in read_marks(file, pages, label is not None):
+            remaining -= 1
             if marks.photo:
-                raise _many_colours(str(file) if len(spool) else name)
-            if not len(spool):
-                check_decoded(name, marks.values.nbytes * known)
+                raise _many_colours(str(file) if first else name)
+            if first is None:
+                check_decoded(name, marks.values.nbytes * len(known))
             if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
                 raise InputError(f"{file}: masks must be finite, got nan or infinity")
-            if len(spool) and marks.values.shape != spool.shape:
-                raise InputError(f"{file}: mask must have shape {spool.shape}, got {marks.values.shape}")
-            counts.add(marks.values, marks.soft)
-            spool.add(marks.values)
-        if len(spool) < wanted:
+            first = first or marks
+            if marks.values.shape != first.values.shape:
+                raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
+            yield marks
+        if remaining:
             raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
-    is_person, kind = counts.classifier(label, name)
-    size, values = (spool.shape[1], spool.shape[0]), iter(spool)
-    masks = empty_planes(len(images), size)
-    for k, (file, _) in enumerate(images):
-        masks[k] = 0 if file is None else np.packbits(is_person(next(values)))
-    return masks, size, kind
-
-
-class _Spool:
-    """The values of images of one shape, compressed, in a file."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self.shape: tuple[int, ...] = (0, 0)
-        self._file = file
-        self._stored: list[tuple[int, np.dtype[Any]]] = []
-
-    def __len__(self) -> int:
-        return len(self._stored)
-
-    def add(self, values: Values) -> None:
-        """Store the values of the next image."""
-        self.shape = values.shape
-        self._stored.append((self._file.write(zlib.compress(values.tobytes(), 1)), values.dtype))
-
-    def __iter__(self) -> Iterator[Values]:
-        self._file.seek(0)
-        for length, dtype in self._stored:
-            yield np.frombuffer(zlib.decompress(self._file.read(length)), dtype).reshape(self.shape)
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:
