@@ -81,7 +81,7 @@ class Costs:
 
 
 def estimate(pose: Array, place: Array, frame_costs: Any = None) -> Estimate:
-    return Estimate(pose, place, frame_costs or Costs(), 10.4)
+    return Estimate(pose, place, frame_costs or Costs(), 10.4, (pose[None], place[None]))
 
 
 def steady(k: float) -> Estimate:

@@ -61,14 +61,6 @@ def test_an_unknown_translation_is_aligned(walker: Walk, seed: int) -> None:
     assert errors.max() < 150.0
 
 
-def test_fitted_hypotheses_lower_the_cost(walker: Walk, seed: int) -> None:
-    path, fitted = (
-        np.mean([frame.cost for frame in walker.track(evaluations=2440, fitted=fitted, seed=seed)])
-        for fitted in (False, True)
-    )
-    assert fitted < 0.6 * path
-
-
 def test_a_track_begins_at_the_first_pose(seed: int) -> None:
     # from the side one frame does not distinguish left from right, and no later frame is used
     motion = built_in.motion("walk-a", frames=4)
@@ -164,8 +156,8 @@ def test_the_budget_holds_with_pictures_of_any_size_and_any_number_of_cameras(
 
 
 def test_too_small_a_budget_is_refused(walker: Walk) -> None:
-    with pytest.raises(ValueError, match="evaluations must be at least 300 for exemplars, got 299"):
-        walker.track(evaluations=299)
+    with pytest.raises(ValueError, match="evaluations must be at least 715 for exemplars, got 714"):
+        walker.track(evaluations=714)
 
 
 QUICK: dict[str, Any] = {"evaluations": 2440, "smoothing": 0.0}
