@@ -2,7 +2,7 @@
 
 | arrow | |
 |---|---|
-| files to frames | `numbered`: a frame a page; numbers that are missing are frames in which nothing is known |
+| files to frames | `numbered`: numbers that are missing are frames in which nothing is known |
 | frames to values | `images.read_marks`, `archive.archived` |
 | values to bits | `ValueCounts.classifier`, `_above` |
 
@@ -14,8 +14,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +23,7 @@ from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, page_count, read_marks
+from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, read_marks
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
@@ -134,48 +132,42 @@ def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list
 def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of images of one size. Raises InputError naming the file where one is none."""
     files, guesses = numbered(images, name)
-    every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
-    chosen = every[slice(*span(frames, len(every)))]
-    known = np.array([file is not None for file, _ in chosen])
+    files = files[slice(*span(frames, len(files)))]
+    known = np.array([file is not None for file in files])
     counts, size = ValueCounts(), (0, 0)
-    for marks in _marks(chosen, name, label):
+    for marks in _marks(files, name, label):
         counts.add(marks.values, marks.soft)
         size = marks.values.shape[1], marks.values.shape[0]
     is_person, kind = counts.classifier(label, name)
-    masks = empty_planes(len(chosen), size)
+    masks = empty_planes(len(files), size)
     masks[~known] = 0
-    for k, marks in zip(np.flatnonzero(known), _marks(chosen, name, label), strict=True):
+    for k, marks in zip(np.flatnonzero(known), _marks(files, name, label), strict=True):
         masks[k] = np.packbits(is_person(marks.values))
     valid = None
     if not known.all():
-        valid = empty_planes(len(chosen), size)
+        valid = empty_planes(len(files), size)
         valid[:] = np.where(known, 255, 0)[:, None]
-    paged = {file for file, page in chosen if page}
-    names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
+    names = [str(file) if file else f"{name}, missing" for file in files]
     return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
 
 
-def _marks(images: Sequence[tuple[Path | None, int]], name: str, label: int | None) -> Iterator[Marks]:
-    """Yield how each of the images, files and pages but None, marks a person. Raises InputError where one does not."""
-    known = [(file, page) for file, page in images if file is not None]
+def _marks(files: Sequence[Path | None], name: str, label: int | None) -> Iterator[Marks]:
+    """Yield how each of the images but None marks a person. Raises InputError where one does not."""
     first: Marks | None = None
-    for file, group in groupby(known, key=itemgetter(0)):
-        pages = [page for _, page in group]
-        remaining = len(pages)
-        for marks in read_marks(file, pages, label is not None):
-            remaining -= 1
-            if marks.photo:
-                raise _many_colours(str(file) if first else name)
-            if first is None:
-                check_decoded(name, marks.values.nbytes * len(known))
-            if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
-                raise InputError(f"{file}: masks must be finite, got nan or infinity")
-            first = first or marks
-            if marks.values.shape != first.values.shape:
-                raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
-            yield marks
-        if remaining:
+    for file in filter(None, files):
+        marks = read_marks(existing(file), label is not None)
+        if marks is None:
             raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
+        if marks.photo:
+            raise _many_colours(str(file) if first else name)
+        if first is None:
+            check_decoded(name, marks.values.nbytes * sum(file is not None for file in files))
+        if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
+            raise InputError(f"{file}: masks must be finite, got nan or infinity")
+        first = first or marks
+        if marks.values.shape != first.values.shape:
+            raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
+        yield marks
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:

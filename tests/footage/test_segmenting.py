@@ -317,7 +317,7 @@ def test_a_segmenter_gets_the_roi_alone_and_its_masks_are_put_there(
     filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
 ) -> None:
     segmenter("box", Box)
-    segmentation, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
+    _, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
     assert masks[0].shape == (120, 160)
     rows, columns = np.flatnonzero(masks[0].any(axis=1)), np.flatnonzero(masks[0].any(axis=0))
     assert (rows[0], columns[0], columns[-1]) == (30, 45, 57)
