@@ -267,11 +267,9 @@ class Segmentation:
                 tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
             blanks.append(self._row(quality, image, empty, k))
             largest.append(self._row(largest_quality, image, blobs[0], k))
-        count, scale, choice, rows = len(blanks), segmenter.scale, self.how.person, largest
+        count, rows = len(blanks), largest
         masks, valid = masks[:count], valid[:count]
-        if isinstance(choice, tuple):
-            choice = choice[0] * scale, choice[1] * scale
-        parts, several = people.chosen(choice, lambda k: f"frame {self.start + k}", 1.0 / scale)
+        parts, several = people.chosen(self.how.person, lambda k: f"frame {self.start + k}", 1.0 / segmenter.scale)
         if several:
             rows = [blank if (part := part_at(parts, k)) is None else part.rows[k] for k, blank in enumerate(blanks)]
             others = [part for person in people.persons() for part in person if part not in parts]

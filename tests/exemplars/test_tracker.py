@@ -1,7 +1,7 @@
 """People who are not in the training clips, followed; settings; when frames come, what they cost, and their samples."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -14,11 +14,9 @@ from posefit.arrays import Array
 from posefit.cli import main
 from posefit.fitting.tracker import Frame, Observation
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import Skeleton
 from posefit.motion import built_in, recorded
-from posefit.motion.motion import Motion
 from posefit.testing import check_tracker
-from posefit_exemplars import exemplars, tracker
+from posefit_exemplars import tracker
 from posefit_exemplars.tracker import MIN_EVALUATIONS, WRONG_YAW_COST, ExemplarTracker, yaw_costs
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of
@@ -187,17 +185,3 @@ def test_a_sampled_path_is_one_movement(walker: Walk) -> None:
     turns = np.abs(wrapped(np.diff(yaws, axis=0)))
     assert np.median(turns) < np.radians(5.0)
     assert float(np.mean(turns > np.radians(30.0))) < 0.05
-
-
-def test_the_library_is_learned_from_once(walker: Walk, monkeypatch: pytest.MonkeyPatch) -> None:
-    hashed: list[bool] = []
-
-    def counted(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> exemplars.Exemplars:
-        hashed.append(mirrored)
-        return learned(motions, skeleton, mirrored)
-
-    learned = exemplars.exemplars_of
-    monkeypatch.setattr(exemplars, "exemplars_of", counted)
-    made = ExemplarTracker(walker.task, mirrored=False)
-    assert hashed == [False]
-    assert made.lookup.exemplars is made.exemplars
