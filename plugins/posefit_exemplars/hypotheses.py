@@ -161,7 +161,7 @@ class HypothesisFilter:
 
     def follow(self, estimates: Iterable[Estimate], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield each estimate with the pose of the likeliest sequence, up to `delay` frames later."""
-        rows = paths = None
+        rows = None
         self._costs.clear()  # of an earlier track
         for window in markov.windows(self._frames(estimates), self.delay):
             states = [frame.states for frame in window]
@@ -169,10 +169,8 @@ class HypothesisFilter:
             row, weights, poses = markov.viterbi_state(states), markov.state_weights(states), hypotheses.poses
             squares = ((hypotheses.joints - hypotheses.joints[row]) ** 2).sum(axis=2).mean(axis=1) / SAME_DISTANCE**2
             pose, place = markov.mean_near(row, weights, squares, poses, hypotheses.places)
-            if self._sampling.paths:
-                rows = markov.sample_states(states, rows, self._sampling, rng)
-                skeleton = self._task.body.skeleton
-                paths = markov.SampledPaths.of(skeleton, poses[rows], hypotheses.places[rows], pose)
+            rows = markov.sample_states(states, rows, self._sampling, rng)
+            paths = markov.SampledPaths.of(self._task.body.skeleton, poses[rows], hypotheses.places[rows], pose)
             yield replace(estimate, pose=pose, place=place, paths=paths)
 
     def _frames(self, estimates: Iterable[Estimate]) -> Iterator[_FittedFrame]:

@@ -55,9 +55,8 @@ class ExemplarTracker:
         spread: distance of joints from where a clip continues in a thirtieth of a second, metres, rms; above 0.
         temperature: divides silhouette costs; above 0. Errors of successive frames are correlated, so more than 1.
         lag: later frames that are used before a pose is reported, 0 or more.
-        mirrored: whether the mirror images of all clips are learned from as well.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
+        samples: tracks drawn from the posterior, 1 or more.
     """
 
     def __init__(
@@ -67,7 +66,6 @@ class ExemplarTracker:
         spread: float = 0.03,
         temperature: float = 2.0,
         lag: int = 20,
-        mirrored: bool = True,
         smoothing: float = 1.0,
         samples: int = 24,
     ) -> None:
@@ -75,10 +73,10 @@ class ExemplarTracker:
         positive("temperature", temperature)
         at_least("smoothing", smoothing, 0)
         at_least("lag", lag, 0)
-        at_least("samples", samples, 0)
+        at_least("samples", samples, 1)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
-        self.task, self.exemplars = task, exemplars_for(task, mirrored)
+        self.task, self.exemplars = task, exemplars_for(task)
         self.step, self.lookup = beams.Step.of(task, spread), Lookup(task, self.exemplars)
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames

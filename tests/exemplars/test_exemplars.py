@@ -120,10 +120,10 @@ def test_no_motion_is_refused() -> None:
 
 def test_states_are_made_once_for_the_same_motions() -> None:
     walk = built_in.motion("walk-a", frames=12)
-    made = exemplars_of([walk], SKELETON, False)
-    assert exemplars_of([replace(walk, poses=walk.poses.copy())], SKELETON, False) is made
+    made = exemplars_of([walk], SKELETON)
+    assert exemplars_of([replace(walk, poses=walk.poses.copy())], SKELETON) is made
     moved, faster = replace(walk, translations=walk.translations + 1e-9), replace(walk, fps=60.0)
     parts = ([walk.frames(0, k), walk.frames(k, 12)] for k in (4, 6))
     for motions in ([moved], [faster], *parts):
-        assert exemplars_of(motions, SKELETON, False) is not made
-        made = exemplars_of(motions, SKELETON, False)
+        assert exemplars_of(motions, SKELETON) is not made
+        made = exemplars_of(motions, SKELETON)

@@ -158,16 +158,6 @@ def test_too_small_a_budget_is_refused(walker: Walk) -> None:
 QUICK: dict[str, Any] = {"evaluations": 2440, "smoothing": 0.0}
 
 
-def test_reported_poses_do_not_depend_on_the_number_of_samples(walker: Walk) -> None:
-    plain, sampled = (walker.track(0, 10, seed=3, samples=samples) for samples in (0, 5))
-    for none, some in zip(plain, sampled, strict=True):
-        np.testing.assert_array_equal(none.pose, some.pose)
-        assert none.posterior is None
-        assert some.posterior is not None
-        assert len(some.posterior) == 5
-        assert some.posterior.coherent
-
-
 def sampled_poses(frames: list[Frame]) -> Array:
     return np.array([frame.posterior.poses for frame in frames if frame.posterior is not None])
 
