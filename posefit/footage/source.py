@@ -49,7 +49,7 @@ _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
 
 
 def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
-    """Return nothing. Raises InputError where an option is given that sources of this kind have no use for."""
+    """Raise InputError where an option is given that sources of this kind have no use for."""
     for name, (where, kinds) in _USED_FOR.items():
         if kind not in kinds and view.get(name) is not None:
             raise useless_for(kind, name, view[name], where)
@@ -85,7 +85,8 @@ def scene_of(
 ) -> Scene:
     """Return the scene of a source, or of what several cameras saw at the same times.
 
-    The options are those of `posefit.track`, see `posefit.tracking.options`. Raises InputError where one does not fit.
+    The options are those of `posefit.track`, see `posefit.tracking.options`; `check_used` refuses those that
+    sources have no use for. Raises InputError where one does not fit.
     """
     for source in sources:  # names are in every file that is written
         if isinstance(source, str | Path | tuple):
@@ -94,8 +95,6 @@ def scene_of(
     if len(kinds) > 1:
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
-    options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "asf": asf, "person": person})
     if person is not None and len(sources) > 1:
         raise InputError(f"person must be given for one camera only, got {len(sources)}")
     if kind == "motion":
