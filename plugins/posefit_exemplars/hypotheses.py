@@ -226,16 +226,14 @@ class HypothesisFilter:
             costs += silhouette_costs / (noise * self._temperature)
             costs += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if before is None:
-            states = markov.frame_states(costs)
-        else:
-            latest = before.hypotheses
-            steps = step_costs(self._spread, latest, hypotheses) + landmarks - landmarks.min(axis=0)
-            if frame_costs.root is None:
-                expected = latest.places + latest.shifts
-                steps += root_deviation_costs(places, expected[:, None], frame_costs.camera_position)
-            states = markov.frame_states(costs, before.states, steps)
-            exchanged = exchanged[states.parents]
-        return states, exchanged_given(likelihoods, exchanged)
+            return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
+        latest = before.hypotheses
+        steps = step_costs(self._spread, latest, hypotheses) + landmarks - landmarks.min(axis=0)
+        if frame_costs.root is None:
+            expected = latest.places + latest.shifts
+            steps += root_deviation_costs(places, expected[:, None], frame_costs.camera_position)
+        states = markov.frame_states(costs, before.states, steps)
+        return states, exchanged_given(likelihoods, exchanged[states.parents])
 
     def _noise(self, frame_costs: FrameCosts, poses: Array, places: Array) -> float:
         """Return how many times less precise one camera's masks are than clean ones, by the best frames so far."""
