@@ -4,7 +4,7 @@
 |---|---|
 | files to frames | `numbered`: numbers that are missing are frames in which nothing is known |
 | frames to values | `images.read_marks`, `archive.archived` |
-| values to bits | `ValueCounts.classifier`, `_above` |
+| values to bits | `ValueCounts.classifier`, `_pack` |
 
 Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file does not show which, so the values of
 all files are counted before any pixel is decided: an image is decoded once to count, and once to decide.
@@ -12,7 +12,7 @@ all files are counted before any pixel is decided: an image is decoded once to c
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -134,18 +134,11 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
     files, guesses = numbered(images, name)
     files = files[slice(*span(frames, len(files)))]
     known = np.array([file is not None for file in files])
-    counts, size = ValueCounts(), (0, 0)
-    for marks in _marks(files, name, label):
-        counts.add(marks.values, marks.soft)
-        size = marks.values.shape[1], marks.values.shape[0]
-    is_person, kind = counts.classifier(label, name)
-    masks = empty_planes(len(files), size)
-    masks[~known] = 0
-    for k, marks in zip(np.flatnonzero(known), _marks(files, name, label), strict=True):
-        masks[k] = np.packbits(is_person(marks.values))
-    valid = None
+    size, is_person, kind = _decided(_marks(files, name, label), label, name)
+    masks, valid = _pack(_marks(files, name, label), int(known.sum()), size, is_person), None
     if not known.all():
-        valid = empty_planes(len(files), size)
+        shown, masks, valid = masks, *(empty_planes(len(files), size) for _ in range(2))
+        masks[~known], masks[known] = 0, shown
         valid[:] = np.where(known, 255, 0)[:, None]
     names = [str(file) if file else f"{name}, missing" for file in files]
     return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
@@ -181,14 +174,18 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     start, stop = span(frames, count)
     if not usable[start:stop].any():
         raise InputError(f"{name}: expected a frame that is usable, got none from {start} to {stop}")
-    is_person, guesses = _stack_classifier(name, stack, start, stop, label)
-    masks = _pack(stack, start, stop, is_person)
-    valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
+    size, is_person, guesses = (width, height), _above(0.0), list[str]()
+    if stack.dtype.kind != "b" or label is not None:  # booleans need no count
+        _, is_person, guesses = _decided(_chosen(name, stack, start, stop), label, name)
+    masks = _pack(_chosen(name, stack, start, stop), stop - start, size, is_person)
+    valid = None
+    if "valid" in arrays:
+        valid = _pack(_chosen(name, arrays["valid"], start, stop), stop - start, size, _above(0.0))
     names = [f"{name}[{k}]" for k in range(start, stop)]
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
     if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
         raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
-    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks, start, guesses)
+    return PackedMasks(names, size, masks, valid, usable[start:stop], fps, landmarks, start, guesses)
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
@@ -227,27 +224,29 @@ def _described(stored: Stored | NDArray[Any]) -> str:
     return f"{quoted(tuple(stored.shape))} {stored.dtype}"
 
 
-def _stack_classifier(
-    name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None
-) -> tuple[Classifier, list[str]]:
-    """Return how frames start to stop become masks, and what was guessed; booleans need no count."""
-    if stored.dtype.kind == "b" and label is None:
-        return _above(0.0), []
-    counts = ValueCounts()
+def _chosen(name: str, stored: Stored | NDArray[Any], start: int, stop: int) -> Iterator[Marks]:
+    """Yield frames start to stop; the others are read to the end, for the checksum."""
     for k, frame in enumerate(stored):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
             raise InputError(f"{name}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
-            counts.add(frame, soft=False)
-    return counts.classifier(label, name)
+            yield Marks(frame)
 
 
-def _pack(stored: Stored | NDArray[Any], start: int, stop: int, is_person: Classifier) -> Planes:
-    """Return the bits of frames start to stop; the others are read to the end, for the checksum."""
-    planes = empty_planes(stop - start, (stored.shape[2], stored.shape[1]))
-    for k, frame in enumerate(stored):
-        if start <= k < stop:
-            planes[k - start] = np.packbits(is_person(frame))
+def _decided(frames: Iterable[Marks], label: int | None, name: str) -> tuple[tuple[int, int], Classifier, list[str]]:
+    """Return the size of frames, how their values become masks, and what was guessed of them."""
+    counts, size = ValueCounts(), (0, 0)
+    for marks in frames:
+        counts.add(marks.values, marks.soft)
+        size = marks.values.shape[1], marks.values.shape[0]
+    return size, *counts.classifier(label, name)
+
+
+def _pack(frames: Iterable[Marks], count: int, size: tuple[int, int], is_person: Classifier) -> Planes:
+    """Return the bits of so many frames."""
+    planes = empty_planes(count, size)
+    for k, marks in enumerate(frames):
+        planes[k] = np.packbits(is_person(marks.values))
     return planes
 
 

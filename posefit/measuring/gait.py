@@ -87,9 +87,9 @@ class Gait:
 
     def as_dict(self) -> dict[str, object]:
         """Return the gait as summary.json holds it."""
-        counted, reasons = len(_values(self.steps, "step_seconds")), (self.why or None, self.why_no_lengths or None)
-        values = {**asdict(self), "steps": counted}
-        return {"walk": not self.why, **values, **dict(zip(("why", "why_no_lengths"), reasons, strict=True))}
+        counted = {"steps": len(_values(self.steps, "step_seconds"))}
+        reasons = {"why": self.why or None, "why_no_lengths": self.why_no_lengths or None}
+        return {"walk": not self.why, **asdict(self), **counted, **reasons}
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
