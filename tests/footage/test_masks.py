@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from PIL.ImageFile import ImageFile
 
 from posefit.footage import images
 from posefit.footage.cameras import CameraView, combined
@@ -18,6 +19,7 @@ from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_masks
 from posefit.footage.source import body_of, scene_of
+from posefit.tracking.front import track
 from posefit.tracking.options import text_person
 from tests.cases import each
 from tests.commands import error_of, run
@@ -307,6 +309,22 @@ def test_small_holes_are_filled_by_default(tmp_path: Path) -> None:
     assert not filled(None)[65, 60]
     np.testing.assert_array_equal(filled(0.0), holed)
     np.testing.assert_array_equal(filled(1.0), mask)
+
+
+def test_every_image_is_decoded_twice_however_often_its_mask_is_needed(
+    walk: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decoded: list[str] = []
+    real = ImageFile.load
+
+    def load(image: ImageFile) -> Any:
+        decoded.extend(["image"] * bool(image.tile))  # it is loaded already without
+        return real(image)
+
+    monkeypatch.setattr(ImageFile, "load", load)
+    path = folder(tmp_path / "a", [255 * mask.astype(np.uint8) for mask in walk])
+    track(path, out=tmp_path / "out", method="sapso@loose", evaluations=200, restarts=2, body_frames=2)
+    assert len(decoded) == 2 * len(walk)  # to count its values, and to decide by those of all
 
 
 def test_views_of_other_frames_or_another_rate_are_refused_by_name(walk: list[Any], tmp_path: Path) -> None:

@@ -166,6 +166,17 @@ def test_the_only_array_of_a_file_is_the_masks(walk: list[Any], tmp_path: Path) 
         read_masks(tmp_path / "c.npz", ALL)
 
 
+def test_a_person_who_touches_the_border_in_all_masks_is_followed(walk: list[Any], tmp_path: Path) -> None:
+    for k, mask in enumerate(walk):  # cut to the person, as silhouettes of gait are
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        Image.fromarray(255 * cv2.resize(cut.astype(np.uint8), (88, 128), interpolation=cv2.INTER_NEAREST)).save(
+            tmp_path / f"{k:03}.gif"
+        )
+    scene = scene_of([tmp_path])
+    assert [scene.observations[k].usable for k in range(len(walk))] == [True] * len(walk)
+
+
 def test_an_image_of_numbers_that_are_none_is_refused(tmp_path: Path) -> None:
     values = np.zeros((12, 10), dtype=np.float32)
     values[3:9, 2:6] = 0.7
