@@ -1,6 +1,7 @@
 """Masks from video: synthetic ones with a known person, and video whose frames come at uneven times."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +10,17 @@ import numpy as np
 import pytest
 
 import posefit
+from posefit.fitting.validation import BrokenRuleError
 from posefit.footage.extract import extract
 from posefit.footage.readers import read_masks
-from posefit.footage.segmentation import Extraction
+from posefit.footage.segmentation import Extraction, Segmentation
 from posefit.footage.video import Video
+from posefit.geometry.skeleton import JOINTS
 from posefit.silhouette.foreground import Still, mean_background, median_background, people
 from tests.cases import each
 from tests.commands import error_of, run
 from tests.files import arrays, csv_rows
-from tests.footage.conftest import EMPTY, FRAMES, SIZE, iou, truth
+from tests.footage.conftest import EMPTY, FRAMES, SIZE, Box, iou, truth
 from tests.footage.matroska import write_matroska
 
 
@@ -71,15 +74,22 @@ def test_what_is_extracted_can_be_tracked_and_unknown_pixels_stay_unknown(
     assert result.summary["iou"] > 0.4
 
 
-def test_a_background_is_the_mean_with_its_spread_or_the_median_of_pictures() -> None:
-    still = mean_background([np.full((2, 3, 3), value, dtype=np.uint8) for value in (10, 20, 30)])
+def test_a_mean_background_is_the_mean_and_its_spread() -> None:
+    images = [np.full((2, 3, 3), value, dtype=np.uint8) for value in (10, 20, 30)]
+    still = mean_background(iter(images))
     np.testing.assert_allclose(still.middle, 20.0)
     np.testing.assert_allclose(still.spread, np.sqrt(200.0 / 3.0), rtol=1e-6)
-    passed = [np.full((4, 4, 3), level, dtype=np.uint8) for level in (100, 100, 0, 100, 100, 255, 100)]
-    np.testing.assert_allclose(median_background(passed).middle, 100.0)
-    for background in (mean_background, median_background):
-        with pytest.raises(ValueError, match="at least one frame"):
-            background(np.zeros((0, 2, 2, 3), dtype=np.uint8))
+    with pytest.raises(ValueError, match="at least one frame"):
+        mean_background([])
+
+
+def test_a_median_background_is_not_changed_by_a_passer_by() -> None:
+    images = [np.full((4, 4, 3), 100, dtype=np.uint8) for _ in range(9)]
+    images[2][:] = 0
+    images[5][:] = 255
+    np.testing.assert_allclose(median_background(images).middle, 100.0)
+    with pytest.raises(ValueError, match="at least one frame"):
+        median_background(np.zeros((0, 2, 2, 3), dtype=np.uint8))
 
 
 def test_a_shadow_is_darker_but_has_the_grounds_colour() -> None:
@@ -261,3 +271,36 @@ def test_a_rate_that_a_video_does_not_state_is_guessed_aloud(
     result = run("extract", filmed[0], "--frames", "20:40", "--out", tmp_path / "out")
     assert f"guessed: {filmed[0]}: 30 frames a second, which the file does not state" in result.stderr
     assert arrays(tmp_path / "out" / "masks.npz")["fps"] == 30.0
+
+
+def test_a_walker_goes_as_fast_as_the_stamps_say(filmed: tuple[Path, list[Any]], tmp_path: Path) -> None:
+    pictures = list(Video.of(filmed[0]).frames(0, None, SIZE))
+    taken = [k for k in range(len(pictures)) if k % 10 not in (3, 4, 7)]
+    path = write_matroska(tmp_path / "a.mkv", [pictures[k] for k in taken], [40 * k for k in taken])
+    out = tmp_path / "out"
+    result = run("extract", path, "--out", out, "--frames", f"{EMPTY + 6}:{EMPTY + 40}")
+    assert result.exit_code == 0, result.stderr
+    assert "its frames come at uneven times" in result.stderr
+    stored = arrays(out / "masks.npz")
+    assert stored["fps"] == pytest.approx(25.0)
+    assert len(stored["masks"]) == 34
+    held = np.array([k % 10 in (3, 4, 7) for k in range(EMPTY + 6, EMPTY + 40)])
+    assert not stored["usable"][held].any()
+    assert stored["usable"][~held].mean() > 0.8
+    middles = np.array([np.flatnonzero(mask.any(axis=0)).mean() for mask in stored["masks"]])
+    true = np.array([np.flatnonzero(mask.any(axis=0)).mean() for mask in filmed[1][EMPTY + 6 : EMPTY + 40]])
+    assert np.abs(middles - true)[stored["usable"]].max() < 3.0  # pixels: the frame at its own time
+
+
+def test_landmarks_are_kept_at_their_place_in_the_whole_picture(
+    filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None]
+) -> None:
+    segmenter("box", Box)
+    masks = Segmentation(Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)).read().masks
+    assert masks.landmarks is not None
+    assert masks.landmarks.shape == (3, len(JOINTS), 3)
+    assert not masks.landmarks[0, :, 2].any()
+    np.testing.assert_array_equal(masks.landmarks[1:, 0], [[25.0, 17.0, 0.5]] * 2)
+    how = Extraction("box", settings={"wrong": "landmarks"})
+    with pytest.raises(BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"):
+        Segmentation(Video.of(filmed[0]), how, (0, 3)).read()

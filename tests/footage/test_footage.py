@@ -1,5 +1,7 @@
 """Video and masks of real cameras: calibrations, several views, restarts, what is written, and what is resumed."""
 
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +24,7 @@ from posefit.geometry.rotation import wrapped
 from posefit.progress import Progress
 from posefit.uncertainty.modes import nearer_mirrored
 from tests.cases import each
-from tests.commands import error_of
+from tests.commands import error_of, run
 from tests.footage.conftest import EMPTY, NOBODY, SIZE, camera, film, iou, truth, walk
 
 QUICK: dict[str, Any] = {
@@ -170,6 +172,27 @@ def test_what_cannot_be_resumed_is_reported(tmp_path: Path) -> None:
                          (None, "resume must be given with out")):  # fmt: skip
         with pytest.raises(ValueError, match=message):
             posefit.track("walk", resume=True, out=out)
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_one_line_and_loses_no_frame(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", masks=np.stack(truth()[10:30]).astype(np.uint8))
+    script = (
+        "import resource, sys\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (24_000, 24_000))\n"
+        "from posefit.cli import main\n"
+        f"sys.exit(main({['track', str(tmp_path / 'a.npz'), '--out', str(tmp_path / 'out'), *BRIEF]!r}))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    lines = [line for line in done.stderr.splitlines() if line.startswith("posefit:")]
+    assert done.returncode == 2, done.stderr
+    assert len(lines) == 1
+    assert "expected room to write to, got File too large" in lines[0]
+    assert "finished frames are kept" in lines[0]
+    assert not (tmp_path / "out").exists()
+    again = run("track", tmp_path / "a.npz", "--out", tmp_path / "out", *BRIEF, "--resume")
+    assert again.exit_code == 0, again.stderr
+    assert "going on from frame" in again.stderr
 
 
 def test_two_people_and_a_moving_camera_are_warned_of(tmp_path: Path) -> None:

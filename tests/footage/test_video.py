@@ -1,6 +1,8 @@
 """Films: what is no video, frames that were never written, names of files, pictures one a frame."""
 
 import os
+import subprocess
+import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -27,11 +29,11 @@ def moving(count: int = 8) -> list[Any]:
     return list(pictures)
 
 
-def encoded(path: Path, aspect: Fraction | None = None) -> Path:
+def encoded(path: Path, *, interlaced: bool = False, aspect: Fraction | None = None) -> Path:
     """Write pictures by PyAV, which is skipped where it is not there."""
     av = pytest.importorskip("av")
     with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=25)
+        stream = container.add_stream("libx264", rate=25, options={"x264-params": f"interlaced={int(interlaced)}"})
         stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
         if aspect is not None:
             stream.codec_context.sample_aspect_ratio = aspect
@@ -39,6 +41,21 @@ def encoded(path: Path, aspect: Fraction | None = None) -> Path:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
         container.mux(stream.encode())
     return path
+
+
+def test_interlaced_frames_are_read_right_or_refused(tmp_path: Path) -> None:
+    av = pytest.importorskip("av")
+    path = encoded(tmp_path / "a.mp4", interlaced=True)
+    with av.open(str(path)) as container:
+        frame = next(container.decode(video=0))
+        assert frame.interlaced_frame
+        wanted = frame.to_ndarray(format="bgr24").astype(float)
+    try:
+        video = Video.of(path)
+    except ValueError as error:
+        assert "got the same picture in all frames; if it is interlaced" in str(error)
+    else:
+        assert np.abs(next(video.frames(0, 1, SIZE)) - wanted).mean() < 3.0
 
 
 def test_frames_that_were_never_written_are_refused(tmp_path: Path) -> None:
@@ -117,6 +134,15 @@ def test_a_name_that_opencv_cannot_open_is_refused_before_the_work(tmp_path: Pat
         words = ("extract", tmp_path / "walk.avi", "--out", strange)
     assert "expected a name in UTF-8, got one that is not" in error_of(*words)
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_name_beyond_ascii_is_refused_in_one_line_under_a_language_without_it(tmp_path: Path) -> None:
+    film(tmp_path / "walk.avi", truth()[:4]).rename(tmp_path / "café.avi")
+    script = f"from posefit.footage.video import Video\nVideo.of(b'{tmp_path}/caf\\xc3\\xa9.avi'.decode('ascii', 'surrogateescape'))"
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PATH": os.environ["PATH"]}
+    done = subprocess.run([sys.executable, "-c", script], env=plain, capture_output=True, check=False)
+    assert done.returncode == 1
+    assert b"expected a name in UTF-8" in done.stderr.splitlines()[-1]
 
 
 def written(folder: Path, path: Path, suffix: str, numbers: list[int]) -> Path:
