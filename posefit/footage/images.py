@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -16,6 +16,7 @@ from posefit.errors import InputError
 from posefit.reading import check_size
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".gif", ".webp")
+PAGED = (".tif", ".tiff", ".gif", ".webp")  # may hold several pictures
 PIXELS = 50_000_000  # of a picture or a frame of video; 8K has 33 million
 LARGEST_FILE = 400_000_000  # bytes of a picture; 8 for each pixel
 FORMATS = "PNG, JPEG, BMP, TIFF, PGM, GIF or WebP"
@@ -40,53 +41,63 @@ class Marks(NamedTuple):
     photo: bool = False  # a picture in many colours
 
 
-def read_image(path: str | Path, grey: bool) -> NDArray[np.uint8] | None:
+def read_image(path: str | Path, grey: bool, page: int = 0) -> NDArray[np.uint8] | None:
     """Return a picture (height, width) in grey, or (height, width, 3) in blue, green and red; None where it is none.
 
-    Raises InputError where it has more than `PIXELS` or `LARGEST_FILE`, or where the file holds several.
+    Raises InputError where it has more than `PIXELS` or `LARGEST_FILE`.
     """
-    return _decoded(Path(path), _grey if grey else _colours)
+    return next(_decoded(Path(path), [page], _grey if grey else _colours), None)
 
 
-def read_marks(path: Path, labelled: bool = False) -> Marks | None:
-    """Return the values by which a picture marks a person; None where it is no picture.
+def read_marks(path: Path, pages: Sequence[int] = (0,), labelled: bool = False) -> Iterator[Marks]:
+    """Yield the values by which the pages of a file mark a person; nothing, or too few, where it is no picture.
 
     They are its alpha channel, where it has one that is not all opaque and no label is wanted; else the indices of a
     palette of colours, or colours as 0xRRGGBB, or grey levels, of 8 or 16 bits. Raises InputError as `read_image` does.
     """
-    return _decoded(path, partial(_marks, labelled=labelled))
+    return _decoded(path, pages, partial(_marks, labelled=labelled))
+
+
+def page_count(path: Path) -> int:
+    """Return how many pictures a file holds; 1 where it is none."""
+    if path.suffix.lower() not in PAGED:
+        return 1
+    return next(_decoded(path, [0], lambda image: int(getattr(image, "n_frames", 1))), 1)
 
 
 @lru_cache(maxsize=64)
 def is_photo(path: Path) -> bool:
     """Return whether a file is a picture in many colours, without alpha channel: of a place, not of a person's mask."""
     try:
-        return bool(_decoded(path, lambda image: image.mode not in _GREY and _marks(image, False).photo))
+        return any(_decoded(path, [0], lambda image: image.mode not in _GREY and _marks(image, False).photo))
     except InputError:  # raised again where it is read
         return False
 
 
-def _decoded(path: Path, decode: Callable[[Image.Image], T]) -> T | None:
-    """Return what `decode` makes of a picture, None where it is none. Raises InputError for large ones or several."""
+def _decoded(path: Path, pages: Sequence[int], decode: Callable[[Image.Image], T]) -> Iterator[T]:
+    """Yield what `decode` makes of pages of a file; no more where there is none. Raises InputError for large ones."""
     if not path.is_file():
-        return None
+        return
     check_size(path, LARGEST_FILE)
     expected = f"{path}: expected at most {PIXELS // 10**6} million pixels"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(path, formats=_FORMATS) as image:
-                if image.format not in _JPEG and (count := getattr(image, "n_frames", 1)) > 1:
-                    raise InputError(f"{path}: expected one picture, got {count}")
-                if image.width * image.height > PIXELS:
-                    raise InputError(f"{expected}, got {image.width}x{image.height}")
-                return decode(image)
+                if image.format == "PNG" and getattr(image, "n_frames", 1) > 1:
+                    raise InputError(f"{path}: expected one picture, got an animation")
+                for page in pages:
+                    if page:
+                        image.seek(page)
+                    if image.width * image.height > PIXELS:
+                        raise InputError(f"{expected}, got {image.width}x{image.height}")
+                    yield decode(image)
     except Image.DecompressionBombError:
         raise InputError(f"{expected}, got far more") from None
     except InputError:
         raise
     except Exception:  # whatever the library trips over, the file is to blame
-        return None
+        return
 
 
 def _grey(image: Image.Image) -> NDArray[np.uint8]:

@@ -2,7 +2,7 @@
 
 | arrow | |
 |---|---|
-| files to frames | `numbered`: numbers that are missing are frames in which nothing is known |
+| files to frames | `numbered`: a frame a page; numbers that are missing are frames in which nothing is known |
 | frames to values | `images.read_marks`, `archive.archived` |
 | values to bits | `ValueCounts.classifier`, `_pack` |
 
@@ -14,6 +14,8 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, read_marks
+from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, page_count, read_marks
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
@@ -132,35 +134,41 @@ def numbered(images: Sequence[Path], name: str) -> tuple[list[Path | None], list
 def read_images(images: Sequence[Path], name: str, frames: Range, label: int | None = None) -> PackedMasks:
     """Return the masks of images of one size. Raises InputError naming the file where one is none."""
     files, guesses = numbered(images, name)
-    files = files[slice(*span(frames, len(files)))]
-    known = np.array([file is not None for file in files])
-    size, is_person, kind = _decided(_marks(files, name, label), label, name)
-    masks, valid = _pack(_marks(files, name, label), int(known.sum()), size, is_person), None
+    every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
+    chosen = every[slice(*span(frames, len(every)))]
+    known = np.array([file is not None for file, _ in chosen])
+    size, is_person, kind = _decided(_marks(chosen, name, label), label, name)
+    masks, valid = _pack(_marks(chosen, name, label), int(known.sum()), size, is_person), None
     if not known.all():
-        shown, masks, valid = masks, *(empty_planes(len(files), size) for _ in range(2))
+        shown, masks, valid = masks, *(empty_planes(len(chosen), size) for _ in range(2))
         masks[~known], masks[known] = 0, shown
         valid[:] = np.where(known, 255, 0)[:, None]
-    names = [str(file) if file else f"{name}, missing" for file in files]
+    paged = {file for file, page in chosen if page}
+    names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
     return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
 
 
-def _marks(files: Sequence[Path | None], name: str, label: int | None) -> Iterator[Marks]:
-    """Yield how each of the images but None marks a person. Raises InputError where one does not."""
+def _marks(images: Sequence[tuple[Path | None, int]], name: str, label: int | None) -> Iterator[Marks]:
+    """Yield how each of the images, files and pages but None, marks a person. Raises InputError where one does not."""
+    known = [(file, page) for file, page in images if file is not None]
     first: Marks | None = None
-    for file in filter(None, files):
-        marks = read_marks(existing(file), label is not None)
-        if marks is None:
+    for file, group in groupby(known, key=itemgetter(0)):
+        pages = [page for _, page in group]
+        remaining = len(pages)
+        for marks in read_marks(file, pages, label is not None):
+            remaining -= 1
+            if marks.photo:
+                raise _many_colours(str(file) if first else name)
+            if first is None:
+                check_decoded(name, marks.values.nbytes * len(known))
+            if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
+                raise InputError(f"{file}: masks must be finite, got nan or infinity")
+            first = first or marks
+            if marks.values.shape != first.values.shape:
+                raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
+            yield marks
+        if remaining:
             raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
-        if marks.photo:
-            raise _many_colours(str(file) if first else name)
-        if first is None:
-            check_decoded(name, marks.values.nbytes * sum(file is not None for file in files))
-        if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
-            raise InputError(f"{file}: masks must be finite, got nan or infinity")
-        first = first or marks
-        if marks.values.shape != first.values.shape:
-            raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
-        yield marks
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:

@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.files import opencv_name
 from posefit.footage.cameras import CameraView, calibrated, combined, listed, world_of
 from posefit.footage.cleaning import cleaned
-from posefit.footage.images import IMAGES, is_photo
+from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import Range
 from posefit.footage.people import Choice
 from posefit.footage.quality import Verdict
@@ -215,12 +215,12 @@ def kind_of(source: Footage) -> Kind:
     """Return what a source names: a built-in motion's name is never a folder, and what is no other file is video.
 
     A name with folders in it and no suffix is a folder's, even where there is none. Images are a film where there are
-    several, and the first is a picture in many colours; else they are masks.
+    several, or pages, and the first is a picture in many colours; else they are masks.
     """
     if isinstance(source, np.ndarray):
         return "masks"
     if isinstance(source, tuple):
-        return "pictures" if len(source) > 1 and is_photo(source[0]) else "masks"
+        return "pictures" if is_photo(source[0]) and (len(source) > 1 or page_count(source[0]) > 1) else "masks"
     if isinstance(source, Motion) or source in built_in.names() or recorded.is_recorded(source):
         return "motion"
     path = Path(source)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.files import opencv_name
-from posefit.footage.images import PIXELS, read_image
+from posefit.footage.images import PIXELS, page_count, read_image
 from posefit.footage.readers import numbered
 from posefit.motion.clips import FPS
 from posefit.silhouette.foreground import Image
@@ -39,8 +39,8 @@ class Video:
     fps: float
     size: tuple[int, int]  # width and height in pixels, as filmed
     claimed: int = 0  # frames, by what the file says of itself; 0 where it says nothing
-    # images or their files; of a video file none
-    pictures: Sequence[Path | Image] = field(default=(), repr=False, compare=False)
+    # images, or their files and pages; of a video file none
+    pictures: Sequence[tuple[Path, int] | Image] = field(default=(), repr=False, compare=False)
     warnings: Sequence[str] = ()  # what a user should know of its frames
     guesses: Sequence[str] = ()  # what it does not state
     _order: Order = field(kw_only=True, repr=False, compare=False)  # of the file's frames: one for each moment
@@ -100,13 +100,16 @@ class Video:
     def of_pictures(cls, files: Sequence[Path], name: Path, fps: float | None) -> "Video":
         """Return the film of pictures, 30 a second by default, in which a missing number holds the one before it."""
         frames, guesses = numbered(files, str(name))
-        image = _picture(files[0])
+        pictures: list[tuple[Path, int] | Image] = [(file, page) for file in files for page in range(page_count(file))]
+        image = _picture(pictures[0])
         filmed = np.array([file is not None for file in frames])
         order = np.cumsum(filmed) - 1
+        if len(pictures) > len(files):
+            order, filmed = np.arange(len(pictures)), np.ones(len(pictures), dtype=bool)
         size = image.shape[1], image.shape[0]
         if fps is None:
             guesses.append(f"{FPS:g} frames a second")
-        return cls(name, fps or FPS, size, 0, files, guesses=guesses, _order=order, _filmed=filmed)
+        return cls(name, fps or FPS, size, 0, pictures, guesses=guesses, _order=order, _filmed=filmed)
 
     def frames(self, start: int, stop: int | None, size: tuple[int, int], step: int = 1) -> Iterator[Image]:
         """Yield every `step`th frame of start to stop, scaled to `size`.
@@ -145,12 +148,13 @@ class Video:
         return bool(self._filmed[k])
 
 
-def _picture(source: Path | Image) -> Image:
+def _picture(source: tuple[Path, int] | Image) -> Image:
     if isinstance(source, np.ndarray):
         return source
-    image = read_image(source, grey=False)
+    file, page = source
+    image = read_image(file, grey=False, page=page)
     if image is None:
-        raise InputError(f"{source}: expected a picture, got a file that is none")
+        raise InputError(f"{file}: expected a picture, got a file that is none")
     return image
 
 

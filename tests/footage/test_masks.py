@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 import pytest
 from PIL.ImageFile import ImageFile
+from PIL.PngImagePlugin import PngInfo
 
 from posefit.footage import images
 from posefit.footage.cameras import CameraView, combined
 from posefit.footage.cleaning import cleaned
-from posefit.footage.images import read_image
+from posefit.footage.images import read_image, read_marks
 from posefit.footage.masks import PackedMasks
 from posefit.footage.readers import read_masks
 from posefit.footage.source import body_of, scene_of
@@ -389,6 +390,53 @@ def test_a_picture_of_too_many_pixels_is_refused_before_it_is_unpacked(
         bomb(tmp_path / "a.png", side)
         with pytest.raises(ValueError, match=f"a.png: expected at most 50 million pixels, got {came}"):
             read_masks(tmp_path, ALL)
+
+
+def test_a_chunk_that_says_it_has_more_than_the_file_is_refused(tmp_path: Path) -> None:
+    bomb(tmp_path / "a.png", 30)
+    content = (tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(content[:33] + b"\x7f" + content[34:])
+    assert read_image(tmp_path / "a.png", grey=True) is None
+
+
+def tiff(fields: Sequence[tuple[int, int, int]]) -> bytes:
+    """Return a TIFF file of 8 bits a pixel, all 0, that has these fields (tag, type, value) for its size."""
+    data = zlib.compress(bytes(10_000))
+    others = [(258, 3, 8), (259, 3, 8), (262, 3, 1), (273, 4, -1), (277, 3, 1), (278, 4, 60_000), (279, 4, len(data))]
+    entries = [*fields, *others]
+    start = 8 + 2 + 12 * len(entries) + 4
+    packed = b"".join(struct.pack("<HHII", tag, kind, 1, start if value < 0 else value) for tag, kind, value in entries)
+    return b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed + bytes(4) + data
+
+
+@each(
+    ("suffix", "content"),
+    [
+        (".tif", tiff([(256, 3, 100), (256, 4, 60_000), (257, 4, 60_000)])),  # a width that stands twice
+        (".tif", tiff([(256, 4, 60_000), (256, 3, 100), (257, 4, 60_000)])),
+        (".tif", tiff([(256, 16, 60_000), (257, 4, 60_000)])),  # of a type that has eight bytes
+        (".pgm", b"P4\n#x\r60000 60000\n5 5\n" + bytes(1000)),  # a comment that ends at a carriage return
+        (".pgm", b"P4\n#x\r5 5\n60000 60000\n" + bytes(1000)),
+    ],
+)
+def test_no_more_pixels_are_decoded_than_were_counted(tmp_path: Path, suffix: str, content: bytes) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(content)
+    try:
+        read = next(read_marks(path), None)
+    except ValueError as error:
+        assert "a" + suffix + ": expected at most 50 million pixels" in str(error)
+    else:
+        assert read is None or read.values.size < 50_000_000
+
+
+def test_a_palette_is_the_files_own(tmp_path: Path) -> None:
+    image = images.Image.frombytes("P", (9, 9), np.eye(9, dtype=np.uint8).tobytes())
+    image.putpalette([0, 0, 0, 200, 0, 0])
+    note = PngInfo()
+    note.add_text("a", "PLTE")  # which stands before the palette
+    image.save(tmp_path / "a.png", pnginfo=note)
+    np.testing.assert_array_equal(read_masks(tmp_path, ALL).silhouette(0).mask, np.eye(9, dtype=bool))
 
 
 def test_masks_that_unpack_to_too_much_are_refused_by_their_shape(

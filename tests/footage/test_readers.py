@@ -1,4 +1,4 @@
-"""Masks by what their files and values are: gaps in numbers, other pictures beside them, fractions and logits."""
+"""Masks by what their files and values are: pages, gaps in numbers, other pictures beside them, fractions and logits."""
 
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,20 @@ def check(source: Any, walk: list[Any]) -> list[str]:
     return list(masks.guesses)
 
 
+@each("name", ["a.tif", "a.gif", "a.webp"])
+def test_pages_of_a_file_are_frames(walk: list[Any], tmp_path: Path, name: str) -> None:
+    first, *others = drawn(walk)
+    options = {"lossless": True} if name == "a.webp" else {}
+    first.save(tmp_path / name, save_all=True, append_images=others, **options)
+    with Image.open(tmp_path / name) as image:
+        assert image.n_frames == len(walk)
+    check((tmp_path / name,), walk)
+    check(tmp_path, walk)
+    masks = read_masks((tmp_path / name,), (2, 4))
+    assert [Path(path).name for path in masks.names] == [f"{name}, page 2", f"{name}, page 3"]
+    np.testing.assert_array_equal(masks.silhouette(1).mask, walk[3])
+
+
 @each("suffix", [".gif", ".webp", ".tif"])
 def test_a_folder_of_images_of_any_kind_is_read_as_pillow_reads_it(
     walk: list[Any], tmp_path: Path, suffix: str
@@ -44,11 +58,10 @@ def test_a_folder_of_images_of_any_kind_is_read_as_pillow_reads_it(
     assert kind_of(tmp_path) == "masks"
 
 
-@each("name", ["a.png", "a.tif", "a.gif", "a.webp"])
-def test_several_pictures_in_a_file_are_refused(walk: list[Any], tmp_path: Path, name: str) -> None:
+def test_an_animated_png_is_refused(walk: list[Any], tmp_path: Path) -> None:
     first, *others = drawn(walk)
-    first.save(tmp_path / name, save_all=True, append_images=others)
-    with pytest.raises(ValueError, match=f"{name}: expected one picture, got 6"):
+    first.save(tmp_path / "a.png", save_all=True, append_images=others)
+    with pytest.raises(ValueError, match="a.png: expected one picture, got an animation"):
         read_masks(tmp_path, ALL)
 
 
