@@ -21,6 +21,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.silhouette.cost import masks_of
+from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_for
@@ -146,7 +147,8 @@ class Lookup:
         for camera, silhouette in zip(self.task.cameras, observation.silhouettes, strict=True):
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
-                table = _table(self.exemplars, float(np.round(elevation / ELEVATION) * ELEVATION))
+                with uncounted():  # a table is learned, once a process
+                    table = _table(self.exemplars, float(np.round(elevation / ELEVATION) * ELEVATION))
                 views.append((table, azimuth))  # whose yaws count from the camera
                 turn = round((azimuth - views[0][1]) / YAW_STEP)
                 total = total + np.roll(table.distances(picture), turn, axis=1)
