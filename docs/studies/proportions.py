@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import numpy as np
+from scipy.stats import multivariate_normal
 
 from posefit.arrays import Array
 from posefit.fitting.shape import COVARIANCE, LENGTHS
@@ -71,8 +72,7 @@ def library_factors() -> Array:
 
 def likelihood(factors: Array, covariance: Array) -> float:
     """Return the mean logarithm of the density of people's factors (n, k) under a normal one about the average."""
-    distances = np.einsum("ni,ij,nj->n", factors, np.linalg.inv(covariance), factors)
-    return float(-0.5 * (distances.mean() + np.linalg.slogdet(2.0 * np.pi * covariance)[1]))
+    return float(multivariate_normal(cov=covariance).logpdf(factors).mean())
 
 
 def proportions_lines(men: Path, women: Path) -> Iterator[str]:

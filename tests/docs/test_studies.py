@@ -272,16 +272,6 @@ def test_proportions_are_of_as_many_men_as_women(tmp_path: Path) -> None:
     assert correlation[0, 1] == pytest.approx(covariance / np.sqrt(1.5 * 0.5 * (3.25 + 8.75 / 3)))
 
 
-def test_the_density_of_people_is_that_of_a_normal_distribution() -> None:
-    from scipy.stats import multivariate_normal
-
-    rng = np.random.default_rng(0)
-    root = rng.normal(size=(4, 4))
-    people, covariance = rng.normal(size=(6, 4)), root @ root.T + np.eye(4)
-    expected = multivariate_normal(np.zeros(4), covariance).logpdf(people).mean()
-    assert proportions.likelihood(people, covariance) == pytest.approx(expected)
-
-
 def test_tracks_are_as_far_apart_as_the_median_joint_of_all_pairs() -> None:
     tracks = [np.zeros((1, 3, 3)), np.full((1, 3, 3), [3.0, 4.0, 0.0]), np.full((1, 3, 3), [0.0, 12.0, 0.0])]
     assert seeds.median_distance(tracks) == pytest.approx(np.sqrt(73.0))  # of 5, 12 and the square root of 9 + 64
