@@ -200,8 +200,8 @@ def test_what_a_stream_does_not_state_is_logged_and_the_unit_of_its_calibration_
             assert -2.9 < frames[0].frame.translation[2] < -1.9
 
 
-@each(
-    "options, expected",
+@pytest.mark.parametrize(
+    ("options", "expected"),
     [
         ({"hypotheses": 2}, "hypotheses must be left out with live, got 2"),
         ({"smooth": True}, "smooth must be left out with live, got True"),
