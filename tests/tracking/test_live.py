@@ -200,22 +200,27 @@ def test_what_a_stream_does_not_state_is_logged_and_the_unit_of_its_calibration_
             assert -2.9 < frames[0].frame.translation[2] < -1.9
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
+@each(
+    "options, expected",
     [
         ({"hypotheses": 2}, "hypotheses must be left out with live, got 2"),
         ({"smooth": True}, "smooth must be left out with live, got True"),
         ({"extraction": Extraction("median")}, "extraction must be given for video only, got .* for masks"),
         ({"unit": "cm"}, "unit must be given for calibrations and files of motions only, got 'cm' for masks"),
         ({"up": "z"}, "up must be given for calibrations and files of motions only, got 'z' for masks"),
-        ({}, "expected frames of 160x120, got 160x60"),
     ],
 )
 def test_what_a_stream_of_masks_cannot_be_tracked_with_is_refused(options, expected, monkeypatch, every_frame, walk):
-    content = b"".join(map(pgm, [*walk, walk[0][:60]]))
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"".join(map(pgm, walk[:8])))))
     with pytest.raises(InputError, match=expected):
-        list(track_live(**QUICK, **options))
+        next(track_live(**QUICK, **options))
+
+
+def test_images_of_another_size_are_refused(every_frame, walk):
+    masks = live_masks(Stream("-", io.BytesIO(pgm(walk[0]) + pgm(walk[0][:60]))), None, lambda _: None)
+    assert next(masks).source.number == 0
+    with pytest.raises(InputError, match="expected frames of 160x120, got 160x60"):
+        next(masks)
 
 
 IMPATIENT = """
