@@ -92,9 +92,10 @@ def test_scores_follow_from_the_traces() -> None:
 @each("infeasible", ["repair", "reject", "penalise"])
 def test_any_loop_makes_a_run_whose_improvements_cost_the_same_again(infeasible: Any) -> None:
     problem = posefit.suite(function=1, instance=10_000, budget=200, infeasible=infeasible)
+    assert [len(part) for part in problem.trace] == [0, 0]
     rng = np.random.default_rng(5)
     proposals = rng.uniform(-1.2, 1.2, (100, 9)) * rng.uniform(0.2, 1.0, (100, 1))
-    costs = problem(proposals)
+    costs = np.append(problem(proposals[:60]), [problem(proposal) for proposal in proposals[60:]])
     falls = [k for k in range(100) if costs[k] < min([np.inf, *costs[:k]])]
     run = run_of(problem, "my own", {"width": 1.2}, seed=7)
     assert np.array_equal(run.evaluations, [*(k + 1.0 for k in falls), 100.0][: len(run.evaluations)])
