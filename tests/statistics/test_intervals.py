@@ -86,12 +86,6 @@ def test_one_seed_or_fewer_than_eight_runs_give_no_interval():
         assert np.isnan([interval.low[0], interval.high[0]]).all()
 
 
-def test_a_higher_level_gives_a_wider_interval():
-    errors = np.random.default_rng(0).gamma(2.0, size=(1, 6, 6))
-    wide, narrow = (iqm_intervals(errors, np.random.default_rng(1), level=level) for level in (0.99, 0.8))
-    assert wide.low[0] < narrow.low[0] < narrow.high[0] < wide.high[0]
-
-
 @each(
     ("errors", "settings", "message"),
     [
