@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import agents
 import functions
 import gpu
 import proportions
 import seeds
+import table
 from make_boxes import learned_from, upright_poses
 from make_library import LONGEST_GAP, TOLERANCE, kept_frames
+from make_models import normalised_ridge
 from posefit.motion.built_in import average_skeleton
 from posefit.suites.boxes import STEP, TRAINING_PEOPLE, learned_without
 from posefit.sweep.plan import Plan
@@ -52,7 +55,6 @@ def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
         '[defaults]\nframes = 2\nevaluations = 80\n[product]\nmethods = ["random@pca"]\nmotions = ["walk"]\n'
         "corruptions = [{}, { holes = 0.5 }]\nseeds = 2\n"
     )
-    table = importlib.import_module("table")
     before = Path.cwd()
     words = [str(plan), "--by", "method", "--by", "corruption", "--workers", "1"]
     result = CliRunner(env={"POSEFIT_CMU": ""}).invoke(table.main, words)
@@ -66,7 +68,7 @@ def test_the_table_of_a_plan_has_a_line_a_group(tmp_path: Path) -> None:
 
 
 def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
-    table, path = importlib.import_module("table"), str(tmp_path / "rows.jsonl")
+    path = str(tmp_path / "rows.jsonl")
     rows = {name: {"name": name, "cost": cost} for name, cost in (("one", 1.5), ("other", 2.5))}
     assert table.earlier(path, lambda row: row["name"]) == {}
     coming = table.kept(path, iter(rows.items()), 2)
@@ -77,7 +79,6 @@ def test_rows_are_written_as_they_come_and_read_again(tmp_path: Path) -> None:
 
 
 def test_an_interval_holds_the_median() -> None:
-    table = importlib.import_module("table")
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     low, high = table.interval(values, "abcde")
     assert 1.0 <= low <= 3.0 <= high <= 5.0
@@ -85,11 +86,11 @@ def test_an_interval_holds_the_median() -> None:
 
 
 def test_the_models_ridge_is_in_normalised_units_with_an_offset_towards_a_target() -> None:  # Interpretation V5
-    rng, models = np.random.default_rng(1), importlib.import_module("make_models")
+    rng = np.random.default_rng(1)
     before = np.column_stack([np.zeros((90, 3)), rng.normal(0.0, 0.3, (90, 40))])
     after = before + rng.normal(0.0, 0.05, before.shape)
     inputs, target = before[:, 3:], 0.1 * rng.normal(size=(43, 40))
-    matrix, offset = models.normalised_ridge(before, after, target, 0.15)
+    matrix, offset = normalised_ridge(before, after, target, 0.15)
     unit = np.sqrt(inputs.var(axis=0).sum() / 10.0)
     scaled = (inputs - inputs.mean(axis=0)) / unit
     wanted = after - before - inputs @ target.T
@@ -236,15 +237,15 @@ def test_the_table_says_that_both_count_the_same(monkeypatch: pytest.MonkeyPatch
 
 def test_proportions_are_of_as_many_men_as_women(tmp_path: Path) -> None:
     heads = sorted({"stature", *(name.strip("-") for of in proportions.MEASURES.values() for name in of)})
-    table = tmp_path / "men.csv"
+    men_csv = tmp_path / "men.csv"
     person = dict.fromkeys(heads, 100.0) | {
         "stature": 2000.0,
         "trochanterionheight": 1100.0,
         "cervicaleheight": 1700.0,
     }
     people = [person | {"lateralfemoralepicondyleheight": height} for height in (500.0, 600.0)]
-    table.write_text("\n".join([",".join(heads), *(",".join(str(row[name]) for name in heads) for row in people)]))
-    logs = proportions.proportions(table)
+    men_csv.write_text("\n".join([",".join(heads), *(",".join(str(row[name]) for name in heads) for row in people)]))
+    logs = proportions.proportions(men_csv)
     assert logs.shape == (2, 9)
     np.testing.assert_allclose(logs[:, :3], np.log([[2.0, 0.3, 0.2], [2.0, 0.25, 0.25]]))
     men, women = np.array([[0.0, 0.0], [2.0, 2.0]]), np.array([[3.0, -3.0], [3.0, -1.0], [3.0, -2.0]])
@@ -262,14 +263,12 @@ def test_tracks_are_as_far_apart_as_the_median_joint_of_all_pairs() -> None:
 
 
 def test_blind_equivalents_lie_between_the_budgets_measured_by_their_logarithm() -> None:
-    equivalent = importlib.import_module("agents").equivalent
     blind = {100: 10.0, 10_000: 2.0}
-    assert [equivalent(blind, cost) for cost in (10.0, 6.0, 2.0)] == ["100", "1,000", "10,000"]
-    assert [equivalent(blind, cost) for cost in (10.1, 1.9)] == ["< 100", "> 10,000"]
+    assert [agents.equivalent(blind, cost) for cost in (10.0, 6.0, 2.0)] == ["100", "1,000", "10,000"]
+    assert [agents.equivalent(blind, cost) for cost in (10.1, 1.9)] == ["< 100", "> 10,000"]
 
 
 def test_the_table_of_agents_has_a_search_in_a_line_and_the_mean_of_seeds() -> None:
-    agents = importlib.import_module("agents")
     rows = [
         {"agent": name, "budget": budget, "costs": [cost, cost + 2.0], "cpu_seconds": 3.0}
         for name, budget, cost in (("sapso", 40, 9.0), ("sapso", 4_000, 1.0), ("cma", 40, 9.0), ("cma", 4_000, 5.0))

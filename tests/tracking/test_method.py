@@ -197,12 +197,6 @@ def test_every_default_is_completed(motion: Any, options: dict[str, Any], **expe
     assert completed(done, motion) == done
 
 
-def test_what_is_the_default_may_be_given() -> None:
-    brief: dict[str, Any] = {"frames": (0, 2), "evaluations": 80, "size": (80, 60)}
-    default, given = posefit.track("walk", **brief), posefit.track("walk", restarts=0, **brief)
-    np.testing.assert_array_equal(given.motion.poses, default.motion.poses)
-
-
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
