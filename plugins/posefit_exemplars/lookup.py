@@ -131,14 +131,12 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
 class Lookup:
     """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones.
 
-    `exemplars` are those of the task, where a tracker has them already.
-
     Settings:
         mirrored: whether the mirror images of all clips are learned from as well.
     """
 
-    def __init__(self, task: Task, exemplars: Exemplars | None = None, *, mirrored: bool = True) -> None:
-        self.task, self.exemplars = task, exemplars_for(task, mirrored) if exemplars is None else exemplars
+    def __init__(self, task: Task, *, mirrored: bool = True) -> None:
+        self.task, self.exemplars = task, exemplars_for(task, mirrored)
 
     def nearest(
         self, observation: Observation, count: int, yaw: float | None = None
