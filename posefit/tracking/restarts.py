@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.space import ROOT_RANGE_DEGREES
+from posefit.fitting.start import searched_posterior
 from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
@@ -49,6 +50,7 @@ SPIN_ANGLE = np.radians(60.0)  # within that time: more is no turn of a person, 
 END_SECONDS = 0.5  # from the ends of what is without spins, where it goes on from
 VOTES_PER_SECOND = 30.0
 EXCESS_TURN_VOTES = 30.0  # that a radian costs which is turned faster than a person can
+END = ("pose", "translation", "cost")  # of a search
 SEARCHED, SEARCHED_AGAIN = "searched", "searched again"
 
 Follow = Callable[[Task, Iterable[Observation], np.random.Generator], Iterator[Frame]]
@@ -105,7 +107,8 @@ def best_restart(
     Each searches the first usable frame around a mode of what it may show, as many as are likely; or, where nothing is
     guessed, anywhere, at all yaws where none is known. It then follows the person through a few more
     frames. The least mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution,
-    and the first frame is then searched once more in the whole one, around the best. A task that is `going_on` is
+    and the first frame is then searched once more in the whole one, around the best. Of a single frame that
+    has the posterior of where the searches end. A task that is `going_on` is
     followed beside the restarts, and is returned where none of them is better. `log` takes where they search.
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
@@ -131,9 +134,13 @@ def best_restart(
         tried += frames
         if (cost := _trial_cost(frames)) < least:
             best, least = after(task, frames[0]), cost
+    ends = tried if len(chosen) == 1 else []
     if factor > 1 and best is not (going_on or task):
-        tried.append(next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts]))))
+        tried = [*tried, next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts])))]
         best = after(task, tried[-1])
+    if ends and best.before:
+        poses, places, costs = (np.array([getattr(end, name) for end in ends]) for name in END)
+        best = after(task, replace(best.before[-1], posterior=searched_posterior(poses, places, costs)))
     return best, tried
 
 
