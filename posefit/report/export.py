@@ -52,7 +52,8 @@ def write_iohprofiler(runs: Sequence[SuiteRun], path: str | Path) -> None:
     for run in runs:
         # names of several words, which no optimiser's setting has
         budget = {"evaluations for each dimension": run.budget / run.dimension} if several else {}
-        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget}
+        looks = {"looks at the silhouette": True} if run.looked else {}
+        settings = {**run.settings, "infeasible proposals": run.infeasible, **budget, **looks}
         logged = algorithms.setdefault((run.method, json.dumps(settings, sort_keys=True, default=str)), {})
         place = run.function, run.dimension, run.instance, run.seed
         if place in logged:
