@@ -18,7 +18,7 @@ project_copyright = "The posefit developers"
 release = version = posefit.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
-exclude_patterns = ["_build", "contributions"]
+exclude_patterns = ["_build", "contributions", "generated/*.md"]  # the last are parts of pages
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3

@@ -1,8 +1,9 @@
 """What of the handbook is made from the code: settings, figures, equations, commands, environments.
 
 `python docs/generator` writes it into the pages, between `<!-- from the code: NAME -->` and `<!-- end -->`, and so does
-docs/conf.py before every build; tests/docs compares it with the code. The pages of the Python modules and those of the
-environments, which are docstrings alone, are not in the repository.
+docs/conf.py before every build; tests/docs compares it with the code. What the program prints or its modules
+hold, the lists of commands, settings and figures and the pages of modules and environments, goes to docs/generated,
+which is not in the repository.
 """
 
 import re
@@ -17,10 +18,8 @@ DOCS = Path(__file__).parents[1]
 PARTS = {
     "background/equations.md": equations.page,
     "howto/measuring.md": angles.page,
-    "reference/commands.md": commands.page,
-    "reference/figures.md": figures.page,
     "reference/joints.md": joints.page,
-    "reference/settings.md": settings.page,
+    "reference/settings.md": settings.tracker,
 }
 _PART = re.compile(r"(<!-- from the code: \w+ -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -39,6 +38,9 @@ def write() -> None:
     shutil.rmtree(DOCS / "generated", ignore_errors=True)
     for name, text in {
         **pages(),
+        "generated/commands.md": commands.page(),
+        "generated/figures.md": figures.page(),
+        "generated/settings.md": settings.page(),
         **{f"generated/python/{name}.rst": text for name, text in python.pages().items()},
         **{f"generated/environments/{name}.md": text for name, text in environments.pages().items()},
     }.items():

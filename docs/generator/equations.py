@@ -53,15 +53,16 @@ class Tag(NamedTuple):
 
 
 def page() -> str:
-    """Return a table of tags for each source, as Markdown."""
+    """Return a list of tags for each source, as Markdown."""
     ordered = sorted(tags(), key=lambda tag: _key(tag.step))
     parts = []
     for source, title in SOURCES.items():
-        lines = [f"## {source}", f"{title}.", "| tag | where | tests |\n|---|---|---|"]
-        for tag in (tag for tag in ordered if tag.source == source):
-            named = "<br>".join(f"`{name}`" for name in tests_of(tag))
-            lines[-1] += f"\n| `{tag.step}` | `{tag.path}` | {named} |"
-        parts += lines
+        entries = [
+            f"- `{tag.step}` `{tag.path}`: {', '.join(f'`{name}`' for name in tests_of(tag))}"
+            for tag in ordered
+            if tag.source == source
+        ]
+        parts += [f"## {source}", f"{title}.", "\n".join(entries)]
     return "\n\n".join(parts) + "\n"
 
 

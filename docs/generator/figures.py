@@ -1,4 +1,4 @@
-"""The page of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
+"""The list of the figures: the keys of summary.json, the columns of frames.csv and of a sweep's CSV, with units."""
 
 from collections.abc import Iterable, Mapping
 
@@ -12,23 +12,23 @@ RAW = {"%": "share, 0 to 1", "ms": "s", "ms a frame": "s"}
 # What summary.json says beside the figures: the question, not the answer.
 REQUEST = {
     "motion": ("", "name of the motion, the video or the masks"),
-    "source": ("", "what was given as the source, one entry a camera"),
-    "frames_chosen": ("frames", "start and stop of `--frames`; null is an end that was not given"),
+    "source": ("", "one entry a camera"),
+    "frames_chosen": ("frames", "start and stop of `--frames`, or null"),
     "method": ("", "the optimiser and the prior, or the tracker"),
     "seed": ("", "of everything random"),
     "frames": ("frames", "how many were followed"),
     "evaluations_per_frame": ("", "budget of a frame, in each track"),
     "version": ("", "of posefit"),
-    "train": ("", "names of the motions learned from"),
-    "view_degrees": ("degrees", "directions of the cameras; null where unknown"),
+    "train": ("", "motions learned from"),
+    "view_degrees": ("degrees", "directions of the cameras, or null"),
     "translation": ("", "the root's position: known, searched or aligned"),
     "first_pose": ("", "searched, or given"),
     "smooth": ("", "whether the track was [smoothed](../howto/smoothing.md)"),
     "views": ("", "number of cameras"),
-    "camera": ("", "given by a calibration, guessed, or placed around a known motion"),
-    "size_pixels": ("pixels", "width and height of the first camera's masks"),
+    "camera": ("", "calibrated, guessed, or placed around a known motion"),
+    "size_pixels": ("pixels", "of the first camera's masks"),
     "fps": ("1/s", "frames a second"),
-    "dimensions": ("", "coordinates of a proposal; `null` of a tracker of its own"),
+    "dimensions": ("", "coordinates of a proposal; null of a tracker that searches no box"),
     "settings": ("", "what was set, or follows from the budget"),
 }
 
@@ -39,27 +39,25 @@ ROW = {
     "status": ("", "`done` or `quarantined`, after three failed attempts"),
     "reason": ("", "why a quarantined cell failed"),
     "kind": ("", "`track` or `search`"),
-    "evaluations_used": ("", "poses whose cost was computed, in all frames together"),
-    "dimensions": ("", "coordinates of a proposal; none of a tracker that searches no box"),
+    "evaluations_used": ("", "`evaluations` of summary.json; here `evaluations` is the budget of a frame"),
     "seconds": ("s", "wall time of the whole cell"),
-    "warnings": ("", "what to look at before the result is trusted"),
     "joint_errors_mm.JOINT": ("mm", "mean distance of one joint from the true one, both roots at one point"),
 }
-SPENT = ("evaluations_used", "dimensions", "seconds", "warnings", "joint_errors_mm.JOINT")
+SPENT = ("evaluations_used", "seconds", "joint_errors_mm.JOINT")
 RESULT = {
     "hypotheses": (
         "",
         "of each [hypothesis](../howto/hypotheses.md): `beginning`, `cost`, `motion` term, and `kept`",
     ),
-    "build": ("m", "the build that was fitted: `stature_m`, `factors` on the average and their `spread`; or null"),
-    "trace": ("", "of a single frame only: evaluations so far and best cost, after each population"),
+    "build": ("m", "what was fitted: `stature_m`, `factors` on the average and their `spread`; or null"),
+    "trace": ("", "of a single frame: evaluations so far and best cost, after each population"),
     "warnings": ("", "what to look at before the result is trusted"),
-    "guesses": ("", "what the source does not state and posefit assumed, such as the camera, the rate or a height"),
+    "guesses": ("", "what posefit assumed, such as the camera, the rate or a height"),
     "modes": ("", "weights of the tracks that the whole motion may be, the likeliest first"),
-    "none_of_modes": ("", "how likely it is that none of a frame's modes is right, the mean over frames"),
-    "unknown_sides": ("", "numbers of the frames whose left and right are called unknown"),
-    "lost_frames": ("", "numbers of the frames that are called lost"),
-    "relocalised": ("", "numbers of the frames from which the person was searched for all around again"),
+    "none_of_modes": ("", "mean probability that no mode of a frame is right"),
+    "unknown_sides": ("", "frames whose left and right are called unknown"),
+    "lost_frames": ("", "frames that are called lost"),
+    "relocalised": ("", "frames from which the person was searched for all around again"),
     "retracked_outside": (
         "",
         "first and last frame of what [was not tracked again](../howto/smoothing.md#a-body-that-spins)",
@@ -81,9 +79,9 @@ def page() -> str:
         _table("key", _described(REQUEST)),
         _table("key", [*_measured(MEASURES.values()), *_described(RESULT)]),
         "`error_degrees` holds `mean`, `std` and `max` over the frames. `skill`, `baselines_degrees` and "
-        f"`baselines_mm` hold one number for each baseline: {_baselines()}, with the true root and translation. "
-        "`coverage` holds a share for each of `50`, `80` and `95`, and `interval_mm` a radius. A figure that needs the "
-        "truth is `null` where it is unknown, and a figure of a method is `null` where the method does not report it.",
+        f"`baselines_mm` hold one number for each baseline: {_baselines()}. "
+        "`coverage` and `interval_mm` hold one for each of `50`, `80` and `95`. What needs a truth that is unknown, or "
+        "what the method does not report, is `null`.",
         "## Columns of `frames.csv`",
         "One row a frame; those that need the truth are there only where it is known. "
         f"{_shared()} are as above, of one frame. Then there are",
@@ -94,9 +92,8 @@ def page() -> str:
         "`baselines_degrees.mean_pose`.",
         "What the cell is: the fields [of a plan](../howto/plan.md#the-fields-of-a-cell), and",
         _table("column", _described({name: ROW[name] for name in ("key", "version", "status", "reason", "kind")})),
-        "What it measured: the figures of [`summary.json`](#keys-of-summary-json), `evaluations_per_second` aside, and",
+        "What it measured: the results of [`summary.json`](#keys-of-summary-json) but `evaluations_per_second`, and",
         _table("column", _described({name: ROW[name] for name in SPENT})),
-        "In this file `evaluations` is the budget of a frame, and `evaluations_used` what all frames took.",
     ]
     return "\n\n".join(parts) + "\n"
 

@@ -1,4 +1,4 @@
-"""The page of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code.
+"""The list of the settings: every optimiser, prior, tracker and segmenter that posefit brings, read from the code.
 
 Of optimisers that only adapt a library the page has the names.
 """
@@ -29,8 +29,12 @@ def page() -> str:
                 "### Adapters of libraries",
                 f"{names}: `posefit plugins show NAME` has their settings. {ADAPTERS}",
             ]
-    parts += ["## What drives an optimiser and a prior", _described("tracker", Prediction)]
     return "\n\n".join(parts) + "\n"
+
+
+def tracker() -> str:
+    """Return the list of what drives an optimiser and a prior, as Markdown."""
+    return _described("tracker", Prediction) + "\n"
 
 
 def _method(offer: Offer) -> str:

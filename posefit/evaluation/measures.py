@@ -62,8 +62,7 @@ class Measures:
         "error",
         "degrees",
         2,
-        "absolute difference of the 66 angles from the true ones, the mean over angles: its mean over the frames, "
-        "standard deviation and maximum. SAPSO (8)-(10)",
+        "mean absolute difference of the 66 angles from the true ones. SAPSO (8)-(10)",
     )
     geodesic_degrees: float | None = _figure(
         "geodesic", "degrees", 2, "angle between true and estimated rotations of root and joints, the mean"
@@ -78,7 +77,7 @@ class Measures:
         "PA-MPJPE", "mm", 0, "the same after the best rotation, scale and translation (Procrustes)"
     )
     iou: float = _figure(
-        "IoU", "", 3, "intersection over union of body and mask, the mean over views and frames that show enough"
+        "IoU", "", 3, "intersection over union of body and mask, the mean over usable views and frames"
     )
     cost: float = _figure("cost", "", 2, "silhouette mismatch of the estimated poses, 0 to 100. SAPSO (4)")
     swap_rate: float | None = _share("left/right swapped", "share of frames nearer to the truth when mirrored")
@@ -93,14 +92,12 @@ class Measures:
         "radius about a joint that holds it in 50, 80 and 95 % of cases, the mean over all but the root",
     )
     unknown_rate: float | None = _share(
-        "flagged unknown", "share of frames whose left and right the method calls unknown, where it reports it"
+        "flagged unknown", "share of frames whose left and right the method calls unknown"
     )
     swapped_known_rate: float | None = _share(
         "swapped where known", "share swapped of the frames whose left and right it calls known"
     )
-    lost_flagged_rate: float | None = _share(
-        "flagged lost", "share of frames that the method calls lost, where it reports it"
-    )
+    lost_flagged_rate: float | None = _share("flagged lost", "share of frames that the method calls lost")
     acceleration: float | None = _figure(
         "acceleration", "m/s2", 1, "of the joints, the mean over joints and frames: about 6 in a walk; more is jitter"
     )
@@ -109,9 +106,8 @@ class Measures:
         "foot slide",
         "mm a step",
         0,
-        "how far a foot gets along the ground from where it first stood, the mean over steps; a foot stands where "
-        "the true one does, or, where that is unknown, where it is low and slow; about 20 of motion capture; none "
-        "where no foot stands",
+        "how far a foot that stands (as the true one does, else where it is low and slow) gets along the ground, the "
+        "mean over steps: about 20 of motion capture",
     )
     held_frames: int = _figure(
         "held", "frames", 0, "frames that show too little: the pose is held or carried on, not searched"
@@ -129,11 +125,9 @@ class Measures:
         "truth projected into the prior", "degrees", 2, "error of the true poses' projection; a floor of linear priors"
     )
     seconds_per_frame: float = _figure(
-        "time", "ms a frame", 1, "wall time from the first mask read to the last pose smoothed, over the frames", 1e3
+        "time", "ms a frame", 1, "wall time from the first mask to the last pose, over the frames", 1e3
     )
-    cpu_seconds_per_frame: float = _figure(
-        "CPU time", "ms a frame", 1, "the same in CPU time of all threads; a busy machine does not add to it", 1e3
-    )
+    cpu_seconds_per_frame: float = _figure("CPU time", "ms a frame", 1, "the same in CPU time of all threads", 1e3)
     evaluations: int = _figure("evaluations", "", 0, "poses whose cost was computed, in all frames together")
     evaluations_per_second: float = _figure("speed", "poses a second", 0, "evaluations over that time")
 

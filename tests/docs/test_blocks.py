@@ -21,7 +21,7 @@ from tests.docs.pages import ROOT, RUN, SHOWN, Block, blocks, pages
 BLOCKS = [block for page in pages() for block in blocks(page)]
 # pages that take seconds of a processor
 SLOW = (
-    *(f"docs/{page}.md" for page in ("ways/sweep", "howto/suite", "howto/leaderboard", "howto/masks")),
+    *(f"docs/{page}.md" for page in ("ways/sweep", "howto/suite", "howto/masks")),
     *("docs/reference/settings.md", "docs/notebooks/array_to_angles.ipynb", "docs/notebooks/learner.ipynb"),
 )
 VIDEO = ROOT.parent / "shared/data/video/sports2d_walk"

@@ -10,13 +10,14 @@ import architecture
 import generator
 import pytest
 from click.testing import CliRunner
-from generator import angles, commands, equations, figures
+from generator import angles, commands, equations, figures, settings
 from generator.prose import restructured, shortened
 
 from posefit import track
 from posefit.cli import main
 from posefit.measuring.angles import COLUMNS
 from posefit.measuring.centres import PLACES
+from posefit.registry import registry
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.sweep.cell import DROPPED, TrackCell, run_cell
 from posefit.sweep.check import FIELDS, cell_of
@@ -34,12 +35,18 @@ def rows(page: str) -> set[str]:
 
 def test_the_page_of_commands_holds_the_help_of_each() -> None:
     assert {"posefit", "posefit track", "posefit plugins new", "posefit reproduce sapso"} <= set(HELPS)
-    assert all(f"## `{command}`" in commands.page() for command in HELPS)
     for name in ("posefit", "posefit track"):
         shown = CliRunner().invoke(
             main, [*name.split()[1:], "--help"], prog_name="posefit", terminal_width=commands.WIDTH
         )
         assert shown.output.strip() == HELPS[name]
+
+
+def test_the_settings_of_every_method_are_described() -> None:
+    page = settings.page()
+    for offers in registry().offers.values():
+        for offer in offers.values():
+            assert f"`{offer.name}`" in page
 
 
 @pytest.fixture(scope="module")
