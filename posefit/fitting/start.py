@@ -14,8 +14,7 @@ from posefit.arrays import Array
 from posefit.fitting.box import Start
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
-from posefit.uncertainty.calibration import Recalibration
+from posefit.geometry.skeleton import Skeleton
 from posefit.uncertainty.modes import Posterior, clusters_of, poses_apart
 
 MODES = 8  # at most
@@ -23,7 +22,6 @@ APART = 0.2  # metres, the mean over joints, beyond which poses are of different
 SPREAD = 0.08  # of a mode in half-ranges of the box: standard deviation
 SMALL_SIDE = 60  # pixels of the picture in which projected poses are compared, at least
 TEMPERATURE = 2.0  # divides their costs
-JOINT_ERROR, ANGLE_ERROR = 0.06, 0.25  # metres along an axis, and radians, that the right one of searched modes is off
 INFEASIBLE = 5.0  # added to the cost of a pose that is none to the prior
 
 
@@ -56,13 +54,6 @@ def start_in(problem: PoseProblem, modes: Sequence[tuple[float, Posterior]]) -> 
     ]
     starts.sort(key=lambda start: -start.weight)
     return replace(starts[0], others=starts[1:])
-
-
-def searched_posterior(poses: Array, translations: Array, costs: Array) -> Posterior:
-    """Return what one frame may show, by the poses (n, 66) that searches around its modes ended at, and their costs."""
-    errors = Recalibration(np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR))
-    weights = np.exp((costs.min() - costs) / TEMPERATURE)
-    return Posterior(poses, translations, weights, coherent=True, recalibration=errors)
 
 
 def coordinates_of(space: SearchSpace, poses: Array, translations: Array) -> Array:

@@ -8,7 +8,7 @@ import posefit
 from posefit.fitting.box import Start, draw_population
 from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
-from posefit.fitting.start import APART, SPREAD, modes_apart, searched_posterior, start_in
+from posefit.fitting.start import APART, SPREAD, modes_apart, start_in
 from posefit.fitting.tracker import Observation, Task, guessed_modes
 from posefit.motion import built_in
 from posefit.testing.toy import Toy
@@ -92,12 +92,6 @@ class Knows:
 
     def posterior(self, observation: Observation) -> Posterior | None:
         return weighted([5], [1.0], [1.0])
-
-
-def test_what_searches_end_at_is_as_likely_as_it_is_cheap() -> None:
-    posterior = searched_posterior(WALK.poses[[5, 20, 35]], np.zeros((3, 3)), np.array([3.0, 1.0, 5.0]))
-    shares = np.exp([-1.0, 0.0, -2.0])  # two of cost are a factor of e
-    np.testing.assert_allclose(posterior.weights, shares / shares.sum())
 
 
 def test_nothing_is_guessed_where_the_pose_is_known_or_nothing_shows() -> None:
