@@ -132,8 +132,8 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
 class Lookup:
     """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones."""
 
-    def __init__(self, task: Task, exemplars: Exemplars | None = None) -> None:
-        self.task, self.exemplars = task, exemplars or exemplars_for(task)  # a tracker has them already
+    def __init__(self, task: Task) -> None:
+        self.task, self.exemplars = task, exemplars_for(task)
 
     def nearest(
         self, observation: Observation, count: int, yaw: float | None = None

@@ -17,7 +17,7 @@ from posefit_exemplars import beam as beams
 from posefit_exemplars import hypotheses, markov
 from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.calibration import reported
-from posefit_exemplars.exemplars import Codes, Rows, exemplars_for
+from posefit_exemplars.exemplars import Codes, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lookup import YAW_STEP, Lookup
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
@@ -76,8 +76,8 @@ class ExemplarTracker:
         at_least("samples", samples, 1)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
-        self.task, self.exemplars = task, exemplars_for(task)
-        self.step, self.lookup = beams.Step.of(task, spread), Lookup(task, self.exemplars)
+        self.task, self.step, self.lookup = task, beams.Step.of(task, spread), Lookup(task)
+        self.exemplars = self.lookup.exemplars
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
         fit_evaluations = FIT_SHARE * task.evaluations
