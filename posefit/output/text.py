@@ -72,10 +72,9 @@ def table(summary: Mapping[str, Any]) -> str:
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
     if tracks := summary["hypotheses"]:
-        best = next(k for k, track in enumerate(tracks) if track["kept"])
         costs = [f"{track['guess']} {track['cost'] + track['motion']:.2f}" for track in tracks]
-        chosen = f"kept track {best + 1} of {len(tracks)}"
-        lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
+        frames = ", ".join(f"{track['frames']} of track {k}" for k, track in enumerate(tracks, 1) if track["frames"])
+        lines.append(f"frames kept: {frames}; trajectory cost by initial guess: {', '.join(costs)}")
     speed = MEASURES["evaluations_per_second"].number(summary["evaluations_per_second"])
     lines.append(f"{_effort(summary)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the names of files are among them

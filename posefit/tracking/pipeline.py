@@ -98,6 +98,7 @@ def track_hypotheses(
     scene: Scene, first: Task, method: Method, options: TrackOptions, recorder: Recorder, progress: Progress
 ) -> list[Hypothesis]:
     """Return each hypothesis with all its frames. Each is recorded as it comes; recorded ones are not tracked again."""
+    assert options.hypotheses is not None
     recorded, state = recorder.earlier()
     gap = method.relocalise_gap if scene.truth is None else 0
     count, total, pivot = scene.count, options.hypotheses, _pivot(scene, first, method)

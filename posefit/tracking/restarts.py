@@ -297,7 +297,7 @@ def retrack_spins(
     new = [*behind[::-1], *frames[first : last + 1], *ahead]
     cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(new) < before
-    new = with_total_effort([frames, new], int(better))
+    new = with_total_effort([frames, new], np.full(len(frames), int(better)))
     new[first : last + 1] = frames[first : last + 1]
     return tracked._replace(frames=new, stay=stay if better else None)
 
