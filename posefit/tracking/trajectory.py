@@ -140,7 +140,7 @@ def cheapest_path(scene: Scene, tracks: Sequence[Sequence[Frame]]) -> NDArray[np
 
 
 def frame_costs(body: Body, cameras: Sequence[Camera], frames: Sequence[Frame], observation: Observation) -> Array:
-    """Return what the poses of several frames cost in one observation, with its landmarks; 0 where it shows too little."""
+    """Return what several frames' poses cost in one observation, with its landmarks; 0 where it shows too little."""
     costs = np.array([frame.cost if observation.usable else 0.0 for frame in frames])
     if observation.landmarks is None:
         return costs
