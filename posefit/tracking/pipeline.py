@@ -4,7 +4,7 @@
 |---|---|---|
 | `initialise` | the first pose and the person's build | initialise.py |
 | `track_hypotheses`, `track_hypothesis` | the frames of each, and of one, by the method's tracker | this one |
-| `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
+| `cheapest`, `retrack_spins` | the cheapest path, tracked again where the body spins | trajectory.py, restarts.py |
 | `smooth` | of footage: a smooth path, planted feet, poses fitted to the contours | smoothing/ |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
 """
