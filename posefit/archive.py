@@ -103,9 +103,9 @@ def archived(
             file = stack.enter_context(_ArchiveFile(path))
             archive = stack.enter_context(zipfile.ZipFile(file))
             file.longest = packed
-            there = set(archive.namelist())
-            arrays = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in there}
-            if single and len(there) == 1 and (only := there.pop()).endswith(".npy"):
+            members = set(archive.namelist())
+            arrays = {name: _stored(path, what, archive, name) for name in names if f"{name}.npy" in members}
+            if single and len(members) == 1 and (only := members.pop()).endswith(".npy"):
                 arrays = {names[0]: _stored(path, what, archive, only.removesuffix(".npy"))}
         yield arrays
 

@@ -26,20 +26,20 @@ _TAKEN = (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR)  # errors of a rename to
 
 
 def check_new(path: str | Path) -> None:
-    """Return nothing. Raises InputError where `path` exists, be it a link that leads nowhere."""
+    """Raise InputError where `path` exists, be it a link that leads nowhere."""
     if os.path.lexists(path):
         raise _exists(path)
 
 
 def check_place(path: str | Path) -> None:
-    """Return nothing. Raises InputError where `path` is in no folder, or in one that cannot be written to."""
+    """Raise InputError where `path` is in no folder, or in one that cannot be written to."""
     parent = Path(path).resolve().parent
     if not parent.is_dir() or not os.access(parent, os.W_OK):
         raise InputError(f"{path}: expected a place to write to, got one in {parent}, which is none")
 
 
 def check_free(path: str | Path | None) -> None:
-    """Return nothing. Raises InputError as `check_new` and `check_place` do, where there is a path."""
+    """Raise InputError as `check_new` and `check_place` do, where there is a path."""
     if path is not None:
         check_new(path)
         check_place(path)
@@ -135,7 +135,7 @@ class Unfinished:
         path = _created_folder(target)
         with _undone(path):
             file = os.open(path / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
-            _locked(file)
+            lock(file)
             (path / MARK).write_text(json.dumps({"target": target.name, "info": info}), encoding="utf-8")
         return cls(target, path, file, info)
 
@@ -149,7 +149,7 @@ class Unfinished:
             with suppress(OSError, ValueError, KeyError, TypeError):
                 modified = entry.stat().st_mtime
                 file = os.open(entry, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
-                mark = parsed_json(read_text(entry, MAX_MARK_BYTES)) if _locked(file) else None
+                mark = parsed_json(read_text(entry, MAX_MARK_BYTES)) if lock(file) else None
                 if mark is not None and mark["target"] == target.name and isinstance(mark["info"], dict):
                     folders.append((modified, cls(target, entry.parent, file, mark["info"])))
                 else:
@@ -210,7 +210,7 @@ def emptied(folder: Path, names: Iterable[str]) -> None:
         folder.rmdir()
 
 
-def _locked(file: int) -> bool:
+def lock(file: int) -> bool:
     """Lock a file; return False where another process has."""
     try:
         import fcntl

@@ -94,7 +94,7 @@ def memory(gigabytes: float) -> Iterator[None]:
 
 
 def check_decoded(name: str, size: int) -> None:
-    """Return nothing. Raises InputError where masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES allows.
+    """Raise InputError where masks unpack to more bytes than POSEFIT_DECODED_GIGABYTES allows.
 
     They take time rather than memory, where they become bits frame by frame.
     """
@@ -110,13 +110,13 @@ def check_decoded(name: str, size: int) -> None:
 
 def allowed_bytes() -> int:
     """Return how much memory this process may have: what the machine, its container and its own limits leave."""
-    own = []
+    limits = []
     with suppress(ImportError):
         import resource
 
-        limits = (resource.getrlimit(one)[0] for one in (resource.RLIMIT_DATA, resource.RLIMIT_AS))
-        own = [limit for limit in limits if limit != resource.RLIM_INFINITY]
-    return min(_machine_bytes(), *own) if own else _machine_bytes()
+        soft = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_DATA, resource.RLIMIT_AS))
+        limits = [limit for limit in soft if limit != resource.RLIM_INFINITY]
+    return min([_machine_bytes(), *limits])
 
 
 @lru_cache(maxsize=1)

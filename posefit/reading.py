@@ -69,7 +69,7 @@ def existing(path: Path) -> Path:
 
 
 def check_size(path: Path, most: int) -> None:
-    """Return nothing. Raises InputError where a file is too large to be read, or is a folder, a pipe or a device."""
+    """Raise InputError where a file is too large to be read, or is a folder, a pipe or a device."""
     state = path.stat()
     if not stat.S_ISREG(state.st_mode):
         came = "a folder" if stat.S_ISDIR(state.st_mode) else "a pipe or a device"

@@ -123,8 +123,8 @@ class Registry:
     @property
     def offers(self) -> Mapping[Kind, Mapping[str, Offer]]:
         """The offers of all plugins that were loaded."""
-        mine = [offer for plugin in self.plugins for offer in plugin.offers]
-        return {kind: {offer.name: offer for offer in mine if offer.kind == kind} for kind in KINDS}
+        offers = [offer for plugin in self.plugins for offer in plugin.offers]
+        return {kind: {offer.name: offer for offer in offers if offer.kind == kind} for kind in KINDS}
 
     def optimiser(self, name: str) -> "OptimiserFactory":
         """Return the optimiser factory of a name. Raises ValueError listing the known names."""
@@ -234,7 +234,7 @@ def load(
     blocked = {word.strip().lower() for word in variables.get(BLOCK, "").split(",")}
     plugins: list[Plugin] = []
     owned = [(*((point.dist.name, point.dist.version) if point.dist else ("unknown", "")), point) for point in points]
-    for owner, release, point in sorted(owned, key=lambda one: (one[0] != PROJECT, one[2].name)):
+    for owner, release, point in sorted(owned, key=lambda entry: (entry[0] != PROJECT, entry[2].name)):
         plugin = Plugin(point.name, owner, release, "left out", f"{BLOCK} names it")
         if not blocked & {point.name.lower(), owner.lower()}:
             try:

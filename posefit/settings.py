@@ -38,9 +38,9 @@ def settings_of(factory: Callable[..., Any]) -> tuple[Setting, ...]:
     except (NameError, TypeError, ValueError):  # an annotation that cannot be resolved is no annotation
         signature = inspect.signature(factory)
     return tuple(
-        Setting(one.name, one.annotation, one.default)
-        for one in signature.parameters.values()
-        if one.kind is inspect.Parameter.KEYWORD_ONLY
+        Setting(parameter.name, parameter.annotation, parameter.default)
+        for parameter in signature.parameters.values()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
     )
 
 
@@ -65,14 +65,14 @@ def names(factory: Callable[..., Any]) -> list[str]:
     return [setting.name for setting in settings_of(factory)]
 
 
-def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def check(plugin: str, factory: Callable[..., Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings, numbers of NumPy as Python's own.
 
     Raises ValueError where one is unknown, listing the known, or its type is wrong.
     """
     known = {setting.name: setting for setting in settings_of(factory)}
     values = {}
-    for name, value in given.items():
+    for name, value in chosen.items():
         setting, plain = _known(plugin, name, known), _plain(value)
         if not accepts(setting.annotation, plain):
             raise InputError(f"{plugin}.{name} must be {setting.type}, got {quoted(value)}")
@@ -80,13 +80,13 @@ def check(plugin: str, factory: Callable[..., Any], given: Mapping[str, Any]) ->
     return values
 
 
-def planned(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> dict[str, Any]:
+def planned(factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int) -> dict[str, Any]:
     """Return an optimiser's settings with what follows from the budget of one search, where it takes it.
 
     These are `evaluations` itself, and `iterations`, the populations after the first. What is given stays as it is.
     """
     known = {setting.name: setting.default for setting in settings_of(factory)}
-    filled = dict(given)
+    filled = dict(chosen)
     if "evaluations" in known:
         filled.setdefault("evaluations", evaluations)
     if "iterations" in known:
@@ -96,21 +96,21 @@ def planned(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: 
     return filled
 
 
-def population(factory: Callable[..., Any], given: Mapping[str, Any], evaluations: int) -> int:
+def population(factory: Callable[..., Any], chosen: Mapping[str, Any], evaluations: int) -> int:
     """Return how many proposals an optimiser makes at a time, where its settings say so; else 1."""
     known = {setting.name: setting.default for setting in settings_of(factory)}
-    size = planned(factory, given, evaluations).get("population_size", known.get("population_size", 1))
+    size = planned(factory, chosen, evaluations).get("population_size", known.get("population_size", 1))
     return size if isinstance(size, int) and size > 0 else 1
 
 
-def parse(plugin: str, factory: Callable[..., Any], given: Mapping[str, str]) -> dict[str, Any]:
+def parse(plugin: str, factory: Callable[..., Any], chosen: Mapping[str, str]) -> dict[str, Any]:
     """Return settings that were given as text, as the values their types ask for.
 
     Raises ValueError where one is unknown or its text does not fit its type.
     """
     known = {setting.name: setting for setting in settings_of(factory)}
     values = {}
-    for name, text in given.items():
+    for name, text in chosen.items():
         setting = _known(plugin, name, known)
         readings = [value for value in _readings(text) if accepts(setting.annotation, value)]
         if not readings:
@@ -124,15 +124,15 @@ def parse_texts(plugin: str, factory: Callable[..., Any], texts: Sequence[str]) 
 
     Raises ValueError where a text has another form, or `parse` does.
     """
-    given: dict[str, str] = {}
+    chosen: dict[str, str] = {}
     for text in texts:
         setting, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"a setting must be SETTING=VALUE such as population_size=20, got {quoted(text)}")
-        if (name := setting.rpartition(".")[2]) in given:
+        if (name := setting.rpartition(".")[2]) in chosen:
             raise InputError(f"a setting must be given once, got {quoted(name)} twice")
-        given[name] = value
-    return parse(plugin, factory, given)
+        chosen[name] = value
+    return parse(plugin, factory, chosen)
 
 
 def settings_text(settings: Mapping[str, Any]) -> list[str]:

@@ -25,7 +25,7 @@ import numpy as np
 VIDEO = Path(__file__).parents[2] / "shared/data/video/sports2d_walk"
 POSEFIT = (sys.executable, "-m", "posefit")
 FRAMES = "8:16"  # of motions
-METHODS = ("sapso@pca", "pso@pca", "cma@pca", "annealed@pca", "particle@full", "random@pca", "vsmm", "sapso+vsmm")
+METHODS = ("sapso@pca", "pso@pca", "cma@pca", "annealed@pca", "particle@full", "random@pca", "vsmm")
 EXPORTS = ("*.amc", "*.asf", "*.bvh", "*.c3d", "*.glb", "*.mot", "*.osim", "*.trc", "angles.csv", "gait.csv")
 TIMES = ("version", "key", "seconds", "_ms", "ms_", "cpu", "wall")  # in the names of columns that are left out
 LABELS = ("kind", "name")  # columns of a row that no result depends on, and that were not there at first

@@ -206,11 +206,3 @@ def test_a_pose_is_compared_on_a_system_without_unix_locks_and_limits():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.stdout == "PoseProblem 0.0\n", done.stderr
-
-
-def test_a_motion_is_tracked_without_any_segmenter(tmp_path):
-    words = ["track", "walk", "--frames", "0:1", "--evaluations", "50", "--out", str(tmp_path / "out")]
-    script = f"import sys\nfrom posefit.cli import main\nsys.exit(main({words!r}))\n"
-    blocked = os.environ | {"POSEFIT_BLOCK_PLUGINS": "background,mediapipe"}
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, env=blocked)
-    assert done.returncode == 0, done.stderr

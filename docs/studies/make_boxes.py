@@ -13,11 +13,10 @@ from posefit.arrays import Array
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.symmetry import mirrored_poses
 from posefit.motion import built_in, recorded
-from posefit.suites.boxes import HELD_OUT_GROUP, SIZES, STEP, TRAINING_PEOPLE, is_upright
+from posefit.suites.boxes import CONSTANT, HELD_OUT_GROUP, SIZES, STEP, TRAINING_PEOPLE, is_upright
 
 BOX, ELLIPSOID = 0.99, 0.98  # quantiles of the poses learned: of each latent, and of the distance from the mean
 RANGE, MARGIN = 0.005, np.radians(5.0)  # of a joint angle: quantile left out at either end, and what is added then
-STILL = np.radians(10.0)  # to either side, of joint angles that are constant in the data
 
 
 def learned_from(poses: Array) -> dict[str, Array]:
@@ -39,8 +38,8 @@ def learned_from(poses: Array) -> dict[str, Array]:
         "reach": np.array(
             [np.sqrt(np.quantile(((latents[:, :m] / spread[:m]) ** 2).sum(axis=1), ELLIPSOID)) for m in SIZES]
         ),
-        "low": np.where(moved, low - MARGIN, mean - STILL),
-        "high": np.where(moved, high + MARGIN, mean + STILL),
+        "low": np.where(moved, low - MARGIN, mean - CONSTANT),
+        "high": np.where(moved, high + MARGIN, mean + CONSTANT),
     }
     rounded = {name: np.round(value / STEP).astype(np.int32) for name, value in values.items()}
     return {**rounded, "order": np.argsort(-angles.std(axis=0), kind="stable").astype(np.int32)}

@@ -19,7 +19,7 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
 from posefit_vsmm import joints
-from posefit_vsmm.joints import BODY, GATE, detect, rules
+from posefit_vsmm.joints import BODY, GATE, default_rules, detect
 from posefit_vsmm.measurement import head_radius
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import lines_of
@@ -36,7 +36,7 @@ CIRCULAR = 0.25  # legs: the deviation granted to points that are only carried a
 
 def detection_errors(rng: np.random.Generator) -> dict[str, list[Array]]:
     """Return the errors (2,) in legs of each point where it was detected."""
-    unbiased = rules()._replace(bias=np.zeros((len(POINTS), 2)))
+    unbiased = default_rules()._replace(bias=np.zeros((len(POINTS), 2)))
     errors_of: dict[str, list[Array]] = {name: [] for name in POINTS}
     for name, azimuth in product(MOTIONS, AZIMUTHS):
         motion = built_in.motion(name)

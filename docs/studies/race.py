@@ -18,15 +18,7 @@ from posefit.arrays import Array
 from posefit.cli.output import Command
 from posefit.fitting.cma import Strategy
 from posefit_envs import to_sb3_vec_env
-from posefit_envs.policies import (
-    Policy,
-    bandit_policy,
-    halving_policy,
-    linear_policy,
-    restarted_policy,
-    round_robin_policy,
-    uniform_policy,
-)
+from posefit_envs.policies import Policy, race_action, race_features
 from posefit_envs.race import COMMON_FEATURES, SEARCH_FEATURES, SEARCHES
 from posefit_reproduce.jobs import each
 from table import LEVEL, RESAMPLES, WORKERS, earlier, kept, markdown
@@ -54,6 +46,97 @@ class Turn(NamedTuple):
     agent: str
     seed: int
     instances: int
+
+
+def uniform_policy(env: gym.Env[Any, Any], rng: np.random.Generator) -> Policy:
+    """Return the policy that draws actions uniformly from an environment's box."""
+    shape = env.action_space.shape
+    return lambda _, __: rng.uniform(-1.0, 1.0, shape)
+
+
+def round_robin_policy() -> Policy:
+    """Return the policy whose searches take turns."""
+
+    def act(observation: Any, step: int) -> Array:
+        features, _ = race_features(observation)
+        searches: int = features.shape[-2]
+        return race_action(np.full(features.shape[:-2], step % searches), searches)
+
+    return act
+
+
+def restarted_policy(slope: float = 0.05) -> Policy:
+    """Return the policy that advances one search until it shows a slope below `slope`, and then another.
+
+    The next one is a search that never was advanced, or where there is none, one that begins.
+    """
+
+    def act(observation: Any, _: int) -> Array:
+        features = race_features(observation)[0]
+        open_ones = features[..., 1] >= slope
+        longest = np.where(open_ones, features[..., 3], -1.0).argmax(axis=-1)
+        searches = features.shape[-2]
+        return race_action(np.where(open_ones.any(axis=-1), longest, searches), searches)
+
+    return act
+
+
+def halving_policy() -> Policy:
+    """Return successive halving as a policy: after each of equal parts of the budget the worse half stops.
+
+    Those that are left take turns. K. Jamieson, A. Talwalkar, Non-stochastic best arm identification and
+    hyperparameter optimization, AISTATS 2016.
+    """
+
+    def act(observation: Any, _: int) -> Array:
+        features, common = race_features(observation)
+        searches = features.shape[-2]
+        parts = int(np.log2(searches)) + 1
+        done = np.minimum(np.floor(parts * (1.0 - common[..., 1]) + 1e-6), parts - 1)  # float32 shows the budget
+        ranks = features[..., 0].argsort(axis=-1, kind="stable").argsort(axis=-1)
+        left = ranks < searches // 2.0 ** done[..., None]
+        return race_action(np.where(left, features[..., 3], np.inf).argmin(axis=-1), searches)
+
+    return act
+
+
+def bandit_policy(curiosity: float = 0.4) -> Policy:
+    """Return UCB1 as a policy: the lowest best cost, less what a search may gain that had few generations.
+
+    That is `curiosity` times the root of ln(generations of all) / generations, in shown costs. It begins no search.
+    P. Auer, N. Cesa-Bianchi, P. Fischer, Finite-time analysis of the multiarmed bandit problem, Machine Learning 47,
+    2002, whose rewards are means and not bests.
+    """
+
+    def act(observation: Any, step: int) -> Array:
+        features, _ = race_features(observation)
+        searches, used = int(features.shape[-2]), np.asarray(features[..., 3])
+        total = step + searches
+        generations = used / used.sum(axis=-1, keepdims=True) * total
+        index = features[..., 0] - curiosity * np.sqrt(np.log(total) / generations)
+        return race_action(index.argmin(axis=-1), searches)
+
+    return act
+
+
+def linear_policy(weights: Any) -> Policy:
+    """Return the policy with the choice of the highest score, linear in what is shown of a search.
+
+    `weights` (..., 9), one policy or one for each row of observations: of four numbers, of these times the budget left,
+    and the score of another search. The numbers are the best cost above the best of all, slope, spread and use.
+    """
+    own = np.asarray(weights, dtype=np.float64)
+
+    def act(observation: Any, _: int) -> Array:
+        features, common = race_features(observation)
+        features[..., 0] -= common[..., :1]
+        shown = np.concatenate([features, features * common[..., 1, None, None]], axis=-1)
+        scores = (shown @ own[..., :-1, None])[..., 0]
+        another = np.broadcast_to(own[..., -1:], (*scores.shape[:-1], 1))
+        choice = np.concatenate([scores, another], axis=-1).argmax(axis=-1)
+        return race_action(choice, scores.shape[-1])
+
+    return act
 
 
 def final_costs(policy: Policy, env: Any, numbers: Sequence[int], seeds: Sequence[int]) -> tuple[Array, int]:

@@ -50,7 +50,8 @@ def rows(plan: Plan, workers: int | None, ledger: str | None) -> list[dict[str, 
         found = Ledger(folder)
         for one in found.quarantined():
             raise ValueError(f"{one['key']}: {one['reasons'][-1]}")
-        return [found.row(cell.key) for cell in plan]
+        rows = {row["key"]: row for row in found.rows()}
+        return [rows[cell.key] for cell in plan]
 
 
 def earlier(path: str | None, key: Callable[[Row], K]) -> dict[K, Row]:

@@ -7,12 +7,10 @@
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
 `FitImage-v0` is the pose in one silhouette, by few proposals; `Track-v0` follows a sequence; `Race-v0` says which of
-several searches goes on.
-Their docstrings are their manual. Importing this package registers them; the environments themselves are imported when
-they are made. `drive` runs an optimiser against an environment or a vector of them, `drive_each` one in every
-environment of a vector, `track_reference` returns what a tracker would commit in Track-v0, `to_sb3_vec_env` adapts a
-vector environment to Stable-Baselines3, and `check_vector_env` compares any vector environment with single ones.
-`posefit_envs.policies` has references to beat.
+several searches goes on. Their docstrings are their manual. Importing this package registers them; the environments
+themselves are imported when they are made. `drive` runs an optimiser against an environment or a vector of them,
+`drive_each` one in every environment of a vector, `track_reference` returns what a tracker would commit in Track-v0,
+and `to_sb3_vec_env` adapts a vector environment to Stable-Baselines3.
 
 | looking for | file |
 |---|---|
@@ -22,8 +20,8 @@ vector environment to Stable-Baselines3, and `check_vector_env` compares any vec
 | arguments and numbered instances (as in sweeps: `posefit.motion.instance`) | instance.py |
 | poses, costs and pictures in many scenes at once; compiled | stage.py, kernels.py |
 | rendering | rendering.py |
-| optimisers that search an environment; references as policies | driving.py, policies.py |
-| a checker of vector environments; Stable-Baselines3 | checker.py, sb3.py |
+| optimisers that search an environment; policies | driving.py, policies.py |
+| Stable-Baselines3 | sb3.py |
 """
 
 from importlib import import_module
@@ -32,14 +30,12 @@ from typing import TYPE_CHECKING, Any
 from gymnasium.envs.registration import register
 
 if TYPE_CHECKING:
-    from posefit_envs.checker import check_vector_env as check_vector_env
     from posefit_envs.driving import drive as drive
     from posefit_envs.driving import drive_each as drive_each
     from posefit_envs.driving import track_reference as track_reference
     from posefit_envs.sb3 import to_sb3_vec_env as to_sb3_vec_env
 
 _MODULES = {
-    "check_vector_env": "checker",
     "drive": "driving",
     "drive_each": "driving",
     "track_reference": "driving",
@@ -47,15 +43,11 @@ _MODULES = {
 }
 __all__ = list(_MODULES)
 
-for _id, _entry in (
-    ("FitImage", "fit:FitImage"),
-    ("Track", "track:Track"),
-    ("Race", "race:Race"),
-):
+for _id, _module in {"FitImage": "fit", "Track": "track", "Race": "race"}.items():
     register(
         id=f"posefit/{_id}-v0",
-        entry_point=f"posefit_envs.{_entry}Env",
-        vector_entry_point=f"posefit_envs.{_entry}VectorEnv",
+        entry_point=f"posefit_envs.{_module}:{_id}Env",
+        vector_entry_point=f"posefit_envs.{_module}:{_id}VectorEnv",
     )
 
 

@@ -23,7 +23,7 @@ from posefit.geometry.skeleton import ANGLES
 from posefit.reading import quoted, suggestion
 from posefit_envs.instance import ArgumentError, Episode, Instance, World, checked, instance_number, world_of
 from posefit_envs.rendering import MODES, Picture, check_mode
-from posefit_envs.stage import Rows, Stage
+from posefit_envs.stage import Rows, Stage, values_of
 
 Flags = NDArray[np.bool_]  # (n,)
 Infos = dict[str, Any]
@@ -49,36 +49,6 @@ class Outcome(NamedTuple):
     def infos_of(self, i: int) -> Infos:
         """Return the infos of environment i, as a single one has them."""
         return _infos_of(self.infos, i) | self.row_infos.get(i, {})
-
-
-class ActionValidator:
-    """Checks actions, and warns once when it clips one."""
-
-    def __init__(self, dimensions: int) -> None:
-        self._dimensions, self._warned = dimensions, False
-
-    def check(self, actions: object, shape: tuple[int, ...]) -> Array:
-        """Return actions of that shape in [-1, 1] as float64, which does not round them.
-
-        Raises gymnasium.error.InvalidAction where they have another shape, or are not finite numbers.
-        """
-        try:
-            values = np.array(exchanged("actions", actions)[0], dtype=np.float64)
-        except (TypeError, ValueError) as mistake:
-            raise error.InvalidAction(f"an action must be {self._dimensions} numbers, got {actions!r}") from mistake
-        if values.shape != shape:
-            raise error.InvalidAction(f"actions must have shape {shape}, got {values.shape}")
-        largest = np.abs(values).max(initial=0.0)
-        if not largest <= 1.0:
-            if not np.isfinite(largest):
-                raise error.InvalidAction("actions must be finite, got nan or infinity")
-            if not self._warned:
-                logger.warn(
-                    f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be"
-                )
-                self._warned = True
-            np.clip(values, -1.0, 1.0, out=values)
-        return values
 
 
 class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
@@ -122,7 +92,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._shape = self.action_space.shape or ()
-        self._validator = ActionValidator(self._shape[1])
+        self._warned = False  # that an action is clipped
         self._longest = np.inf if max_episode_steps is None else max_episode_steps
         self._generators: dict[int, tuple[np.random.Generator, int]] = {}  # with their seeds
         self._ended = np.zeros(num_envs, dtype=bool)
@@ -179,7 +149,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def step(self, actions: Any) -> tuple[Any, Array, Flags, Flags, Infos]:
         """Step each environment; one whose episode has ended resets instead, or at once by SAME_STEP."""
-        actions = self._validator.check(actions, self._shape)
+        actions = self._checked(actions, self._shape)
         self._check_reset()
         stepping = ~self._ended
         for i in np.flatnonzero(self._ended).tolist():
@@ -208,6 +178,25 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         rewards = np.where(stepping, outcome.rewards, 0.0)
         return observations, rewards, outcome.terminated, truncated, self._with_started(infos, ~going)
 
+    def _checked(self, actions: object, shape: tuple[int, ...]) -> Array:
+        """Return actions of that shape as float64, which does not round them; what is not in [-1, 1] is clipped.
+
+        Raises gymnasium.error.InvalidAction where they have another shape, or are not finite numbers.
+        """
+        try:
+            values = np.array(exchanged("actions", actions)[0], dtype=np.float64)
+        except (TypeError, ValueError) as mistake:
+            raise error.InvalidAction(f"an action must be {shape[-1]} numbers, got {actions!r}") from mistake
+        if values.shape != shape:
+            raise error.InvalidAction(f"actions must have shape {shape}, got {values.shape}")
+        largest = np.abs(values).max(initial=0.0)
+        if not np.isfinite(largest):
+            raise error.InvalidAction("actions must be finite, got nan or infinity")
+        if largest > 1.0 and not self._warned:
+            logger.warn(f"actions must lie in [-1, 1], got {largest:.6g} from 0; it is clipped, as all others will be")
+            self._warned = True
+        return np.clip(values, -1.0, 1.0, out=values) if largest > 1.0 else values
+
     def _begin(self, i: int, chosen: int | None) -> None:
         """Begin the next episode of environment i, with a chosen instance or another."""
         number = self.world.next_instance(self._generator(i)) if chosen is None else chosen
@@ -232,7 +221,7 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
 
     def _enter(self, i: int, episode: Episode) -> None:
         self._episodes[i] = episode
-        self._stage.set_problem(i, episode.problem)
+        self._stage.set_values(i, values_of(episode.problem))
         self._truths[i] = episode.instance.truth.poses[episode.frame]
 
     def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Array, **own: NDArray[Any]) -> Infos:
@@ -314,7 +303,7 @@ class SearchEnv(Env[Any, Any]):
             raise error.ResetNeeded(NOT_BEGUN)
         if vector._ended[0]:
             raise error.ResetNeeded(ENDED)
-        action = vector._validator.check(action, self._shape)
+        action = vector._checked(action, self._shape)
         vector._steps += 1
         outcome = vector._advance(action[None], _ONE, _FIRST)
         terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
@@ -337,7 +326,7 @@ def image_spaces(world: World) -> tuple[Box, Box]:
 
 
 def mixed(mask: Flags, chosen: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-    """Return observations (n, ...): those chosen where the mask (n,) is true, others elsewhere."""
+    """Return values (n, ...): those chosen where the mask (n,) is true, others elsewhere."""
     return np.where(mask.reshape(-1, *[1] * (chosen.ndim - 1)), chosen, others)
 
 
@@ -369,7 +358,7 @@ def _masked_infos(mask: Flags, values: Infos, others: Infos) -> Infos:
         if everywhere or other is value:
             infos[name] = value
         else:
-            infos[name] = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, other)
+            infos[name] = mixed(mask, value, other)
     return infos
 
 

@@ -27,11 +27,11 @@ class EnvObjective:
     An episode that ends begins again with the same instance. Raises gymnasium.error.Error for another environment.
     """
 
-    def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any], dtype: Any) -> None:
+    def __init__(self, env: VectorEnv[Any, Any, Any] | Env[Any, Any]) -> None:
         bare = env.unwrapped
         if not isinstance(bare, FitImageEnv | FitImageVectorEnv):
             raise error.Error(f"env must be posefit/FitImage-v0, got {type(bare).__name__}")
-        self._env, self._bare, self._dtype = env, bare, dtype
+        self._env, self._bare = env, bare
         self._vector = isinstance(env, VectorEnv)
         self._count = env.num_envs if isinstance(env, VectorEnv) else 1
         self._instances: Any = None
@@ -45,8 +45,7 @@ class EnvObjective:
 
     def step(self, proposals: Array) -> Array:
         """Return the costs (n,) of proposals (n, d), one in each environment."""
-        actions = proposals.astype(self._dtype)
-        _, _, terminated, truncated, infos = self._env.step(actions if self._vector else actions[0])
+        _, _, terminated, truncated, infos = self._env.step(proposals if self._vector else proposals[0])
         costs, done = np.array(infos["cost"]), np.logical_or(terminated, truncated)
         if done.any():
             mask = {"reset_mask": done} if self._vector else {}
@@ -67,19 +66,17 @@ def drive(
     seed: int = 0,
     instance: int | None = None,
     evaluations: int = 2440,
-    dtype: Any = np.float64,
     **settings: Any,
 ) -> Minimum:
     """Return the minimum of an optimiser that steps `posefit/FitImage-v0`, a single one or a vector.
 
     A population of any size is proposed in as many steps as it takes; the last of them is filled up with its last
     proposal, which does not count. An episode that ends begins again with the same instance: only `evaluations` end the
-    search. Actions are float64, so the result is the library's, bit for bit. With `dtype` numpy.float32, that of the
-    action space, a proposal is rounded to 7 digits; a pixel at a silhouette's edge may then change, and with it the
-    rest of the search. Raises gymnasium.error.Error for another environment, where the budget does not hold one
-    population, and where the environments have several instances: `drive_each` is for those.
+    search. Actions are float64, so the result is the library's, bit for bit. Raises gymnasium.error.Error for another
+    environment, where the budget does not hold one population, and where the environments have several instances:
+    `drive_each` is for those.
     """
-    objective = EnvObjective(env, dtype)
+    objective = EnvObjective(env)
     (space, *_), numbers = objective.begin(seed, instance)
     if len(set(numbers)) > 1:
         raise error.Error(f"instance must be the same in all environments, got {quoted(numbers)}: use drive_each")
@@ -98,7 +95,6 @@ def drive_each(
     seed: int = 0,
     instances: Sequence[int] | None = None,
     evaluations: int = 2440,
-    dtype: Any = np.float64,
     **settings: Any,
 ) -> list[Minimum]:
     """Return the minimum of a search of its own in each environment of a vector of `FitImage-v0`.
@@ -107,7 +103,7 @@ def drive_each(
     `seed` + 1 and so on. `instances` names an instance for each environment; by default each has a random one. Raises
     gymnasium.error.Error as `drive` does.
     """
-    objective = EnvObjective(env, dtype)
+    objective = EnvObjective(env)
     searches = [
         _stepwise(_optimiser(space, optimiser, seed + i, evaluations, settings), evaluations)
         for i, space in enumerate(objective.begin(seed, instances)[0])

@@ -18,9 +18,8 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
 
     Stable-Baselines3 resets an environment in the step that ends its episode, with the last observation in
     `info["terminal_observation"]`. So `vector` must be able to reset some of its environments, by
-    `options={"reset_mask": ...}`, as those of this package are. Environments of a vector share their attributes and
-    methods: one that holds or returns a list or tuple with an entry for each gives `indices` theirs, and only all
-    environments together can be set or called. Raises gymnasium.error.DependencyNotInstalled without
+    `options={"reset_mask": ...}`, as those of this package are. Its environments share their attributes and methods, so
+    that only all of them together can be set or called. Raises gymnasium.error.DependencyNotInstalled without
     Stable-Baselines3.
     """
     try:
@@ -67,7 +66,7 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
             vector.close()
 
         def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-            return self._entries(getattr(vector, attr_name), self._get_indices(indices))
+            return [getattr(vector, attr_name)] * len(list(self._get_indices(indices)))
 
         def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
             self._check_all(indices)
@@ -75,17 +74,13 @@ def to_sb3_vec_env(vector: VectorEnv[Any, Any, Any]) -> "VecEnv":
 
         def env_method(self, method_name: str, *arguments: Any, indices: Any = None, **named: Any) -> list[Any]:
             self._check_all(indices)
-            return self._entries(getattr(vector, method_name)(*arguments, **named), self._get_indices(indices))
+            return [getattr(vector, method_name)(*arguments, **named)] * self.num_envs
 
         def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
             return [False] * len(list(self._get_indices(indices)))
 
         def get_images(self) -> Sequence[Any]:
             return list(vector.render() or [None] * self.num_envs)
-
-        def _entries(self, value: Any, indices: Any) -> list[Any]:
-            each = isinstance(value, list | tuple) and len(value) == self.num_envs
-            return [value[i] if each else value for i in indices]
 
         def _check_all(self, indices: Any) -> None:
             chosen = sorted(set(self._get_indices(indices)))

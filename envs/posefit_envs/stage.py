@@ -1,6 +1,5 @@
 """Poses, costs and pictures of proposals: each in a scene of its own, all scenes in one compiled call."""
 
-from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, final
@@ -8,7 +7,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit import PoseProblem, Silhouette
+from posefit import PoseProblem
 from posefit.arrays import Array
 from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.silhouette.cost import mean_over_views, mismatch
@@ -22,7 +21,6 @@ Rows = NDArray[np.int64]
 _BODY = np.uint16(BODY)
 CAMERA_VALUES = ("rotation", "translation", "focal", "centre")
 LARGEST_REMEMBERED = 2 * 64 * 64  # pixels of an instance whose values are remembered, in about 5 kB
-_READ_ONLY = ("radii", "rotations", "places", "focals", "centres")
 
 
 class Evaluation(NamedTuple):
@@ -35,18 +33,15 @@ class Evaluation(NamedTuple):
     pictures: Image  # (n, height, width, 2 views)
 
 
-def box_of(problem: PoseProblem) -> tuple[Array, Array, Array]:
-    """Return the box of a problem's proposals, as a stage stores it: centre (d,), half (d,) and anchor (3,)."""
-    return problem.space.centre, problem.space.half, problem.space.anchor
-
-
 def values_of(problem: PoseProblem) -> tuple[NDArray[Any], ...]:
     """Return everything of a problem that a stage stores: its masks as bits, its box, and the rest in order."""
-    cameras, silhouettes, body = problem.cameras, problem.silhouettes, problem.body
+    cameras, silhouettes, body, space = problem.cameras, problem.silhouettes, problem.body, problem.space
     masks = np.stack([silhouette.mask for silhouette in silhouettes], axis=-1)
     return (
         np.packbits(masks, axis=1),
-        *box_of(problem),
+        space.centre,
+        space.half,
+        space.anchor,
         body.skeleton.chain.offsets,
         body.radii,
         *(np.array([getattr(camera, name) for camera in cameras]) for name in CAMERA_VALUES),
@@ -83,7 +78,6 @@ class Stage:
         self._width, self._height, self.threads = width, height, threads
         self._prior, self._aligned = world.learned, world.translation == "aligned"
         self._chain = body_of(world.motion[0]).skeleton.chain
-        self._silhouettes: list[Sequence[Silhouette]] = [()] * rows
         self._scenes = Scenes(
             np.empty((rows, bones, 3)),
             np.empty((rows, bones, 2)),
@@ -96,33 +90,22 @@ class Stage:
             np.empty((rows, views), dtype=np.int64),
             np.empty((rows, height, width, views), dtype=np.uint16),
         )
-        self._frozen: Scenes | None = None
         self._joint_radii, self._borders = np.empty((rows, len(JOINTS))), np.empty((rows, views, 4))
         self._first = 6 if world.translation == "searched" else 3
         d = self._first + len(self._prior.low)
         self._centres, self._halves, self._anchors = np.empty((rows, d)), np.empty((rows, d)), np.empty((rows, 3))
-        self._boxes = self._centres, self._halves, self._anchors
-        self._columns = *self._boxes, *self._scenes[:-1], self._joint_radii, self._borders
+        boxes = self._centres, self._halves, self._anchors
+        self._columns = *boxes, *self._scenes[:-1], self._joint_radii, self._borders
         self.all_rows: Rows = np.arange(rows)
 
-    def set_problem(self, row: int, problem: PoseProblem) -> None:
-        """Make a row this problem, one of the world's."""
-        if self._silhouettes[row] is problem.silhouettes:
-            for array, value in zip(self._boxes, box_of(problem), strict=True):
-                array[row] = value
-        else:
-            self.set_values(row, values_of(problem))
-            self._silhouettes[row] = problem.silhouettes
-
     def set_values(self, row: int, values: tuple[NDArray[Any], ...]) -> None:
-        """Make a row the problem that these are the values of."""
+        """Make a row the problem, one of the world's, that these are the values of."""
         masks, *others = values
         backdrop = self._scenes.backdrops[row]
         backdrop[:] = np.unpackbits(masks, axis=1, count=self._width)
         backdrop *= OBSERVED
         for array, value in zip(self._columns, others, strict=True):
             array[row] = value
-        self._silhouettes[row] = ()
 
     def pictures(self) -> Image:
         """Return the pictures (n, height, width, 2 views) before the first proposals."""
@@ -150,8 +133,7 @@ class Stage:
         """Return the poses (n, k, 66) and translations (n, k, 3) of proposals (n, k, d), those of some rows aligned."""
         poses, translations = self._unpacked(proposals)
         if self._aligned:
-            scenes = self._read_only()
-            align_scenes(self._chain, scenes, self._joint_radii, self._borders, rows, poses, translations)
+            align_scenes(self._chain, self._scenes, self._joint_radii, self._borders, rows, poses, translations)
         return poses, translations
 
     def poses(self, proposals: Array) -> Array:
@@ -175,7 +157,7 @@ class Stage:
         views = self._scenes.places.shape[1]
         count_poses(len(rows) * k * views)
         areas = np.zeros((views, n, k, 3), dtype=np.int64)
-        at = self._chain, self._read_only()
+        at = self._chain, self._scenes
         values = poses, translations, areas, _BODY, pictures
         shares = max(min(self.threads, len(rows), len(rows) * k // LEAST_SHARE), 1)
         if shares == 1:
@@ -186,15 +168,3 @@ class Stage:
             work_through(parts, self.threads, lambda _: (), lambda part: draw_scenes(*at, rows[part], *values))
         costs = mean_over_views([mismatch(view) for view in areas.reshape(views, n * k, 3)])  # every pixel is known
         return costs.reshape(n, k), areas
-
-    def _read_only(self) -> Scenes:
-        """Return the scenes as the inner loops are compiled for elsewhere; for writeable arrays they would be again."""
-        if self._frozen is None:
-            frozen = {name: getattr(self._scenes, name).view() for name in _READ_ONLY}
-            for array in frozen.values():
-                array.flags.writeable = False
-            self._frozen = self._scenes._replace(**frozen)
-        return self._frozen
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_frozen": None}  # views of a copy would not be views of its scenes

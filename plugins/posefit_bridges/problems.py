@@ -1,9 +1,5 @@
 """Problems of posefit's suites as those of other tools, where benchmarks are run.
 
-Each function imports its tool, which `pip install posefit[NAME]` brings along. What is not feasible costs what the
-problem's `infeasible` says, by default what its repair costs. Each has `problem`, the suite's, with the trace; the
-budget is the tool's, since that of a problem ends the tool's loop by an error.
-
 | tool | function | what it returns |
 |---|---|---|
 | IOHexperimenter | ioh_problem | a problem for its loggers |
@@ -11,30 +7,25 @@ budget is the tool's, since that of a problem ends the tool's loop by an error.
 | pymoo | pymoo_problem | a problem, evaluated a population at a time |
 | Nevergrad | nevergrad_function | a function of its benchmarks |
 
+What is not feasible costs what the problem's `infeasible` says. Each has `problem`, the suite's, with the trace; the
+budget is the tool's, since that of a problem ends the tool's loop by an error.
+
 >>> import posefit
 >>> from posefit_bridges.problems import pymoo_problem
 >>> pymoo_problem(posefit.suite("posefit-2026.3", function=1, instance=10_000, dimension=9)).n_var
 9
 """
 
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from posefit.arrays import Array
 from posefit.suites.functions import SUITE
 from posefit.suites.problem import Infeasible, Problem, suite
 
-if TYPE_CHECKING:
-    from ioh import problem as problems
-    from nevergrad.functions import ExperimentFunction
-    from optunahub.benchmarks import BaseProblem
-    from pymoo.core.problem import Problem as PymooProblem
-
 FIRST_IOH_ID = 26_300  # function 1 of posefit-2026.3 is 26301: none of IOHexperimenter's own has such a number
 
 
-def ioh_problem(problem: Problem) -> "problems.RealSingleObjective":
+def ioh_problem(problem: Problem) -> Any:
     """Return a problem of IOHexperimenter with the number, instance, bounds and, where known, the optimum.
 
     Its count is the problem's, whose budget holds here too, and its `reset` resets both. J. de Nobel et al.,
@@ -44,8 +35,8 @@ def ioh_problem(problem: Problem) -> "problems.RealSingleObjective":
     from ioh.iohcpp import RealBounds, RealSolution
 
     d, name = problem.dimension, f"{problem.suite}_{problem.function.name.replace(' ', '_')}"
-    unknown = problem.optimum is None
-    optimum = RealSolution([], np.nan) if unknown else RealSolution(problem.made.truth, problem.truth_cost)
+    known = problem.optimum is not None
+    optimum = RealSolution(problem.made.truth, problem.truth_cost) if known else RealSolution([], float("nan"))
 
     class IOHProblem(problems.RealSingleObjective):
         def __init__(self) -> None:
@@ -63,41 +54,34 @@ def ioh_problem(problem: Problem) -> "problems.RealSingleObjective":
     return IOHProblem()
 
 
-def optunahub_problem(problem: Problem) -> "BaseProblem":
+def optunahub_problem(problem: Problem) -> Any:
     """Return a problem of OptunaHub whose parameters x0, x1, ... are floats of [-1, 1], to be minimised.
 
     A trial that is not feasible is no failure. Y. Ozaki et al., OptunaHub: a platform for black-box optimization, 2025,
     arXiv 2510.02798.
     """
-    from optuna.distributions import BaseDistribution, FloatDistribution
+    from optuna.distributions import FloatDistribution
     from optuna.study import StudyDirection
     from optunahub.benchmarks import BaseProblem
 
-    names = [f"x{k}" for k in range(problem.dimension)]
+    box: Any = {f"x{k}": FloatDistribution(-1.0, 1.0) for k in range(problem.dimension)}
 
     class OptunaHubProblem(BaseProblem):
+        search_space, directions = box, [StudyDirection.MINIMIZE]
+
         def __init__(self) -> None:
             self.problem = problem
 
-        @property
-        def search_space(self) -> dict[str, BaseDistribution]:
-            return {name: FloatDistribution(-1.0, 1.0) for name in names}
-
-        @property
-        def directions(self) -> list[StudyDirection]:
-            return [StudyDirection.MINIMIZE]
-
         def evaluate(self, params: dict[str, Any]) -> float:
-            return float(problem([params[name] for name in names]))
+            return float(problem([params[name] for name in box]))
 
     return OptunaHubProblem()
 
 
-def pymoo_problem(problem: Problem) -> "PymooProblem":
+def pymoo_problem(problem: Problem) -> Any:
     """Return a problem of pymoo with one objective, no constraint and the bounds -1 and 1.
 
-    Its Pareto front is the optimum, where that is known. J. Blank, K. Deb, pymoo: multi-objective optimization in
-    Python, IEEE Access 8, 2020.
+    Its Pareto front is the optimum, where that is known.
     """
     from pymoo.core.problem import Problem as PymooProblem
 
@@ -117,19 +101,18 @@ def pymoo_problem(problem: Problem) -> "PymooProblem":
 
 def nevergrad_function(
     function: int = 1, instance: int = 0, dimension: int = 9, infeasible: Infeasible = "repair"
-) -> "ExperimentFunction":
+) -> Any:
     """Return a problem of the suite, by its numbers, as a function of Nevergrad: each copy of it counts for itself.
 
-    An experiment evaluates what the optimiser recommends once more at its end. J. Rapin, O. Teytaud, Nevergrad, a
-    gradient-free optimization platform, 2018.
+    An experiment evaluates what the optimiser recommends once more at its end.
     """
-    import nevergrad
+    import nevergrad as ng
     from nevergrad.functions import ExperimentFunction
 
     class SilhouetteFunction(ExperimentFunction):
         def __init__(self, function: int, instance: int, dimension: int, infeasible: Infeasible) -> None:
             self.problem = suite(SUITE, function, instance, dimension, infeasible=infeasible)
-            box = nevergrad.p.Array(init=self.problem.initial_solution, lower=-1.0, upper=1.0)
+            box = ng.p.Array(init=self.problem.initial_solution, lower=-1.0, upper=1.0)
             super().__init__(self.problem, box.set_name(""))
 
     return SilhouetteFunction(function, instance, dimension, infeasible)

@@ -1,4 +1,4 @@
-"""A variable-structure multiple-model tracker, CN101894278 (2010): `vsmm`; and `sapso+vsmm`, a swarm led by it.
+"""A variable-structure multiple-model tracker, CN101894278 (2010): `vsmm`.
 
 It follows a person in milliseconds a frame, by joints that rules find in the silhouette, as long as one of its motion
 models knows what the person does: walking, arms held out, jumping jacks, jumps, squats. Its steps, by number:
@@ -10,7 +10,7 @@ models knows what the person does: walking, arms held out, jumping jacks, jumps,
 - 6: `measurement`, what cameras measure of a state (6.1), and `imm`, the filter.
 - 7 to 9: `switching`, when a group comes into force and when it ends.
 
-`tracker` is `vsmm`, from its settings to a frame; `search` is that of `sapso+vsmm`, in every frame.
+`tracker` is `vsmm`, from its settings to a frame.
 
 >>> import posefit
 >>> track = posefit.track("jacks", method="vsmm", frames=(0, 3), translation="aligned", view_degrees=0.0)
@@ -24,8 +24,7 @@ from posefit.hooks import RegisterTracker
 
 @hookimpl
 def posefit_register_trackers(register: RegisterTracker) -> None:
-    """Offer `vsmm` and `sapso+vsmm`."""
-    from posefit_vsmm.tracker import VSMM, swarm_led_by_models
+    """Offer `vsmm`."""
+    from posefit_vsmm.tracker import VSMM
 
     register("vsmm", VSMM)
-    register("sapso+vsmm", swarm_led_by_models)

@@ -68,7 +68,6 @@ class Measurement(NamedTuple):
     residuals: Array  # (r, m) measured minus expected
     jacobians: Array  # (r, m, e) of what is expected, by the error of the state
     covariance: Array  # (m, m) of the noise
-    log_likelihoods: Array | float = 0.0  # (r,) of the states themselves, by what cannot be written as a residual
 
 
 Measure = Callable[[Array], Measurement]
@@ -120,10 +119,10 @@ class IMM:
 
     def updated(self, belief: Belief, measure: Measure) -> Belief:
         """Return the belief after each model's state is measured, with the probabilities of before."""
-        residuals, jacobians, noise, log_likelihoods = measure(belief.states)
+        residuals, jacobians, noise = measure(belief.states)
         count, size = residuals.shape
         if not size:
-            return replace(belief, log_likelihoods=np.zeros(count) + log_likelihoods)
+            return replace(belief, log_likelihoods=np.zeros(count))
         across = jacobians @ belief.covariances
         innovations = across @ jacobians.swapaxes(1, 2) + noise  # VSMM 6.3b
         solved = np.linalg.solve(innovations, np.concatenate([across, residuals[..., None]], axis=2))
@@ -135,7 +134,7 @@ class IMM:
         after = rest @ belief.covariances @ rest.swapaxes(1, 2) + gains @ noise @ gains.swapaxes(1, 2)  # Joseph's form
         after = 0.5 * (after + after.swapaxes(1, 2))
         states = self.manifold.plus(belief.states, (gains @ residuals[..., None])[..., 0])
-        return Belief(states, after, belief.log_probabilities, likelihoods + log_likelihoods)
+        return Belief(states, after, belief.log_probabilities, likelihoods)
 
     def fused(self, belief: Belief) -> tuple[Array, Array]:
         """Return the one state and covariance that stand for all models."""

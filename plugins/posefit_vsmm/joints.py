@@ -41,17 +41,18 @@ class Rules(NamedTuple):
 
 
 @cache
-def rules(patent: bool = False) -> Rules:
-    """Return the rules by default or to the patent's letter, with the errors that make_joint_errors.py measured.
-
-    The patent's are unbiased, those of the torso are the root's, and neither gate nor confidence counts.
-    """
+def default_rules() -> Rules:
+    """Return the default rules, with the errors that make_joint_errors.py measured."""
     stored = json.loads((files("posefit_vsmm") / "joints.json").read_text(encoding="utf-8"))
     bias, deviation = (np.array([stored["points"][name][key] for name in POINTS]) for key in ("bias", "deviation"))
-    if not patent:
-        return Rules(bias, deviation, optimal_pairs, nearest_crossings, GATE, 16.0, 0.05)
+    return Rules(bias, deviation, optimal_pairs, nearest_crossings, GATE, 16.0, 0.05)
+
+
+def patent_rules() -> Rules:
+    """Return those to the patent's letter: unbiased, the torso as the root, and neither gate nor confidence counts."""
+    bias, deviation = np.zeros((len(POINTS), 2)), default_rules().deviation.copy()
     deviation[_TORSO] = deviation[AT["root"]]
-    return Rules(np.zeros_like(bias), deviation, nearest_pairs, two_crossings, NO_GATE, np.inf, 1.0)
+    return Rules(bias, deviation, nearest_pairs, two_crossings, NO_GATE, np.inf, 1.0)
 
 
 def detect(

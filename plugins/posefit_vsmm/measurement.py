@@ -15,7 +15,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES
 from posefit_vsmm.imm import Measurement
-from posefit_vsmm.joints import Rules, detect, rules
+from posefit_vsmm.joints import Rules, default_rules, detect
 from posefit_vsmm.motion import leg_of
 from posefit_vsmm.preprocess import Lines
 from posefit_vsmm.state import ENDS, ERROR, DependentJoints, decode, differentiate
@@ -69,7 +69,7 @@ class JointCameras:
     body: Body
     cameras: Sequence[Camera]
     dependent: DependentJoints
-    rules: Rules = field(default_factory=rules)
+    rules: Rules = field(default_factory=default_rules)
     joint_noise: float = 1.0
 
     def project(self, camera: Camera, states: Array) -> tuple[Array, Array]:

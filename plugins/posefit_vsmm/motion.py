@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -137,14 +137,14 @@ class Library(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def library(literal: bool = False) -> Library:
+def library(shrunk_to: Literal["identity", "zero"] = "identity") -> Library:
     """Return the models of the package's file, which docs/studies/make_models.py wrote.
 
-    Literal ones are shrunk towards zero, as in the patent; else towards the identity. Interpretation V5.
+    The patent's are those that were shrunk to zero. Interpretation V5.
     """
     stored = json.loads((files("posefit_vsmm") / "models.json").read_text("utf-8"))
     models: dict[str, Any] = stored["models"]
-    fits = [model["zero" if literal else "identity"] for model in models.values()]
+    fits = [model[shrunk_to] for model in models.values()]
     matrices, offsets, noises = (np.array([fit[key] for fit in fits]) for key in ("matrix", "offset", "noise"))
     poses, captured = (np.array([model[key] for model in models.values()]) for key in ("poses", "captured"))
     turns = captured.reshape(*captured.shape[:2], TURNS, 4)

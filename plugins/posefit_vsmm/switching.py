@@ -210,10 +210,6 @@ class Switching:
         extra = self.form.covariances(unit(belief.states), np.diag(variances))
         return replace(belief, covariances=belief.covariances + extra)
 
-    def updated(self, belief: Belief, measure: Measure) -> Belief:
-        """Return the belief after one more measurement of the same frame; the models' probabilities stay."""
-        return self.imm.updated(belief, self.form.measure(measure))
-
     def cycle(self, before: Belief, measure: Measure, points: Array) -> Belief:
         """Return the belief one frame later. Groups come and go by the joints (17, 2) detected in the frame."""
         self._points, measure = [*self._points, points][-3:], self.form.measure(measure)

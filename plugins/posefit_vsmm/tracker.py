@@ -1,27 +1,26 @@
 """The variable-structure multiple-model tracker: its settings, a first pose from one frame, and each frame."""
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Literal, final
+from typing import Any, Literal, NamedTuple, final
 
 import numpy as np
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
 from posefit.fitting.check import choices, positive
+from posefit.fitting.problem import align
 from posefit.fitting.tracker import Frame, Observation, Task
-from posefit.registry import registry
 from posefit.silhouette.cost import known_views, pose_costs
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import JointFilter, rules
+from posefit_vsmm.joints import JointFilter, Rules, default_rules, patent_rules
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import CLIP_FPS, STIFF, library
 from posefit_vsmm.preprocess import Lines, lines_of
-from posefit_vsmm.search import Search, aligned_costs
 from posefit_vsmm.state import AT, BONES, ERROR, FIRST_BONE, decode, encode, free_errors, minus, plus
-from posefit_vsmm.switching import DefaultForm, PatentForm, Structure, Switching
+from posefit_vsmm.switching import DefaultForm, Form, PatentForm, Structure, Switching
 
 # The first pose: typical poses at several yaws, then draws around the best so far
 YAWS_NEAR = np.radians([-30.0, -15.0, 0.0, 15.0, 30.0])  # where the yaw is about known
@@ -41,22 +40,36 @@ MISSING_DEVIATION = np.radians(15.0)  # that each of its joints then gains a fra
 _LIMBS = {"hand": ("humerus", "radius"), "foot": ("femur", "tibia")}  # bones whose turns a limb's end depends on
 
 
+class Variant(NamedTuple):
+    """What a variant is made of: the letter of the patent, or what tracks better."""
+
+    form: Form  # Interpretations V4 and V11
+    rules: Callable[[], Rules]  # Interpretations V8 and V15
+    shrunk_to: Literal["identity", "zero"]  # Interpretation V5
+    fps: float | None  # of a step of the models; None is the task's. Interpretation V6
+    imputes: bool  # whether a hidden joint counts as measured where its own filter has it. Interpretation V9
+    recovers: bool  # Interpretation V14
+
+
+VARIANTS = {
+    "default": Variant(DefaultForm(), default_rules, "identity", None, imputes=False, recovers=True),
+    "patent": Variant(PatentForm(), patent_rules, "zero", CLIP_FPS, imputes=True, recovers=False),
+}
+
+
 @final
 class TrackFilter:
-    """One track, as far as it has come; with a `search`, every frame ends in one."""
+    """One track, as far as it has come."""
 
     def __init__(self, tracker: "VSMM", rng: np.random.Generator) -> None:
-        task, library = tracker.task, tracker.library
-        self._task, self._search, self._rng = task, tracker.search, rng
-        patent = tracker.variant == "patent"
-        fps = CLIP_FPS if patent else task.fps  # Interpretation V6
-        models = library.models.fitted_to(task.body.skeleton, fps, tracker.process_noise)
-        form = PatentForm() if patent else DefaultForm()
-        self.switching = Switching(models, tracker.topology, form, tracker.structure)
+        task, library, variant = tracker.task, tracker.library, VARIANTS[tracker.variant]
+        self._task, self._rng = task, rng
+        models = library.models.fitted_to(task.body.skeleton, variant.fps or task.fps, tracker.process_noise)
+        self.switching = Switching(models, tracker.topology, variant.form, tracker.structure)
         self._dependent, self._free = library.dependent, free_errors(task.body.skeleton)
-        self._cameras = JointCameras(task.body, task.cameras, self._dependent, rules(patent), tracker.joint_noise)
-        self._imputes = patent  # Interpretation V9
-        self._recovers = not patent if tracker.recovery is None else tracker.recovery  # Interpretation V14
+        self._cameras = JointCameras(task.body, task.cameras, self._dependent, variant.rules(), tracker.joint_noise)
+        self._imputes = variant.imputes
+        self._recovers = variant.recovers if tracker.recovery is None else tracker.recovery
         self._latest: Frame | None = task.before[-1] if task.before else None
         self._joint_filters: list[JointFilter] = []
         self._belief: Belief | None = None
@@ -78,28 +91,16 @@ class TrackFilter:
             return self._frame(pose, place, observation, {})
         belief, measured, details = self._detected(self._belief or self._start(observation), views, observation)
         details["detection_seconds"] = time.perf_counter() - start
-        search = None if blind else self._search
 
         def measure(states: Array) -> Measurement:
-            measurement = self._cameras.measure(states, measured, observation.translation)
-            if search is None:
-                return measurement
-            self._evaluations += len(states)
-            return measurement._replace(log_likelihoods=search.log_likelihoods(states, observation))
+            return self._cameras.measure(states, measured, observation.translation)
 
         start = time.perf_counter()
         self._belief = belief = self.switching.cycle(belief, measure, details["joints"][0])
-        state, spread = self.switching.fused(belief)
+        state, _ = self.switching.fused(belief)
         details["filter_seconds"] = time.perf_counter() - start
         (pose,), (place,) = decode(state[None], self._dependent)
         self._evaluations += 1  # that of the frame's own cost
-        if search is not None:
-            budget = self._task.evaluations - self._evaluations
-            result = search.best(state, spread, observation, budget, self._rng)
-            if result is not None:
-                pose, self._evaluations = result.pose, self._evaluations + result.evaluations
-                self._belief = self.switching.updated(belief, result.measure)
-                place = self.switching.fused(self._belief)[0][:3]  # one frame alone hardly shows the depth
         return self._frame(pose, place, observation, details)
 
     def _detected(
@@ -125,27 +126,27 @@ class TrackFilter:
 
         Typical poses of the models are tried at several yaws, and then draws around the best so far.
         """
-        task, latest, dependent = self._task, self._latest, self._dependent
+        task, latest = self._task, self._latest
         yaw, anchor, known_pose = task.yaw, np.asarray(task.anchor), None
         if latest is not None:
             yaw, anchor, known_pose = float(latest.pose[0]), latest.translation, latest.pose
         elif task.first_pose is not None:
             known_pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], task.first_pose])
-        budget = task.evaluations - 1 if self._search is None else task.evaluations // 2
+        budget = task.evaluations - 1
         yaws = YAWS_ALL_AROUND if yaw is None else yaw + YAWS_NEAR
         states = self.switching.models.typical_states(yaws, anchor)
         count = max(1, min(len(states), int(TYPICAL_SHARE * budget)) - (known_pose is not None))
         states = states[np.linspace(0, len(states) - 1, count).astype(np.int64)]
         if known_pose is not None:
             states = np.concatenate([encode(known_pose[None], anchor[None]), states])
-        costs, states = aligned_costs(task, observation, dependent, states)
+        costs, states = self._aligned_costs(observation, states)
         best, best_cost = states[costs.argmin()], float(costs.min())
         typical, evaluations = best, len(states)
         for k in range((budget - evaluations) // DRAWS):
             deviation = DRAW_DEVIATIONS[min(k, len(DRAW_DEVIATIONS) - 1)]
             errors = self._free * self._rng.normal(0.0, deviation, (DRAWS, ERROR))
             errors[:, :3] = 0.0
-            costs, states = aligned_costs(task, observation, dependent, plus(best, errors))
+            costs, states = self._aligned_costs(observation, plus(best, errors))
             costs += ((minus(states, typical)[:, 3:] / TYPICAL_DEVIATION) ** 2).sum(axis=1)
             if costs.min() < best_cost:
                 best, best_cost = states[costs.argmin()], float(costs.min())
@@ -155,6 +156,14 @@ class TrackFilter:
         self._bad_frames, self._missing = 0, dict.fromkeys(("left hand", "right hand", "left foot", "right foot"), 0)
         self._evaluations = evaluations
         return self.switching.start(best, np.diag(deviations**2))
+
+    def _aligned_costs(self, observation: Observation, states: Array) -> tuple[Array, Array]:
+        """Return the costs (n,) of states (n, 43) in an observation, and the states, moved to where they fit it."""
+        task, known = self._task, observation.translation
+        poses, places = decode(states, self._dependent)
+        scene = task.body, task.cameras, observation.silhouettes
+        places = align(*scene, poses, places) if known is None else np.tile(known, (len(states), 1))
+        return pose_costs(*scene, poses, places, threads=task.threads)[0], np.column_stack([places, states[:, 3:]])
 
     def _missing_variances(self, measured: Sequence[JointMeasurement]) -> Array:
         """Return the variances (33,) to add for limbs whose ends are not detected while an end point is unassigned."""
@@ -195,7 +204,7 @@ class VSMM:
     """Variable-structure multiple-model filter on detected joints (CN101894278, 2010).
 
     `vsmm:patent` sets every interpretation to the patent's letter; the default differs from it where tracks are
-    better. The other settings count in both. With a `search`, every frame ends in one.
+    better. The other settings count in both.
 
     Settings:
         variant: "default", or the "patent"'s letter. Interpretations V4 to V6, V8, V9, V11, V14 and V15.
@@ -208,7 +217,6 @@ class VSMM:
     """
 
     task: Task
-    search: Search | None = None
     _: KW_ONLY
     variant: Literal["default", "patent"] = "default"
     structure: Structure = "variable"
@@ -221,7 +229,7 @@ class VSMM:
         choices(VSMM, vars(self))
         positive("process_noise", self.process_noise)
         positive("joint_noise", self.joint_noise)
-        self.library = library(self.variant == "patent")
+        self.library = library(VARIANTS[self.variant].shrunk_to)
         self.topology = read_topology(self.groups, self.library.models.names)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -229,14 +237,3 @@ class VSMM:
         track_filter = TrackFilter(self, rng)
         for observation in observations:
             yield track_filter.frame(observation)
-
-
-def swarm_led_by_models(task: Task, *, optimiser: str = "sapso", weight: float = 0.25) -> VSMM:
-    """The motion models of `vsmm` predict where a swarm starts, and learn from what it finds.
-
-    Settings:
-        optimiser: name of any registered one, with its own defaults.
-        weight: of a prediction's silhouette cost, 0 to 100, in its model's log-likelihood; above 0. Ours.
-    """
-    positive("weight", weight)
-    return VSMM(task, Search(task, library().dependent, registry().optimiser(optimiser), weight))

@@ -4,6 +4,7 @@ The commands stand in `tracking`, `sweeping`, `motions`, `suite` and `plugins`; 
 `posefit.hooks`. What each does is imported when it runs.
 """
 
+import errno
 import os
 import sys
 import threading
@@ -14,8 +15,7 @@ import click
 from posefit.cli import plugins, suite, sweeping, tracking
 from posefit.cli.group import Group
 from posefit.cli.motions import motions
-from posefit.cli.output import MISTAKE, Command, open_streams, say
-from posefit.errors import InputError
+from posefit.cli.output import MISTAKE, Command, drop, open_streams, say
 from posefit.reading import cut
 from posefit.silhouette.sharing import POOL
 from posefit.version import __version__
@@ -63,7 +63,7 @@ def main(debug: bool) -> None:
     \b
     posefit track walk --out walk           a first track: open walk/track.html
     posefit track video.mp4 --out walker    a person before a still background
-    posefit sweep default --out results     compare nine methods
+    posefit sweep default --out results     compare eight methods
     """  # noqa: D301
 
 
@@ -76,15 +76,18 @@ def run() -> None:
     open_streams()
     try:
         main()
-    except InputError as error:  # outside of any command, such as --help to a full disk
-        say(f"posefit: {error}")
+    except OSError as error:
+        if error.errno != errno.ENOSPC or error.filename is not None:
+            raise
+        drop(1)
+        say(f"posefit: standard output: expected room to write results to, got {error.strerror}")
         raise SystemExit(MISTAKE) from None
     except SystemExit as end:
-        others = (one for one in threading.enumerate() if not one.daemon and one is not threading.main_thread())
-        left = [one for one in others if not one.name.startswith(f"{POOL}_")]
-        for thread in left:
-            thread.join(THREAD_SECONDS / len(left))
-        names = ", ".join(sorted({thread.name for thread in left if thread.is_alive()}))
+        others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
+        running = [thread for thread in others if not thread.daemon and not thread.name.startswith(f"{POOL}_")]
+        for thread in running:
+            thread.join(THREAD_SECONDS / len(running))
+        names = ", ".join(sorted({thread.name for thread in running if thread.is_alive()}))
         if names:
             say(f"posefit: not waiting for what a plugin left running: {cut(names)}")
             sys.stdout.flush()

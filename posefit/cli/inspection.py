@@ -17,8 +17,12 @@ from posefit.settings import Setting, settings_in, without_settings
 def described(offer: Offer) -> dict[str, Any]:
     """Return an offer as `posefit plugins --json` prints it."""
     settings = [
-        {"name": one.name, "type": one.type, "default": None if one.default is Parameter.empty else one.default}
-        for one in offer.settings
+        {
+            "name": setting.name,
+            "type": setting.type,
+            "default": None if setting.default is Parameter.empty else setting.default,
+        }
+        for setting in offer.settings
     ]
     more = {"next_frame": offer.next_frame} if offer.kind == "optimiser" else {}
     return {
@@ -45,11 +49,11 @@ def listing(registry: Registry) -> Iterator[str]:
 def explanation(registry: Registry, name: str) -> Iterator[str]:
     """Yield the lines of `posefit plugins show`: whatever has the name. Raises ValueError listing the known names."""
     offers = [offer for kind in KINDS for offer in registry.offers[kind].values()]
-    mine = [offer for offer in offers if offer.name == name]
-    if not mine:
+    named = [offer for offer in offers if offer.name == name]
+    if not named:
         known = sorted({offer.name for offer in offers})
         raise InputError(f"plugin must be one of {', '.join(known)}, got {quoted(name)}{suggestion(name, known)}")
-    for offer in mine:
+    for offer in named:
         text = getdoc(offer.factory) or ""
         listed = settings_in(text)
         yield _head(offer)

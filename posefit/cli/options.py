@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import click
@@ -49,25 +50,56 @@ def sources_from(_context: click.Context, _parameter: click.Parameter, begun: st
 COMPLETED = {"method": methods_from, "train": sources_from}  # options whose values a shell completes
 
 
+class Flag(click.Option):
+    """An option that the help of its command lists under a heading."""
+
+    def __init__(self, *words: Any, heading: str = "Others", **more: Any) -> None:
+        super().__init__(*words, **more)
+        self.heading = heading
+
+
+def under(heading: str) -> Callable[..., Decorator]:
+    """Return what makes options that are listed under a heading."""
+    return partial(click.option, cls=Flag, heading=heading)
+
+
+class TrackCommand(click.Command):
+    """A command with the options of a track, whose help lists them under headings."""
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options: those of no heading last."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for flag in self.get_params(context):
+            if isinstance(flag, click.Option) and (record := flag.get_help_record(context)):
+                sections.setdefault(getattr(flag, "heading", "Others"), []).append(record)
+        sections["Others"] = sections.pop("Others", [])
+        for heading, rows in sections.items():
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+
 def track_flags(*names: str) -> list[Decorator]:
     """Return the click options of some options of a track; without names, of all that the command line has."""
-    listed = {field.name: field for field in fields(TrackOptions)}
     flags: list[Decorator] = []
-    for name in names or [name for name, one in listed.items() if declared(one).flag != ""]:
-        one, default = declared(listed[name]), listed[name].default
-        flag = (one.flag or name).replace("_", "-")
-        words: dict[str, Any] = {"help": one.help, "shell_complete": COMPLETED.get(name)}
-        if one.parse is bool:
-            flags.append(click.option(f"--{flag}/--no-{flag}", name, default=None, **words))
+    heading = ""
+    for field in fields(TrackOptions):
+        option, default = declared(field), field.default
+        heading = option.heading or heading
+        if (field.name not in names) if names else option.flag == "":
             continue
-        words |= {"metavar": one.unit or None, "multiple": one.repeated}
-        if one.parse in (int, float):
-            words["type"] = one.parse
+        flag, make = (option.flag or field.name).replace("_", "-"), under(heading)
+        words: dict[str, Any] = {"help": option.help, "shell_complete": COMPLETED.get(field.name)}
+        if option.parse is bool:
+            flags.append(make(f"--{flag}/--no-{flag}", field.name, default=None, **words))
+            continue
+        words |= {"metavar": option.unit or None, "multiple": option.repeated}
+        if option.parse in (int, float):
+            words["type"] = option.parse
         else:
-            words["callback"] = parsed_by(one.parse)
+            words["callback"] = parsed_by(option.parse)
         if not isinstance(default, tuple) and default is not None:
             words |= {"default": default, "show_default": True}
-        flags.append(click.option(f"--{flag}", name, **words))
+        flags.append(make(f"--{flag}", field.name, **words))
     return flags
 
 
@@ -79,28 +111,27 @@ def box(text: str) -> tuple[int, ...]:
     return tuple(map(int, parts))
 
 
-FRAMES = click.option(
+_video, _result = under("How the person is taken out of video"), under("Results")
+FRAMES = under("What is seen")(
     "--frames",
     default=":",
     callback=parsed_by(text_range),
     metavar="A:B",
     help="Only these frames: of footage as filmed, of a motion after resampling.",
 )
-JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-QUIET = click.option("--quiet", is_flag=True, help="No messages and no bars, only the result.")
+JSON = _result("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+QUIET = _result("--quiet", is_flag=True, help="No messages and no bars, only the result.")
 EXTRACTION = (
-    click.option(
+    _video(
         "--extraction",
         help="Of video: mixture, or mean with --background; else median, masks, or another of `posefit plugins`.",
     ),
-    click.option("--background", metavar="A:B|IMAGE", help="Frames without the person, or an image."),
-    click.option(
-        "--roi", callback=parsed_by(box), metavar="X,Y,W,H", help="Where the person is, in the video's pixels."
-    ),
-    click.option("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
-    click.option("--width", type=int, help="Larger videos are scaled down to this; by default 640."),
+    _video("--background", metavar="A:B|IMAGE", help="Frames without the person, or an image."),
+    _video("--roi", callback=parsed_by(box), metavar="X,Y,W,H", help="Where the person is, in the video's pixels."),
+    _video("--ignore", metavar="IMAGE", help="Bright pixels are never known, such as a tree in front."),
+    _video("--width", type=int, help="Larger videos are scaled down to this; by default 640."),
 )
-WITHOUT = click.option(
+WITHOUT = under("Method and budget")(
     "--without-subject", multiple=True, metavar="N", help="Leave a person of the library out; may be repeated."
 )
 TRACK: tuple[Any, ...] = (
@@ -108,10 +139,10 @@ TRACK: tuple[Any, ...] = (
     *track_flags(),
     WITHOUT,
     *EXTRACTION,
-    click.option("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
-    click.option("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
-    click.option("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
-    click.option("--verbose", is_flag=True, help="Print all figures, not three lines."),
+    _result("--out", metavar="DIR", help="Write poses, table, video and picture to this new folder."),
+    _result("--force", is_flag=True, help="Replace DIR where it holds earlier results."),
+    _result("--resume", is_flag=True, help="Go on with the track to DIR that ended too early."),
+    _result("--verbose", is_flag=True, help="Print all figures, not three lines."),
     QUIET,
     JSON,
 )
@@ -123,37 +154,6 @@ ENGINE = (
         "--cell-gigabytes", type=float, default=4.0, show_default=True, help="How much memory a cell may have."
     ),
 )
-
-
-HEADINGS = {  # of the flags that are no options of a track, by their names in Python
-    "What is seen": "live frame frames",
-    "Method and budget": "without_subject",
-    "How the person is taken out of video": "extraction background roi ignore width",
-    "Results": "out force resume verbose quiet as_json",
-}
-
-
-class TrackCommand(click.Command):
-    """A command with the options of a track, whose help lists them under headings."""
-
-    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options: those of no heading last."""
-        flags = [flag for flag in self.get_params(context) if isinstance(flag, click.Option)]
-        records = {flag.name: record for flag in flags if (record := flag.get_help_record(context))}
-        sections: dict[str, list[str]] = {}
-        heading = ""
-        for field in fields(TrackOptions):
-            heading = declared(field).heading or heading
-            if declared(field).flag != "":
-                sections.setdefault(heading, []).append(field.name)
-        for heading, listed in HEADINGS.items():
-            sections.setdefault(heading, []).extend(listed.split())
-        for heading, names in sections.items():
-            if rows := [records.pop(name) for name in names if name in records]:
-                with formatter.section(heading):
-                    formatter.write_dl(rows)
-        with formatter.section("Others"):
-            formatter.write_dl(list(records.values()))
 
 
 def options(chosen: Sequence[Decorator]) -> Decorator:

@@ -1,12 +1,10 @@
 """Where commands say what they do: messages and progress go to stderr, results alone to stdout."""
 
-import io
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
-from functools import partial
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
 import click
@@ -17,62 +15,24 @@ from posefit.limits import allowed_bytes
 MISTAKE = 2  # the exit status of a mistake, which is shown in one line
 
 
-class _Messages(io.TextIOWrapper):
-    """Standard error: what cannot be written to it is lost, and the work goes on."""
-
-    writing: Callable[[], AbstractContextManager[None]] = staticmethod(partial(suppress, OSError))
-
-    def write(self, text: str) -> int:
-        """Write a text."""
-        with self.writing():
-            super().write(text)
-        return len(text)
-
-    def flush(self) -> None:
-        """Write what is buffered."""
-        with self.writing():
-            super().flush()
-
-
-@contextmanager
-def _room() -> Iterator[None]:
-    """Raise InputError where the body has no room to write to; a closed pipe ends the output."""
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115, as long as the process lives
-        reason = error.strerror or error
-        raise InputError(f"standard output: expected room to write results to, got {reason}") from None
-
-
-class _Results(_Messages):
-    """Standard output: a result that cannot be written there is a user's mistake."""
-
-    writing = staticmethod(_room)
-
-
 def open_streams() -> None:
-    """Open the standard streams that are closed, on nothing, and let no full one end the work.
+    """Open the standard streams that are closed, on nothing."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115, as long as the process lives
 
-    An open stream is opened again on the same buffer, as the class of a stream cannot be changed.
-    """
-    for number, (name, kind) in enumerate((("stdin", None), ("stdout", _Results), ("stderr", _Messages))):
-        stream = getattr(sys, name)
-        if stream is None and os.open(os.devnull, os.O_RDWR) == number:  # the lowest one that is free
-            stream = open(number, "w" if kind else "r", encoding="utf-8")  # noqa: SIM115, as long as the process lives
-        if kind is not None and isinstance(stream, io.TextIOWrapper):
-            lines, unbuffered = stream.line_buffering or kind is _Messages, stream.write_through
-            encoding, errors = stream.encoding, stream.errors
-            stream = kind(stream.detach(), encoding, errors, line_buffering=lines, write_through=unbuffered)
-        setattr(sys, name, stream)
-        setattr(sys, f"__{name}__", stream)
+
+def drop(stream: int) -> None:
+    """Send to nowhere what a standard stream holds and still gets: there is no room for it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
 
 def say(message: str) -> None:
-    """Print a message on stderr."""
-    click.echo("\n".join(map(printable, message.split("\n"))), err=True)
+    """Print a message on stderr. Where that is full, it is lost, and the work goes on."""
+    try:
+        click.echo("\n".join(map(printable, message.split("\n"))), err=True)
+    except OSError:
+        drop(2)
 
 
 def print_result(lines: Iterable[str], value: Any, as_json: bool) -> None:
@@ -119,10 +79,10 @@ def results_alone() -> Iterator[None]:
     """Send to stderr what anything prints in the body, compiled code and other processes too: stdout is for results."""
     sys.stdout.flush()
     with redirect_stdout(sys.stderr):
-        kept = os.dup(1)
+        stdout_copy = os.dup(1)
         os.dup2(2, 1)
         try:
             yield
         finally:
-            os.dup2(kept, 1)
-            os.close(kept)
+            os.dup2(stdout_copy, 1)
+            os.close(stdout_copy)

@@ -93,8 +93,8 @@ def check(
 
         report = check_in_process(kind, name, settings, only)
     results = [
-        {"check": one.name, "outcome": one.outcome, "detail": one.detail, "traceback": one.traceback}
-        for one in report.results
+        {"check": result.name, "outcome": result.outcome, "detail": result.detail, "traceback": result.traceback}
+        for result in report.results
     ]
     value = {"plugin": report.plugin, "summary": report.summary, "results": results}
     print_result(str(report).split("\n"), value, as_json)

@@ -13,7 +13,7 @@ from posefit.errors import InputError
 from posefit.tracking.options import text_range
 
 if TYPE_CHECKING:
-    from posefit.suites.running import SuiteRun, SuiteScore
+    from posefit.suites.running import SuiteScore
 
 
 @click.group(cls=Group, invoke_without_command=True)
@@ -27,9 +27,7 @@ def suite(context: click.Context, as_json: bool) -> None:
 
     lines = [f"{SUITE}: proposals in [-1, 1]^d, costs of 0 to 100"]
     lines += [f"instances {TRAINING[0]} to {TRAINING[-1]} for training, {HELD_OUT[0]} to {HELD_OUT[-1]} held out", ""]
-    for one in FUNCTIONS:
-        dimensions = ", ".join(map(str, one.dimensions))
-        lines.append(f"  {one.number}  {one.name:20} d = {dimensions:14} {one.summary}")
+    lines += [f"  {f.number}  {f.name:20} d = {listed(f.dimensions):14} {f.summary}" for f in FUNCTIONS]
     print_result(lines, [asdict(function) for function in FUNCTIONS], as_json)
 
 
@@ -49,7 +47,6 @@ def suite(context: click.Context, as_json: bool) -> None:
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--set", "texts", multiple=True, metavar="SETTING=VALUE", help="Of the optimiser; repeatable.")
 @click.option("--infeasible", default="repair", show_default=True, help="repair, reject or penalise.")
-@click.option("--out", metavar="DIR", help="New folder for IOHprofiler's files.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
 def suite_run(
     optimiser: str,
@@ -61,55 +58,38 @@ def suite_run(
     seed: int,
     texts: tuple[str, ...],
     infeasible: Any,
-    out: str | None,
     as_json: bool,
 ) -> None:
     """Run OPTIMISER on problems of the numbered benchmark, and print what it reaches."""
     from posefit import settings
-    from posefit.files import check_free
     from posefit.fitting.check import whole
     from posefit.registry import registry
     from posefit.suites.problem import Suite
-    from posefit.suites.running import run_on
+    from posefit.suites.running import run_on, suite_scores
 
     with results_alone():
         whole("budget", budget, 1)
         whole("seed", seed, 0)
-        check_free(out)
         numbers = _numbers(*instances)
         chosen_functions, chosen_dimensions = functions or None, dimensions or (9,)
         problems = Suite(
             functions=chosen_functions, dimensions=chosen_dimensions, instances=numbers, infeasible=infeasible
         )
-        for one in problems.passed_over:
-            listed = ", ".join(map(str, one.dimensions))
-            say(f"function {one.number} is left out: it has dimensions {listed}")
+        for function in problems.passed_over:
+            say(f"function {function.number} is left out: it has dimensions {listed(function.dimensions)}")
         chosen = settings.parse_texts(optimiser, registry().optimiser(optimiser), texts)
         asked = (
             run_on(problem, optimiser, chosen, evaluations=budget * problem.dimension, seed=seed)
             for problem in problems
         )
         runs = list(progress(asked, len(problems), "run"))
-    _print(runs, out, as_json)
+    scores = suite_scores(runs)
+    print_result(_score_lines(scores), [asdict(score) for score in scores], as_json)
 
 
-@suite.command("table")
-@click.argument("ledger", metavar="DIR")
-@click.option("--iohprofiler", metavar="DIR", help="New folder for IOHprofiler's files.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON array and nothing else on stdout.")
-def suite_table(ledger: str, iohprofiler: str | None, as_json: bool) -> None:
-    """Print the scores of a sweep of single searches in DIR, by dimension, function and method."""
-    from posefit.files import check_free
-    from posefit.reading import counted
-    from posefit.sweep.ledger import Ledger
-    from posefit.sweep.table import search_runs
-
-    check_free(iohprofiler)
-    results = Ledger(ledger)
-    runs = list(search_runs(results.rows(), results.path))
-    if failed := len(results.quarantined()):
-        say(f"{counted(failed, 'cell')} failed, left out of all figures")
-    _print(runs, iohprofiler, as_json)
+def listed(dimensions: Sequence[int]) -> str:
+    """Return dimensions as a list."""
+    return ", ".join(map(str, dimensions))
 
 
 def _numbers(start: int | None, stop: int | None) -> range:
@@ -122,33 +102,16 @@ def _numbers(start: int | None, stop: int | None) -> range:
     return range(first, last)
 
 
-def _print(runs: "Sequence[SuiteRun]", out: str | None, as_json: bool) -> None:
-    """Print the scores of runs, and write the runs to a new folder, as IOHprofiler has them."""
-    from posefit.report.export import write_iohprofiler
-    from posefit.suites.running import suite_scores
-
-    scores = suite_scores(runs)
-    if out is not None:
-        write_iohprofiler(runs, out)
-        say(f"written to {out}: IOHprofiler's files")
-    print_result(_score_lines(scores), [asdict(score) for score in scores], as_json)
-
-
 def _score_lines(scores: "Sequence[SuiteScore]") -> list[str]:
     """Return the lines of a table of scores, for a terminal: where runs end, and how soon they reach targets."""
-    from posefit.suites.running import ALL, SHOWN, budgets_differ
+    from posefit.suites.running import ALL, SHOWN
 
-    budgets, ways = budgets_differ(scores), len({score.infeasible for score in scores}) > 1
-    labels = [
-        score.method + f", {score.budget / score.dimension:g} x d" * budgets + f", {score.infeasible}" * ways
-        for score in scores
-    ]
-    wide, heads = max(24, *map(len, labels)), [f"ERT +{above:g}" for above in SHOWN]
-    lines = [f"{'d':>3} {'function':22} {'method':{wide}} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
-    for score, label in zip(scores, labels, strict=True):
+    heads = [f"ERT +{above:g}" for above in SHOWN]
+    lines = [f"{'d':>3} {'function':22} {'method':24} {'runs':>5} {'above':>7} {'targets':>8}" + _cells(heads)]
+    for score in scores:
         function = score.name if score.function == ALL else f"{score.function} {score.name}"
         times = ["-" if time is None else f"{time:.0f}" for time in score.running_times.values()]
-        start = f"{score.dimension:>3} {function:22} {label:{wide}}"
+        start = f"{score.dimension:>3} {function:22} {score.method:24}"
         lines.append(f"{start} {score.runs:>5} {score.above:>7.2f} {score.reached:>8.1%}{_cells(times)}".rstrip())
     return lines
 

@@ -1,16 +1,12 @@
 """`posefit sweep` and `posefit report`."""
 
 from contextlib import nullcontext
-from itertools import islice
 from typing import Any
 
 import click
 
 from posefit.cli.options import ENGINE, JSON, QUIET, options
 from posefit.cli.output import print_result, results_alone, say
-from posefit.errors import printable
-
-LINES = 1000  # that are printed at a time
 
 
 @click.command()
@@ -49,13 +45,11 @@ def sweep(
     seconds, gigabytes = places.pop("cell_seconds"), places.pop("cell_gigabytes")
     start = command.engine(Limits(seconds, gigabytes), **places)
     if dry_run:
-        lines, some = command.preview(plan, out, shard, as_json), ""
-        while True:
-            with results_alone() if as_json else nullcontext():  # a plugin may print, too
-                some = "\n".join(line if as_json else printable(line) for line in islice(lines, LINES))
-            if not some:
-                return
-            click.echo(some)
+        with results_alone() if as_json else nullcontext():  # a plugin may print, too
+            previewed = command.previewed(plan, out, shard)
+            listed = [{"key": cell.key, "done": done, **cell.spec} for cell, done in previewed] if as_json else []
+            lines = command.preview_lines(previewed)
+        return print_result(lines, {"cells": listed}, as_json)
     if out is None:
         raise click.UsageError("--out must name a folder for the results, got none")
     with results_alone() if as_json else nullcontext():
@@ -70,7 +64,7 @@ def sweep(
 @click.command()
 @click.argument("ledger", metavar="DIR...", nargs=-1, required=True)
 @click.option("--out", metavar="FILE.html", help="The page; an earlier report is replaced.")
-@click.option("--figures", metavar="DIR", help="New folder for figures and tables of a paper; needs posefit[figures].")
+@click.option("--figures", metavar="DIR", help="New folder for figures of a paper; needs posefit[figures].")
 @click.option("--csv", metavar="FILE", help="New file of all rows.")
 @JSON
 def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: Any) -> None:
@@ -84,5 +78,5 @@ def report(ledger: tuple[str, ...], out: str | None, as_json: bool, **others: An
     """
     from posefit.report.write import leaderboard_lines, write_report
 
-    summary = write_report(ledger, out, warn=say, **others)
+    summary = write_report(ledger, out, **others)
     print_result(leaderboard_lines(summary), summary, as_json)

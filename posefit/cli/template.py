@@ -18,7 +18,7 @@ from posefit.registry import AUTHORED, COMMAND, Registrable, plugins_of, registr
 TAKEN = {"Frame"}  # names that a template's module has already
 
 
-def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None, own: Sequence[str] = ()) -> Path:
+def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None, commands: Sequence[str] = ()) -> Path:
     """Return the new folder with a small installable plugin, `posefit-NAME` unless another is given.
 
     `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
@@ -27,7 +27,7 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
     one_of("kind", kind, (*AUTHORED, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}")
-    if name in (known := _taken(kind, own)):
+    if name in (known := _taken(kind, commands)):
         raise InputError(f"name must be a new one, got {name!r}, which {known[name]} registers already")
     module = name.replace("-", "_")
     if (there := find_spec(f"{PROJECT}_{module}")) is not None:
@@ -63,10 +63,10 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
     return target
 
 
-def _taken(kind: Registrable, own: Sequence[str]) -> dict[str, str]:
+def _taken(kind: Registrable, commands: Sequence[str]) -> dict[str, str]:
     """Return the names that a new plugin cannot have, each with the distribution that has it."""
     if kind != COMMAND:
         return {offer.name: offer.distribution for offer in registry().offers[kind].values()}
-    plugins = plugins_of((COMMAND,), tuple(own))
-    theirs = {str(command.name): plugin.distribution for plugin in plugins for command in plugin.commands}
-    return dict.fromkeys(own, PROJECT) | theirs
+    plugins = plugins_of((COMMAND,), tuple(commands))
+    others = {str(command.name): plugin.distribution for plugin in plugins for command in plugin.commands}
+    return dict.fromkeys(commands, PROJECT) | others

@@ -10,21 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options, track_flags
+from posefit.cli.options import EXTRACTION, FRAMES, JSON, TRACK, TrackCommand, options, track_flags, under
 from posefit.cli.output import progress, results_alone, say
 from posefit.errors import InputError
 from posefit.progress import Progress
 
 if TYPE_CHECKING:
     from posefit.footage.source import Kind
+    from posefit.output.content import Content
 
+_OF_FILES = ("source", "out", "force", "resume")
 COLOURS = {"good": "green", "doubtful": "yellow", "useless": "red"}
 
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
 @FRAMES
-@click.option(
+@under("What is seen")(
     "--live", metavar="DEVICE|URL|-", help="Frames as they come, instead of SOURCE; - reads PGM masks or PPM pictures."
 )
 def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options: Any) -> None:
@@ -49,12 +51,14 @@ def track(as_json: bool, live: str | None, verbose: bool, quiet: bool, **options
         result = run(progress=shown, **_arguments(options))
     shown.log("took " + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in shown.phases.items()))
     hint = "open track.html, watch overlay.mp4, look at summary.png"
-    _print(result.summary, as_json, {}, options["out"], verbose, hint)
+    _print(result.content, as_json, {}, options["out"], verbose, hint)
 
 
 @click.command(cls=TrackCommand)
 @options(TRACK)
-@click.option("--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling.")
+@under("What is seen")(
+    "--frame", type=int, default=0, show_default=True, metavar="K", help="The frame, after resampling."
+)
 def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
     """Find the pose in one frame of SOURCE.
 
@@ -69,7 +73,7 @@ def fit(as_json: bool, verbose: bool, quiet: bool, **options: Any) -> None:
         result = run(progress=Progress() if quiet else Progress(say), **_arguments(options))
     degrees = [round(math.degrees(angle), 6) for angle in result.pose]
     more = {"pose_degrees": degrees}
-    _print(result.summary, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
+    _print(result.track.content, as_json, more, options["out"], verbose, "open track.html, look at summary.png")
 
 
 def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progress) -> None:
@@ -79,28 +83,29 @@ def _track_live(live: str, as_json: bool, options: dict[str, Any], shown: Progre
         raise InputError(f"SOURCE must be left out with --live, got {' '.join(options['source'])}")
     if useless := [name for name in ("force", "resume", "without_subject") if options[name]]:
         raise InputError(f"--{useless[0].replace('_', '-')} must be left out with --live")
-    given = _arguments(options, "video")
-    kept = {name: given[name] for name in given if name not in ("source", "out", "force", "resume")}
-    frames, out = track_live(live, progress=shown, **kept), options["out"]
+    out = options["out"]
+    # frames that come are taken as those of a video
+    chosen = {name: value for name, value in _arguments(options, "video").items() if name not in _OF_FILES}
+    frames = track_live(live, progress=shown, **chosen)
     summary = write_live(frames, out, (lambda frame: click.echo(json.dumps(frame.row))) if as_json else None)
     latency = f"latency {summary['latency_ms']['p50']:g} ms, 99 % within {summary['latency_ms']['p99']:g} ms"
     shown.log(f"{summary['frames']} frames tracked, {summary['skipped']} skipped; {latency}")
 
 
 def _print(
-    summary: Mapping[str, Any], as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
+    content: "Content", as_json: bool, more: Mapping[str, Any], out: str | None, verbose: bool, hint: str
 ) -> None:
-    """Print a track's summary: as JSON with something more, in three lines, or whole."""
+    """Print what a track is: as JSON with something more, in three lines, or whole."""
     from posefit.output.text import brief, table
 
     if as_json:
-        click.echo(json.dumps({**summary, **more}))
+        click.echo(json.dumps({**content.summary, **more}))
         return
     if verbose:
-        click.echo(table(summary))
+        click.echo(table(content))
     else:
-        worth, *work = brief(summary)
-        grade = "good" if summary["trust"] is None else summary["trust"]["grade"]
+        worth, *work = brief(content)
+        grade = "good" if content.trust is None else content.trust.grade
         click.secho(worth, bold=True, fg=COLOURS[grade])
         click.echo("\n".join(work))
     if out or not verbose:
@@ -165,22 +170,22 @@ def extraction_of(options: dict[str, Any], kind: "Kind", settings: Sequence[str]
     from posefit.registry import registry
     from posefit.settings import parse_texts
 
-    given = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
-    given = {name: value for name, value in given.items() if value is not None}
+    values = {name: options.pop(name) for name in ("extraction", "background", "roi", "ignore", "width")}
+    values = {name: value for name, value in values.items() if value is not None}
     if kind not in ("video", "pictures"):
-        for name, value in given.items():
+        for name, value in values.items():
             raise useless_for(kind, name, value, "video")
         return None
-    if "extraction" in given:
-        given["method"] = given.pop("extraction")
-    name = segmenter_name(given.get("method"), given.get("background"))
+    if "extraction" in values:
+        values["method"] = values.pop("extraction")
+    name = segmenter_name(values.get("method"), values.get("background"))
     if settings is None and "settings" in options:
         texts = options["settings"]
         settings = [text for text in texts if text.partition(".")[0] == name]
         options["settings"] = tuple(text for text in texts if text not in settings)
     if settings:
-        given["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, settings)
-    return Extraction(**given) if given else None
+        values["settings"] = parse_texts(name, registry().offer("segmenter", name).factory, settings)
+    return Extraction(**values) if values else None
 
 
 def without_subjects(train: Sequence[Any], subjects: Sequence[str]) -> list[Any]:

@@ -15,8 +15,8 @@ cameras see pointing up, unless `up` names one. Lengths are in the file's own un
 
 Each file but Qualisys' and our own becomes texts, numbers, lists and dictionaries, without OpenCV, whose reader trusts
 the file: nothing is expanded, and a matrix is as large as the numbers that are there. One reader looks for cameras in
-that, whatever the format. A key that seems to describe a lens in a way that is not known here is an error, not a
-straight lens.
+that and in its tables, whatever the format. A key that seems to describe a lens in a way that is not known here is an
+error, not a straight lens.
 """
 
 import math
@@ -37,6 +37,7 @@ from posefit.reading import cut, parsed_json, parsed_toml, quoted, read_text
 Up = Literal["x", "y", "z"]
 LARGEST_FILE = 500_000  # bytes: PyYAML reads some 100,000 a second
 MESSAGE = 300  # characters of what is wrong
+MOST_TABLES = 10_000
 DISTORTIONS = (4, 5, 8, 12, 14)  # how many numbers OpenCV describes a lens by
 BLOCK = 16  # pixels: codecs fill pictures up to a multiple of it
 # the letters of OpenCV's element types whose numbers are rounded when they are read
@@ -220,7 +221,7 @@ def _cameras(path: Path, text: str) -> list[Calibration]:
     values = _stored_values(path, start, text)
     if "names" in values and any(key.startswith("K_") or key.startswith("Rot_") for key in values):
         return _easymocap(path, values)
-    return list(_described(path.stem, values, set(), 2))
+    return _described(path.stem, values)
 
 
 def _own(path: Path) -> list[Calibration]:
@@ -229,28 +230,38 @@ def _own(path: Path) -> list[Calibration]:
     return [Calibration(path.stem, size, matrix, np.zeros(4), camera.rotation, camera.translation, upright=True)]
 
 
-def _described(name: str, values: Mapping[str, Any], read: set[int], depth: int) -> Iterator[Calibration]:
-    """Yield the camera that values describe by their keys, or those of the values that are such, to some depth.
+def _described(name: str, values: Mapping[str, Any]) -> list[Calibration]:
+    """Return the camera that values describe by their keys, or those of their tables, and of the tables in these."""
+    cameras, tables = list[Calibration](), [(name, values)]
+    for _ in range(3):
+        inner: list[tuple[str, Mapping[str, Any]]] = []
+        for name, table in tables:
+            known = {_plain(key): value for key, value in table.items()}
+            if str(known.get("ignore")).lower() == "true":  # a camera that Caliscope left out
+                continue
+            if {"fx", "fy", "cx", "cy"} <= known.keys():
+                axes = ([_number_of(known[kind + axis]) for axis in "xy"] for kind in "fc")
+                known["matrix"] = _pinhole(*axes).tolist()
+            if _first(known, MATRIX) is not None:
+                cameras.append(_camera(name, table, known))
+            elif _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
+                raise InputError(f"{quoted(name)} without camera_matrix, image_width and image_height")
+            else:
+                inner += _tables(table)
+        if len(inner) > MOST_TABLES:  # as an alias of YAML may give the same one again and again
+            raise InputError(f"a file of more than {MOST_TABLES:,} tables")
+        tables = inner
+    return cameras
 
-    `read` are those read already, as an alias of YAML may give the same values again and again.
-    """
-    known = {_plain(key): value for key, value in values.items()}
-    if str(known.get("ignore")).lower() == "true":  # a camera that Caliscope left out
-        return
-    if {"fx", "fy", "cx", "cy"} <= known.keys():
-        known["matrix"] = _pinhole(*([_number_of(known[kind + axis]) for axis in "xy"] for kind in "fc")).tolist()
-    if _first(known, MATRIX) is not None:
-        yield _camera(name, values, known)
-        return
-    if _first(known, (*LENS, *ROTATION, *SIZE, *SIDES[0][:1])) is not None:
-        raise InputError(f"{quoted(name)} without camera_matrix, image_width and image_height")
-    for key, value in values.items() if depth else ():
-        several = value if isinstance(value, list) else [value]
-        for number, entry in enumerate(several):
-            if isinstance(entry, dict) and id(entry) not in read and key != "metadata":
-                read.add(id(entry))
-                own = f"{key}{number}" if isinstance(value, list) else key
-                yield from _described(str(entry.get("name", own)), entry, read, depth - 1)
+
+def _tables(values: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables among values, and those in lists, with their names."""
+    for key, value in values.items():
+        if isinstance(value, dict) and key != "metadata":
+            yield str(value.get("name", key)), value
+        elif isinstance(value, list):
+            tables = (entry for entry in value if isinstance(entry, dict))
+            yield from ((str(table.get("name", f"{key}{number}")), table) for number, table in enumerate(tables))
 
 
 def _camera(name: str, values: Mapping[str, Any], known: Mapping[str, Any]) -> Calibration:
@@ -322,7 +333,7 @@ def _easymocap(path: Path, values: dict[str, Any]) -> list[Calibration]:
         entry = {key: values[f"{kind}_{name}"] for key, kind in keys.items() if f"{kind}_{name}" in values}
         if not (_counts(entry.get("width")) and _counts(entry.get("height"))):
             entry.pop("width", None)
-        calibrations += _described(str(name), entry, set(), 0) if entry else []
+        calibrations += _described(str(name), entry) if entry else []
     return calibrations
 
 

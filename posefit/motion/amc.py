@@ -2,6 +2,7 @@
 
 import re
 from array import array
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,17 +24,17 @@ from posefit.geometry.skeleton import ANGLES, Skeleton, channel_angles
 from posefit.geometry.units import CMU_UNIT, Unit
 from posefit.limits import RATES
 from posefit.motion.asf import parse_asf
-from posefit.motion.lines import lines_of, mistake, shown, values_of
+from posefit.motion.lines import Line, lines_of
 from posefit.motion.motion import LONGEST, Motion
-from posefit.reading import check_size
+from posefit.reading import check_size, quoted
 
 FPS = 120.0  # CMU's rate; its files do not state it
-RATE = re.compile(rb"#\s*(\S{1,40}) frames a second")  # in posefit's own files
+RATE = re.compile(r"#\s*(\S{1,40}) frames a second")  # in posefit's own files
 SIZE_LIMIT = 500_000_000  # bytes
 LONGEST_LINE = 10_000  # bytes; a root line has about 60
 VALUES = 20_000_000  # numbers of a file: 200,000 frames of 100 channels
 
-Spans = dict[bytes, tuple[int, int]]  # bone: where its values start and stop in a frame
+Spans = dict[str, tuple[int, int]]  # bone: where its values start and stop in a frame
 
 
 def read_clip(
@@ -62,7 +63,9 @@ def read_amc(
     path = Path(path)
     check_size(path, SIZE_LIMIT)
     spans, columns, targets = _layout(skeleton)
-    values, radians, stated = _frames(path, spans, skeleton.name)
+    lines = lines_of(path, LONGEST_LINE)
+    radians, stated, first = _head(lines)
+    values = _frames(lines, spans, first, skeleton.name)
     rate = fps or stated or FPS
     assumed = f"{path}: the file does not state its rate: {FPS:g} frames a second are assumed; --rate sets it"
     notes = () if fps or stated else (assumed,)
@@ -75,12 +78,12 @@ def read_amc(
 
 def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.int64]]:
     """Return the spans of a frame's values, and which of its columns go to which of the 66 angles."""
-    spans: Spans = {b"root": (0, 6)}
+    spans: Spans = {"root": (0, 6)}
     columns: list[int] = []
     targets: list[int] = []
     start = 6
     for bone, angles in skeleton.channels:
-        spans[bone.encode()] = start, start + len(angles)
+        spans[bone] = start, start + len(angles)
         if indices := channel_angles(bone, angles):
             columns += range(start, start + len(angles))
             targets += indices
@@ -88,67 +91,67 @@ def _layout(skeleton: Skeleton) -> tuple[Spans, NDArray[np.int64], NDArray[np.in
     return spans, np.array(columns, dtype=np.int64), np.array(targets, dtype=np.int64)
 
 
-def _frames(path: Path, spans: Spans, name: str) -> tuple[Array, bool, float | None]:
-    """Return all frames (T, values of a frame) in file units, whether angles are radians, and the rate if stated."""
-    width = max(stop for _, stop in spans.values())
-    data, row = array("d"), [0.0] * width
-    bones_read: set[bytes] = set()
-    frame, radians, number, rate = -1, None, 0, None
-    for number, raw in lines_of(path, LONGEST_LINE):
-        words = raw.split()
-        if not words or words[0].startswith(b"#"):
-            if frame < 0 and (match := RATE.match(raw)):
-                rate = _rate(path, number, match[1])
-            continue
-        word = words[0]
-        span = spans.get(word)
-        if span is not None and frame >= 0:
-            if word in bones_read:
-                raise mistake(path, number, f"each bone once in frame {frame}", f"{shown(word)} again")
-            bones_read.add(word)
-            row[span[0] : span[1]] = values_of(path, number, words, span[1] - span[0])
-        elif len(words) == 1 and word.isdigit() and len(word) < 10:
-            if radians is None:
-                raise mistake(path, number, ":DEGREES or :RADIANS before the first frame", f"frame {int(word)}")
-            if frame >= 0:
-                _check_whole(path, number, spans, bones_read, frame, f"frame {int(word)}")
-                data.extend(row)
-                if len(data) >= min(LONGEST * width, VALUES):
-                    most = min(LONGEST, VALUES // width)
-                    raise mistake(path, number, f"at most {most} frames of {width} numbers", "more")
-                if int(word) != frame + 1:
-                    raise mistake(path, number, f"frame {frame + 1}", f"frame {int(word)}")
-            frame = int(word)
-            bones_read.clear()
-        elif frame < 0 and word.startswith(b":"):
-            keyword = word.upper()
-            if keyword not in (b":FULLY-SPECIFIED", b":DEGREES", b":RADIANS"):
-                raise mistake(path, number, ":FULLY-SPECIFIED, :DEGREES or :RADIANS", shown(raw))
-            if keyword != b":FULLY-SPECIFIED":
-                radians = keyword == b":RADIANS"
-        elif frame < 0:
-            raise mistake(path, number, "a header such as :DEGREES or the number of a frame", shown(raw))
+def _head(lines: Iterator[Line]) -> tuple[bool, float | None, int]:
+    """Return whether angles are radians, the rate if it is stated, and the number of the first frame."""
+    radians = rate = None
+    while True:
+        line = next(lines)
+        if line.key.startswith("#"):
+            if match := RATE.match(" ".join(line.words)):
+                rate = _rate(line, match[1])
+        elif line.key in (":degrees", ":radians"):
+            radians = line.key == ":radians"
+        elif line.key.startswith(":"):
+            if line.key != ":fully-specified":
+                raise line.mistake(":FULLY-SPECIFIED, :DEGREES or :RADIANS")
+        elif (number := _frame_number(line)) is None:
+            raise line.mistake("a header such as :DEGREES or the number of a frame")
+        elif radians is None:
+            raise line.mistake(":DEGREES or :RADIANS before the first frame", f"frame {number}")
         else:
-            raise mistake(path, number, f"a bone of skeleton {name!r} or a frame's number", shown(raw))
-    if frame < 0:
-        raise mistake(path, max(number, 1), "at least one frame", "the end of the file")
-    _check_whole(path, number, spans, bones_read, frame, "the end of the file")
-    data.extend(row)
-    return np.array(data).reshape(-1, width), bool(radians), rate
+            return radians, rate, number
 
 
-def _rate(path: Path, number: int, word: bytes) -> float:
+def _frames(lines: Iterator[Line], spans: Spans, frame: int, name: str) -> Array:
+    """Return all frames (T, values of a frame) in file units, from that of a number on."""
+    width = max(stop for _, stop in spans.values())
+    data, row, bones_read = array("d"), [0.0] * width, set[str]()
+    for line in lines:
+        bone, number = line.words[0] if line.words else "", _frame_number(line)
+        if bone in spans:
+            if bone in bones_read:
+                raise line.mistake(f"each bone once in frame {frame}", f"{bone!r} again")
+            bones_read.add(bone)
+            start, stop = spans[bone]
+            row[start:stop] = line.numbers(stop - start)
+        elif number is not None or not line.words:  # the frame is over
+            if len(bones_read) < len(spans):
+                missing = quoted(next(bone for bone in spans if bone not in bones_read))
+                raise line.mistake(f"bone {missing} in frame {frame}", None if number is None else f"frame {number}")
+            data.extend(row)
+            if number is not None and number != frame + 1:
+                raise line.mistake(f"frame {frame + 1}", f"frame {number}")
+            if number is not None and len(data) >= min(LONGEST * width, VALUES):
+                raise line.mistake(f"at most {min(LONGEST, VALUES // width)} frames of {width} numbers", "more")
+            frame += 1
+            bones_read.clear()
+        elif not bone.startswith("#"):
+            raise line.mistake(f"a bone of skeleton {name!r} or a frame's number")
+    return np.array(data).reshape(-1, width)
+
+
+def _frame_number(line: Line) -> int | None:
+    """Return the number of a line that is one alone."""
+    alone = len(line.words) == 1 and line.key.isascii() and line.key.isdigit() and len(line.key) < 10
+    return int(line.key) if alone else None
+
+
+def _rate(line: Line, word: str) -> float:
     """Return the rate that a comment states."""
-    (rate,) = values_of(path, number, [b"rate", word], 1)
+    (rate,) = line._replace(words=["rate", word]).numbers(1)
     if not RATES[0] <= rate <= RATES[1]:
-        raise mistake(path, number, f"a rate of {RATES[0]:g} to {RATES[1]:g} frames a second", shown(word))
+        raise line.mistake(f"a rate of {RATES[0]:g} to {RATES[1]:g} frames a second", quoted(word))
     return rate
-
-
-def _check_whole(path: Path, number: int, spans: Spans, bones_read: set[bytes], frame: int, came: str) -> None:
-    if len(bones_read) < len(spans):
-        missing = next(bone for bone in spans if bone not in bones_read)
-        raise mistake(path, number, f"bone {shown(missing)} in frame {frame}", came)
 
 
 def write_amc(path: str | Path, motion: Motion) -> None:
@@ -166,9 +169,9 @@ def write_amc(path: str | Path, motion: Motion) -> None:
     root = joint_angles_from_rotation(rotation_from_root_angles(motion.poses[:, :3]))
     values[:, 3:6] = np.rad2deg(steady_angles(root))
     values[:, columns] = np.rad2deg(unwrapped(motion.poses[:, targets]))
-    bones = [(bone.decode(), start, stop) for bone, (start, stop) in spans.items()]
     with Path(path).open("w", encoding="utf-8", newline="\n") as file:
         file.write(f"# {motion.fps!r} frames a second\n:FULLY-SPECIFIED\n:DEGREES\n")
         for frame, row in enumerate(values.tolist(), motion.first + 1):
             file.write(f"{frame}\n")
-            file.writelines(f"{bone} {' '.join(map(repr, row[start:stop]))}\n" for bone, start, stop in bones)
+            for bone, (start, stop) in spans.items():
+                file.write(f"{bone} {' '.join(map(repr, row[start:stop]))}\n")

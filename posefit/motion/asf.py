@@ -1,7 +1,7 @@
 """Acclaim skeletons (.asf): read into a `Skeleton`, and written from one."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,30 +13,13 @@ from posefit.geometry.body import Body
 from posefit.geometry.rotation import joint_angles_from_rotation, rotation_from_joint_angles
 from posefit.geometry.skeleton import ANGLES, BONES, INNER, JOINTS, PARENTS, Skeleton, channel_angles
 from posefit.geometry.units import CMU_UNIT, INCH, STATURES, UNIT_NAMES, Unit, metres_of, unit_of
-from posefit.motion.lines import LARGEST, mistake, values_of
+from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.reading import check_size, quoted
 
 SIZE_LIMIT = 1_000_000  # bytes; CMU's files have 7,000
 ROOT_CHANNELS = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 # Where to hang the bones that a Skeleton knows by their channels alone.
 _FINGERS = {"lfingers": "lhand", "lthumb": "lwrist", "rfingers": "rhand", "rthumb": "rwrist"}
-
-
-@dataclass(frozen=True)
-class _Line:
-    path: Path
-    number: int
-    words: list[str]
-
-    @property
-    def key(self) -> str:
-        return self.words[0].lower()
-
-    def mistake(self, expected: str, got: str | None = None) -> InputError:
-        return mistake(self.path, self.number, expected, repr(" ".join(self.words)) if got is None else got)
-
-    def numbers(self, count: int) -> list[float]:
-        return values_of(self.path, self.number, self.words, count)
 
 
 class _Bone(NamedTuple):
@@ -107,29 +90,26 @@ def _limits(bones: dict[str, _Bone]) -> Array | None:
     return limits[3:]
 
 
-def _sections(path: Path) -> dict[str, list[_Line]]:
-    sections: dict[str, list[_Line]] = {}
-    current: list[_Line] | None = None
-    text = path.read_bytes().decode("utf-8", errors="replace").split("\n")
-    for number, words in enumerate(map(str.split, text), 1):
-        if not words or words[0].startswith("#"):
-            continue
-        line = _Line(path, number, words)
-        if words[0].startswith(":"):
-            name = line.key[1:]
-            if name in sections:
-                raise line.mistake(f"one section :{name}", "a second one")
-            current = sections[name] = []
-        if current is None:
-            raise line.mistake("a section such as :units")
-        current.append(line)
+def _sections(path: Path) -> dict[str, list[Line]]:
+    """Return the lines of each section, the first of them its name."""
+    sections: dict[str, list[Line]] = {}
+    current: list[Line] | None = None
+    for line in lines_of(path, SIZE_LIMIT):
+        if line.key.startswith(":"):
+            if line.key[1:] in sections:
+                raise line.mistake(f"one section {line.key}", "a second one")
+            current = sections[line.key[1:]] = []
+        if line.words and not line.key.startswith("#"):
+            if current is None:
+                raise line.mistake("a section such as :units")
+            current.append(line)
     for name in ("root", "bonedata", "hierarchy"):
         if name not in sections:
-            raise mistake(path, len(text), f"a section :{name}", "the end of the file")
+            raise line.mistake(f"a section :{name}")
     return sections
 
 
-def _units(lines: list[_Line]) -> tuple[float, bool]:
+def _units(lines: list[Line]) -> tuple[float, bool]:
     """Return metres per file unit and whether angles are degrees; Acclaim's own defaults are inches and degrees."""
     metres, degrees = INCH, True
     for line in lines[1:]:
@@ -145,7 +125,7 @@ def _units(lines: list[_Line]) -> tuple[float, bool]:
     return metres, degrees
 
 
-def _check_root(lines: list[_Line]) -> None:
+def _check_root(lines: list[Line]) -> None:
     wanted = {"order": " ".join(ROOT_CHANNELS), "axis": "XYZ"}
     for line in lines[1:]:
         if line.key in wanted and " ".join(line.words[1:]).upper() != wanted[line.key]:
@@ -156,9 +136,9 @@ def _check_root(lines: list[_Line]) -> None:
         raise lines[-1].mistake(f"root order {wanted['order']}", "none")
 
 
-def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
+def _bones(lines: list[Line], radians: float) -> dict[str, _Bone]:
     bones: dict[str, _Bone] = {}
-    block: dict[str, _Line] | None = None
+    block: dict[str, Line] | None = None
     for line in lines[1:]:
         if line.key == "begin" and block is None:
             block = {}
@@ -174,7 +154,7 @@ def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
             bones[name] = _bone(block, radians)
             block = None
         elif line.words[0].startswith("(") and "limits" in block:
-            block["limits"] = replace(block["limits"], words=[*block["limits"].words, *line.words])
+            block["limits"] = block["limits"]._replace(words=[*block["limits"].words, *line.words])
         else:
             block[line.key] = line
     if block is not None:
@@ -182,7 +162,7 @@ def _bones(lines: list[_Line], radians: float) -> dict[str, _Bone]:
     return bones
 
 
-def _bone(block: dict[str, _Line], radians: float) -> _Bone:
+def _bone(block: dict[str, Line], radians: float) -> _Bone:
     direction, (length,) = np.array(block["direction"].numbers(3)), block["length"].numbers(1)
     norm = float(np.linalg.norm(direction))
     if length < 0.0:
@@ -192,25 +172,25 @@ def _bone(block: dict[str, _Line], radians: float) -> _Bone:
     axis = block["axis"]
     if len(axis.words) != 5 or axis.words[4].upper() != "XYZ":
         raise axis.mistake("axis order XYZ")
-    angles = np.array(replace(axis, words=axis.words[:4]).numbers(3))
+    angles = np.array(axis._replace(words=axis.words[:4]).numbers(3))
     free = tuple(word.lower() for word in block["dof"].words[1:]) if "dof" in block else ()
     if not set(free) <= {"rx", "ry", "rz"} or sorted(set(free)) != list(free):
         raise block["dof"].mistake("dof out of rx ry rz, in this order")
     limits = None
     if "limits" in block:  # (lowest highest) for each free angle, such as `(-160.0 20.0)`, on one line or several
         words = " ".join(block["limits"].words).replace("(", " ").replace(")", " ").split()
-        limits = np.array(replace(block["limits"], words=words).numbers(2 * len(free))).reshape(-1, 2) * radians
+        limits = np.array(block["limits"]._replace(words=words).numbers(2 * len(free))).reshape(-1, 2) * radians
         if (limits[:, 0] > limits[:, 1]).any():
             raise block["limits"].mistake("limits (lowest highest) in order")
     return _Bone(direction / norm * length if length > 0.0 else np.zeros(3), angles * radians, free, limits)
 
 
-def _check_tree(path: Path, lines: list[_Line], bones: Iterable[str]) -> None:
+def _check_tree(path: Path, lines: list[Line], bones: Iterable[str]) -> None:
     known = {"root", *bones}
     for name in BONES:
         if name not in known:
             raise InputError(f"{path}: the skeleton needs bone {name!r}, which this file does not define")
-    parents: dict[str, tuple[str, _Line]] = {}
+    parents: dict[str, tuple[str, Line]] = {}
     for line in lines[1:]:
         if line.key in ("begin", "end") and len(line.words) == 1:
             continue

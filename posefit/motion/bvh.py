@@ -22,7 +22,7 @@ from posefit.geometry.skeleton import ENDS, JOINTS, PARENTS
 from posefit.geometry.units import METRES, UNIT_NAMES, UNITS, Unit, metres_of, unit_of
 from posefit.motion.amc import SIZE_LIMIT, VALUES
 from posefit.motion.joint_names import joints_of
-from posefit.motion.lines import LARGEST, lines_of, mistake, shown, values_of
+from posefit.motion.lines import LARGEST, Line, lines_of
 from posefit.motion.motion import LONGEST, Motion
 from posefit.motion.rig import STANDING, Retargeted, Rig, retargeted, upward
 from posefit.reading import check_size, cut, quoted
@@ -53,7 +53,6 @@ NAMES = {
 }
 ROTATIONS = "Zrotation Xrotation Yrotation"
 LONGEST_LINE = 100_000  # bytes; a frame of CMU's files has about 1,000
-BOM = b"\xef\xbb\xbf"  # which some editors write first
 NODES = 1_000  # joints and ends of a file
 FRAME_TIMES = (1e-4, 10.0)  # seconds
 WHOLE_RATE = 1e-4  # how far a rate may be from a whole number, as a share: files state 0.0083333 for 1 / 120
@@ -141,28 +140,26 @@ class _Content:
     fps: float
 
 
-Lines = Iterator[tuple[int, bytes, list[bytes]]]  # number, text and words
-
-
 def _parsed(path: Path) -> _Content:
     """Return what a file says. Raises InputError with file and line where it is no BVH file."""
-    texts = ((number, raw.removeprefix(BOM)) for number, raw in lines_of(path, LONGEST_LINE))
-    lines = ((number, raw, words) for number, raw in texts if (words := raw.split()))
-    nodes, width = _hierarchy(path, lines)
-    count, frame_time = _head(path, lines)
-    data, rows, number = array("d"), 0, 1
-    for number, raw, words in lines:
-        if len(words) != width:
-            raise mistake(path, number, f"{width} numbers of frame {rows + 1}", f"{len(words)}")
+    lines = lines_of(path, LONGEST_LINE)
+    nodes, width = _hierarchy(lines)
+    count, frame_time = _head(lines)
+    data, rows = array("d"), 0
+    for line in lines:
+        if not line.words:
+            break
         rows += 1
+        if len(line.words) != width:
+            raise line.mistake(f"{width} numbers of frame {rows}", f"{len(line.words)}")
         if rows > LONGEST or rows * width > VALUES:
-            raise mistake(path, number, f"at most {LONGEST} frames and {VALUES} numbers", "more")
+            raise line.mistake(f"at most {LONGEST} frames and {VALUES} numbers", "more")
         try:
-            data.extend(map(float, words))
+            data.extend(map(float, line.words))
         except ValueError:
-            raise mistake(path, number, f"{width} numbers of frame {rows}", shown(raw)) from None
+            raise line.mistake(f"{width} numbers of frame {rows}") from None
     if not rows or rows != count:
-        raise mistake(path, number, f"{max(count, 1)} frames", f"{rows}")
+        raise line.mistake(f"{max(count, 1)} frames", f"{rows}")
     values = np.array(data).reshape(rows, width)
     if not (np.abs(values) < LARGEST).all():
         raise InputError(f"{path}: expected finite numbers below {LARGEST:g}, got {np.abs(values).max()}")
@@ -170,71 +167,70 @@ def _parsed(path: Path) -> _Content:
     return _Content(nodes, values, float(round(rate)) if abs(rate - round(rate)) < WHOLE_RATE * rate else rate)
 
 
-def _hierarchy(path: Path, lines: Lines) -> tuple[list[_Node], int]:
+def _hierarchy(lines: Iterator[Line]) -> tuple[list[_Node], int]:
     """Return the joints and ends, and how many channels they have, of the lines up to MOTION."""
     nodes: list[_Node] = []
     opened: list[int] = []  # numbers of the nodes whose braces are open
     waiting = False  # for the brace of the last node
-    width, number = 0, 1
-    for number, raw, words in lines:
-        word, brace = words[0].upper(), words[-1] == b"{" and len(words) > 1
+    width = 0
+    while True:
+        line = next(lines)
+        brace = line.words[-1:] == ["{"]
         node = nodes[opened[-1]] if opened else None
-        if word in (b"ROOT", b"JOINT", b"END"):
-            if waiting or (word == b"ROOT") != (node is None) or (node is not None and not node.name):
-                raise mistake(path, number, "a ROOT, with JOINT and End Site inside", shown(raw))
+        if line.key in ("root", "joint", "end"):
+            if waiting or (line.key == "root") != (node is None) or (node is not None and not node.name):
+                raise line.mistake("a ROOT, with JOINT and End Site inside")
             if len(nodes) >= NODES:
-                raise mistake(path, number, f"at most {NODES} joints and ends", "more")
-            rest = b" ".join(words[1:-1] if brace else words[1:]).decode("utf-8", errors="replace")
-            nodes.append(_Node("" if word == b"END" else rest or "unnamed", opened[-1] if opened else -1))
+                raise line.mistake(f"at most {NODES} joints and ends", "more")
+            name = " ".join(line.words[1:-1] if brace else line.words[1:]) or "unnamed"
+            nodes.append(_Node("" if line.key == "end" else name, opened[-1] if opened else -1))
             waiting = True
-        elif word == b"{" and waiting:
-            brace = True
-        elif word == b"}" and node is not None:
+        elif line.key == "}" and node is not None:
             if node.offset is None:
-                raise mistake(path, number, f"an OFFSET of {quoted(node.name)}", "none")
+                raise line.mistake(f"an OFFSET of {quoted(node.name)}", "none")
             opened.pop()
-        elif word == b"OFFSET" and node is not None:
-            node.offset = np.array(values_of(path, number, words, 3))
-        elif word == b"CHANNELS" and node is not None and node.name and not node.channels:
-            node.channels, node.column = _channels(path, number, words, raw), width
+        elif line.key == "offset" and node is not None:
+            node.offset = np.array(line.numbers(3))
+        elif line.key == "channels" and node is not None and node.name and not node.channels:
+            node.channels, node.column = _channels(line), width
             width += len(node.channels)
-        elif word == b"MOTION" and not opened and nodes:
+        elif line.key == "motion" and not opened and nodes:
             return nodes, width
-        elif word != b"HIERARCHY" or nodes:
-            raise mistake(path, number, "HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION", shown(raw))
+        elif not (line.key == "{" and waiting) and (line.key != "hierarchy" or nodes):
+            raise line.mistake("HIERARCHY, ROOT, JOINT, End Site, OFFSET, CHANNELS or MOTION")
         if brace and waiting:
             opened.append(len(nodes) - 1)
             waiting = False
-    raise mistake(path, number, "MOTION after the joints", "the end of the file")
 
 
-def _head(path: Path, lines: Lines) -> tuple[int, float]:
+def _head(lines: Iterator[Line]) -> tuple[int, float]:
     """Return how many frames there are to be, and the seconds of one."""
-    count, number = -1, 1
-    for number, raw, words in lines:
-        if words[0].upper() == b"FRAMES:" and len(words) == 2 and words[1].isdigit() and len(words[1]) < 10:
-            count = int(words[1])
-        elif b" ".join(words[:2]).upper() == b"FRAME TIME:" and count >= 0:
-            (frame_time,) = values_of(path, number, words[1:], 1)
+    count = -1
+    while True:
+        line = next(lines)
+        if line.key == "frames:" and len(line.words) == 2 and line.words[1].isdecimal() and len(line.words[1]) < 10:
+            count = int(line.words[1])
+        elif [word.lower() for word in line.words[:2]] == ["frame", "time:"] and count >= 0:
+            (frame_time,) = line._replace(words=line.words[1:]).numbers(1)
             if not FRAME_TIMES[0] <= frame_time <= FRAME_TIMES[1]:
                 low, high = FRAME_TIMES
-                raise mistake(path, number, f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}")
+                raise line.mistake(f"a frame time of {low:g} to {high:g} s", f"{frame_time:g}")
             return count, frame_time
         else:
-            raise mistake(path, number, "Frames: and Frame Time:", shown(raw))
-    raise mistake(path, number, f"{max(count, 1)} frames", "0")
+            raise line.mistake("Frames: and Frame Time:")
 
 
-def _channels(path: Path, number: int, words: list[bytes], raw: bytes) -> list[tuple[bool, int]]:
+def _channels(line: Line) -> list[tuple[bool, int]]:
     """Return the channels of a joint, in their order."""
     channels = []
-    for word in words[2:]:
-        axis, kind = b"XYZ".find(word[:1].upper()), word[1:].lower()
-        if axis < 0 or kind not in (b"position", b"rotation"):
-            raise mistake(path, number, "channels such as Xposition or Zrotation", shown(raw))
-        channels.append((kind == b"rotation", axis))
-    if len(words) < 2 or words[1] != b"%d" % len(channels) or len(channels) > 6 or len(set(channels)) != len(channels):
-        raise mistake(path, number, "a count of at most 6 channels, and these", shown(raw))
+    for word in line.words[2:]:
+        axis, kind = "XYZ".find(word[:1].upper()), word[1:].lower()
+        if axis < 0 or kind not in ("position", "rotation"):
+            raise line.mistake("channels such as Xposition or Zrotation")
+        channels.append((kind == "rotation", axis))
+    counted = line.words[1:2] == [str(len(channels))] and len(channels) <= 6
+    if not counted or len(set(channels)) != len(channels):
+        raise line.mistake("a count of at most 6 channels, and these")
     return channels
 
 

@@ -54,8 +54,7 @@ class SourceClip:
 def clip_of(source: Source, stated: FileOptions = RECOGNISED) -> SourceClip:
     """Return what gives the motion that a source names at any rate: built-in, recorded, or of an .amc or .bvh file.
 
-    A file is read once, now. Raises InputError where there is
-    no such motion.
+    A file is read once, now. Raises InputError where there is no such motion.
     """
     if source in built_in.names():
         name = str(source)

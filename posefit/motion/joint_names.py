@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-# Of each joint of a side, from the trunk outwards: its names, and those that it has where no other joint has the first.
+# Of each joint of a side, from the trunk outwards: its names, and those that also other joints have.
 _LIMBS: Mapping[str, tuple[set[str], set[str]]] = {
     "thigh": ({"upleg", "upperleg", "thigh", "femur", "uleg", "legupper"}, {"hip"}),
     "shin": ({"leg", "lowleg", "lowerleg", "shin", "shank", "calf", "knee", "tibia", "leglower"}, set()),
@@ -130,33 +130,28 @@ def joints_of(names: Sequence[str], parents: Sequence[int]) -> Joints | list[str
     return Joints(limbs, hips, chest, between, bearing, head)
 
 
-_TWO_IN_A_ROW = {  # where two nodes in a row have names of one joint, they are these joints
-    "shin": ("thigh", "shin"),  # `leg` and below it `knee`
-    "foot": ("foot", "toe"),  # `ankle` and below it `foot`
-    "hand": ("hand", "palm"),  # `wrist` and below it `hand`
-}
+# where two nodes in a row have names of one joint: `leg` and below it `knee`, `ankle` and `foot`, `wrist` and `hand`
+_TWO_IN_A_ROW = {"shin": ("thigh", "shin"), "foot": ("foot", "toe"), "hand": ("hand", "palm")}
 
 
 def _limbs(side: str, parts: Sequence[Part], paths: Sequence[Sequence[int]]) -> dict[str, int]:
-    """Return the joints of a side's arm and leg."""
+    """Return the joints of a side's arm and leg: of nodes with names of one joint, that nearest to the root."""
 
-    def named(names: set[str]) -> list[int]:
+    def nodes_named(names: set[str]) -> list[int]:
+        """Return the nodes whose names have the fewest other words, from the root outwards."""
         nodes = [node for node, part in enumerate(parts) if part.side == side and part.part in names]
         fewest = min((parts[node].others for node in nodes), default=0)
         return sorted((node for node in nodes if parts[node].others == fewest), key=lambda node: len(paths[node]))
 
-    nodes = {joint: named(first) for joint, (first, _) in _LIMBS.items()}
-    others = {joint: named(second) for joint, (_, second) in _LIMBS.items()}
-    nodes["thigh"] = nodes["thigh"] or others["thigh"]
-    if not nodes["arm"]:
-        nodes["arm"] = others["arm"]
-    elif not nodes["clavicle"]:
-        nodes["clavicle"] = others["clavicle"]
+    nodes = {joint: nodes_named(names) for joint, (names, _) in _LIMBS.items()}
+    for joint in ("thigh", "arm", "clavicle"):  # `shoulder` is the arm; with an `upperarm` below, it is the clavicle
+        if not nodes[joint] and not (joint == "clavicle" and nodes["arm"] == nodes_named({"shoulder"})):
+            nodes[joint] = nodes_named(_LIMBS[joint][1])
     for joint, (above, below) in _TWO_IN_A_ROW.items():
         absent, two = below if joint == above else above, nodes[joint]
         if not nodes[absent] and len(two) > 1 and two[0] in paths[two[1]]:
-            nodes[above], nodes[below] = [two[0]], [two[1]]
-    return {joint: each[0] for joint, each in nodes.items() if each}
+            nodes[above], nodes[below] = two[:1], two[1:]
+    return {joint: named[0] for joint, named in nodes.items() if named}
 
 
 def _common(paths: Sequence[Sequence[int]], nodes: Sequence[int]) -> int | None:

@@ -3,42 +3,62 @@
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 from posefit.errors import InputError
 from posefit.reading import SHOWN, cut
 
 LARGEST = 1e6  # no angle or length of a person comes near; beyond it arithmetic would overflow
+BOM = b"\xef\xbb\xbf"  # which some editors write first
 
 
-def mistake(path: Path, line: int, expected: str, got: str) -> InputError:
-    """Return the error of a file's line; what came is quoted, and cut where it is long."""
-    return InputError(f"{path}:{line}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
+class Line(NamedTuple):
+    """One line of a file, as words; that after the last one has none."""
+
+    path: Path
+    number: int
+    words: Sequence[str]
+
+    @property
+    def key(self) -> str:
+        """The first word in small letters, "" after the last line."""
+        return self.words[0].lower() if self.words else ""
+
+    def mistake(self, expected: str, got: str | None = None) -> InputError:
+        """Return the error of this line; what came is all of it where it is not stated."""
+        if got is None:
+            got = quoted_words(self.words) if self.words else "the end of the file"
+        return InputError(f"{self.path}:{self.number}: expected {cut(expected, 2 * SHOWN)}, got {cut(got)}")
+
+    def numbers(self, count: int) -> list[float]:
+        """Return the numbers after the first word. Raises InputError where they are not so many small ones."""
+        first, words = quoted_words(self.words[:1]), self.words[1:]
+        if len(words) != count:
+            raise self.mistake(f"{count} values for {first}", f"{len(words)}")
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            raise self.mistake(f"numbers for {first}", quoted_words(words)) from None
+        if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
+            raise self.mistake(f"finite numbers below {LARGEST:g} for {first}", quoted_words(words))
+        return values
 
 
-def lines_of(path: Path, longest: int) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines of a file with their numbers from 1. Raises ValueError for one of more than `longest` bytes."""
+def lines_of(path: Path, longest: int) -> Iterator[Line]:
+    """Yield the lines of a file that have words, and the one after the last: no file is without a line.
+
+    Raises InputError for a line of more than `longest` bytes.
+    """
+    number = 0
     with path.open("rb") as file:
-        for number, line in enumerate(iter(partial(file.readline, longest + 1), b""), 1):
-            if len(line) > longest:
-                raise mistake(path, number, f"a line of at most {longest} bytes", "a longer one")
-            yield number, line
+        for number, raw in enumerate(iter(partial(file.readline, longest + 1), b""), 1):
+            if len(raw) > longest:
+                raise Line(path, number, ()).mistake(f"a line of at most {longest} bytes", "a longer one")
+            if words := raw.removeprefix(BOM).decode("utf-8", errors="replace").split():
+                yield Line(path, number, words)
+    yield Line(path, max(number, 1), ())
 
 
-def shown(*words: bytes | str) -> str:
+def quoted_words(words: Sequence[str]) -> str:
     """Return words of a file as a message quotes them."""
-    texts = (word if isinstance(word, str) else word[: 4 * SHOWN].decode("utf-8", errors="replace") for word in words)
-    return repr(cut(" ".join(texts).strip()))
-
-
-def values_of(path: Path, number: int, words: Sequence[Any], count: int) -> list[float]:
-    """Return the numbers of a line after its first word. Raises ValueError where they are not so many small ones."""
-    if len(words) != count + 1:
-        raise mistake(path, number, f"{count} values for {shown(words[0])}", f"{len(words) - 1}")
-    try:
-        values = [float(word) for word in words[1:]]
-    except ValueError:
-        raise mistake(path, number, f"numbers for {shown(words[0])}", shown(*words[1:])) from None
-    if not sum(map(abs, values)) < LARGEST:  # this way round it is true of NaN, too
-        raise mistake(path, number, f"finite numbers below {LARGEST:g} for {shown(words[0])}", shown(*words[1:]))
-    return values
+    return repr(cut(" ".join(words)))

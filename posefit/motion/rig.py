@@ -9,7 +9,7 @@ off the frame that is most like it, each bone turned the shortest way from the o
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -125,77 +125,102 @@ class _Bone:
         return cls(node, *((1.0 - share) * first + share * last for first, last in ends))
 
 
+class _Rest(NamedTuple):
+    """The pose of a rig that stands for CMU's rest."""
+
+    own: bool  # whether it is the rig's own
+    turns: Array  # (nodes, 3, 3)
+    places: Array  # (nodes, 3)
+    root: Array  # (3, 3) left, up and ahead, in the root's node
+
+    def end_of(self, rig: Rig, bone: _Bone) -> Array | None:
+        """Return where a bone ends in this pose."""
+        if bone.rest is None:
+            return None
+        carried = rig.rest[0][bone.node].T @ (bone.rest - rig.rest[1][bone.node])
+        return np.asarray(self.places[bone.node] + self.turns[bone.node] @ carried)
+
+
 def retargeted(rig: Rig, up: Array) -> Retargeted:
     """Return a rig's motion of a skeleton with its bones; `up` (3, 3) turns the world so that y is up.
 
     Raises InputError where the rig's legs have no length.
     """
-    average = average_skeleton()
+    average, hips = average_skeleton(), rig.joints.hips
     turns, places = up @ rig.moving[0], rig.moving[1] @ up.T
     rig = replace(rig, moving=(turns, places))
-    legs = [rig.length(side) for side in ("left", "right")]
-    mine = average.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum()
-    scale = float(np.mean(legs)) / float(mine)
+    leg = average.lengths[[BONES.index("lfemur"), BONES.index("ltibia")]].sum()
+    scale = float(np.mean([rig.length(side) for side in ("left", "right")])) / float(leg)
     if not scale > 0.0:
         raise InputError("legs with a length, got some without")
     bones = _bones(rig, scale)
-    hips = rig.joints.hips
-    own, rest_turns, rest_places, root = _like_rest(rig, bones)
-    frame = rest_turns[hips] @ root  # the root's, where its angles are 0
+    rest = _like_rest(rig, bones)
+    turned, directions, lengths = _bones_at_rest(rig, bones, rest, scale)
     count = places.shape[1]
-    skeleton_offsets = np.zeros((len(BONES), 3))
-    turned = np.tile(np.eye(3), (len(JOINTS), 1, 1))  # of each bone: from CMU's rest to the rig's
-    world = np.empty((len(JOINTS), count, 3, 3))
-    at = np.empty((len(JOINTS), count, 3))
-    rest_at = np.zeros((len(JOINTS), 3))
-    world[0], at[0], rest_at[0] = turns[hips] @ root, places[hips], rest_places[hips]
-    poses = np.zeros((count, ANGLES))
+    offsets, poses = np.zeros((len(BONES), 3)), np.zeros((count, ANGLES))
+    world, at = np.empty((len(JOINTS), count, 3, 3)), np.empty((len(JOINTS), count, 3))
+    world[0], at[0] = turns[hips] @ rest.root, places[hips]
     poses[:, :3] = root_angles_from_rotation(world[0])
-    for joint in range(1, len(JOINTS)):
-        name, bone, above = BONES[joint - 1], bones[joint - 1], PARENTS[joint]
-        expected = scale * average.offsets[joint - 1]
-        rest_end = _rest_end(rig, bone, rest_turns, rest_places)
-        before = turned[above]
-        vector = expected if rest_end is None else before.T @ frame.T @ (rest_end - rest_at[above])
-        rest_at[joint] = rest_at[above] + frame @ before @ vector if rest_end is None else rest_end
-        length = float(np.linalg.norm(vector))
+    for joint, bone in enumerate(bones, 1):
+        above, direction, length = PARENTS[joint], directions[joint - 1], lengths[joint - 1]
         if joint in ENDS:
-            begin, carrying = bones[above - 1].rest, bones[above - 1].node
-            if bone.rest is not None and begin is not None:  # without the end's own turn
-                vector = before.T @ frame.T @ rest_turns[carrying] @ rig.rest[0][carrying].T @ (bone.rest - begin)
-            skeleton_offsets[joint - 1] = vector
             world[joint] = world[above]
-            at[joint] = at[above] + world[above] @ vector
+        else:
+            carrier = turns[bone.node] @ (rest.turns[bone.node].T @ rest.turns[hips] @ rest.root @ turned[joint])
+            if bone.at is not None and length > 0.0:
+                length = _aim(carrier, direction, length, bone.at - at[above], 1e-7 * scale)
+            world[joint] = carrier
+            axes, start = average.axes[joint - 1], angle_index(joint)
+            local = np.swapaxes(world[above], -1, -2) @ carrier
+            poses[:, start : start + 3] = joint_angles_from_rotation(axes.T @ local @ axes)
+        offsets[joint - 1] = direction * length if length else np.zeros(3)
+        at[joint] = at[above] + world[joint] @ offsets[joint - 1]
+    skeleton = _skeleton(offsets, poses, average)
+    ends = [(bone.at, at[joint]) for joint, bone in enumerate(bones, 1) if bone.at is not None and joint not in ENDS]
+    missed = max((float(np.linalg.norm(end - place, axis=1).max()) for end, place in ends), default=0.0)
+    filled = [BONES[k] for k, bone in enumerate(bones) if bone.at is None]
+    return Retargeted(skeleton, unwrapped(np.where(skeleton.free, poses, 0.0)), places[hips], filled, missed)
+
+
+def _bones_at_rest(rig: Rig, bones: Sequence[_Bone], rest: _Rest, scale: float) -> tuple[Array, Array, Array]:
+    """Return how joints turn (27, 3, 3) from CMU's rest to the rig's, and bones' directions (26, 3) and lengths (26,).
+
+    A bone that the rig lacks is an average person's, `scale` times as long.
+    """
+    frame = rest.turns[rig.joints.hips] @ rest.root  # the root's, where its angles are 0
+    turned, at = np.tile(np.eye(3), (len(JOINTS), 1, 1)), np.zeros((len(JOINTS), 3))
+    directions, lengths = np.zeros((len(BONES), 3)), np.ones(len(BONES))
+    at[0] = rest.places[rig.joints.hips]
+    for joint, (name, bone) in enumerate(zip(BONES, bones, strict=True), 1):
+        above, expected = PARENTS[joint], scale * average_skeleton().offsets[joint - 1]
+        before, end = turned[above], rest.end_of(rig, bone)
+        vector = expected if end is None else before.T @ frame.T @ (end - at[above])
+        at[joint] = at[above] + frame @ before @ vector if end is None else end
+        if joint in ENDS:
+            begin, node = bones[above - 1].rest, bones[above - 1].node
+            if bone.rest is not None and begin is not None:  # without the end's own turn
+                vector = before.T @ frame.T @ rest.turns[node] @ rig.rest[0][node].T @ (bone.rest - begin)
+            directions[joint - 1] = vector
             continue
+        length = float(np.linalg.norm(vector))
         off = np.degrees(geodesic(np.eye(3), shortest_turn(expected, vector))) if length > 0.0 else 0.0
         aligned = off > (SAME_DIRECTION if name[1:] in _STEADY else AS_IN_FILE)
         aligned = aligned and not name.endswith("hipjoint")  # which does not turn
         turned[joint] = before @ shortest_turn(expected, vector) if aligned else before
-        if not own and name[1:] in _HINGES:
-            turned[joint] = turned[joint] @ _twist(rig, name, bone, turned[joint].T @ frame.T @ rest_turns[bone.node])
+        if not rest.own and name[1:] in _HINGES:
+            turned[joint] = turned[joint] @ _twist(rig, name, bone, turned[joint].T @ frame.T @ rest.turns[bone.node])
         direction = expected if aligned or not length else vector
-        direction = direction / np.linalg.norm(direction)
-        carrier = turns[bone.node] @ (rest_turns[bone.node].T @ frame @ turned[joint])
-        if bone.at is not None and length > 0.0:
-            reach = bone.at - at[above]
-            distances = np.linalg.norm(reach, axis=1)
-            length = length if np.abs(distances - length).max() < 1e-7 * scale else float(distances.mean())
-            pointing = carrier @ direction
-            off_by = np.linalg.norm(reach - pointing * distances[:, None], axis=1)
-            aim = np.flatnonzero(off_by > 1e-7 * scale)
-            carrier[aim] = shortest_turn(pointing[aim], reach[aim]) @ carrier[aim]
-        skeleton_offsets[joint - 1] = direction * length if length else np.zeros(3)
-        world[joint] = carrier
-        at[joint] = at[above] + carrier @ skeleton_offsets[joint - 1]
-        start = angle_index(joint)
-        local = np.swapaxes(world[above], -1, -2) @ carrier
-        axes = average.axes[joint - 1]
-        poses[:, start : start + 3] = joint_angles_from_rotation(axes.T @ local @ axes)
-    skeleton = _skeleton(skeleton_offsets, poses, average)
-    ends = [(bone, joint) for joint, bone in enumerate(bones, 1) if bone.at is not None and joint not in ENDS]
-    missed = max((float(np.linalg.norm(bone.at - at[joint], axis=1).max()) for bone, joint in ends), default=0.0)  # type: ignore[operator]
-    filled = [BONES[k] for k, bone in enumerate(bones) if bone.at is None]
-    return Retargeted(skeleton, unwrapped(np.where(skeleton.free, poses, 0.0)), places[hips], filled, missed)
+        directions[joint - 1], lengths[joint - 1] = direction / np.linalg.norm(direction), length
+    return turned, directions, lengths
+
+
+def _aim(carrier: Array, direction: Array, length: float, reach: Array, near: float) -> float:
+    """Turn a carrier (T, 3, 3) so that a direction (3,) in it points along `reach` (T, 3); return the bone's length."""
+    distances = np.linalg.norm(reach, axis=1)
+    pointing = carrier @ direction
+    aim = np.flatnonzero(np.linalg.norm(reach - pointing * distances[:, None], axis=1) > near)
+    carrier[aim] = shortest_turn(pointing[aim], reach[aim]) @ carrier[aim]
+    return length if np.abs(distances - length).max() < near else float(distances.mean())
 
 
 def _twist(rig: Rig, name: str, bone: _Bone, frame: Array) -> Array:
@@ -304,60 +329,37 @@ def _spine(rig: Rig, chest: _Bone) -> dict[str, _Bone]:
     return dict(zip(("lowerback", "upperback", "thorax"), [*chain, chest], strict=True))
 
 
-def _rest_end(rig: Rig, bone: _Bone, turns: Array, places: Array) -> Array | None:
-    """Return where a bone ends in a pose of rest with these turns and places of nodes."""
-    if bone.rest is None:
-        return None
-    carried = rig.rest[0][bone.node].T @ (bone.rest - rig.rest[1][bone.node])
-    return np.asarray(places[bone.node] + turns[bone.node] @ carried)
-
-
-def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> tuple[bool, Array, Array, Array]:
-    """Return the pose that stands for CMU's rest, turns and places of all nodes, and the axes (3, 3) of the root in it.
-
-    The columns of these are left, up and ahead in the root's node. First comes whether it is the rig's own rest.
-    """
+def _like_rest(rig: Rig, bones: Sequence[_Bone]) -> _Rest:
+    """Return the pose that stands for CMU's rest: the rig's own where its legs hang down, or the frame most like it."""
     chest, hips = bones[BONES.index("thorax")], rig.joints.hips
     thighs = [rig.joints.limbs[side, "thigh"] for side in ("left", "right")]
-    poses = [rig.rest]
-    count = rig.moving[0].shape[1]
-    step = max(1, count // POSES)
-    poses += [(rig.moving[0][:, k], rig.moving[1][:, k]) for k in range(0, count, step)]
     average = average_skeleton()
-    legs, arms = (
-        [(side, *part) for side in ("left", "right") for part in parts]
-        for parts in (
-            (("thigh", "shin", "femur"), ("shin", "foot", "tibia")),
-            (("arm", "forearm", "humerus"), ("forearm", "hand", "radius")),
-        )
-    )
 
-    def frame_of(turns: Array, places: Array) -> Array:
-        end = _rest_end(rig, chest, turns, places)
+    def pose(own: bool, turns: Array, places: Array) -> _Rest:
+        end = _Rest(own, turns, places, np.eye(3)).end_of(rig, chest)
         local = turns[hips].T
         above = (places[hips] if end is None else end) - places[thighs].mean(axis=0)
-        return _squared(local @ (places[thighs[0]] - places[thighs[1]]), local @ above)
+        return _Rest(own, turns, places, _squared(local @ (places[thighs[0]] - places[thighs[1]]), local @ above))
 
-    def angles(turns: Array, places: Array, root: Array, parts: Sequence[tuple[str, str, str, str]]) -> Array:
-        frame = turns[hips] @ root
-        off = []
-        for side, start, stop, kind in parts:
-            first, last = (places[rig.joints.limbs[side, joint]] for joint in (start, stop))
-            expected = average.offsets[BONES.index(f"{side[0]}{kind}")]
-            off.append(geodesic(np.eye(3), shortest_turn(expected, frame.T @ (last - first))))
+    def degrees_off(pose: _Rest, parts: Sequence[tuple[str, str, str]]) -> Array:
+        frame, off = pose.turns[hips] @ pose.root, []
+        for side in ("left", "right"):
+            for start, stop, kind in parts:
+                first, last = (pose.places[rig.joints.limbs[side, joint]] for joint in (start, stop))
+                expected = average.offsets[BONES.index(f"{side[0]}{kind}")]
+                off.append(geodesic(np.eye(3), shortest_turn(expected, frame.T @ (last - first))))
         return np.degrees(np.array(off))
 
-    best, best_off = 0, np.inf
-    root = frame_of(*rig.rest)
-    legs_off = angles(*rig.rest, root, legs)
-    if legs_off.max() <= UPRIGHT:
-        return True, *rig.rest, root
-    for k, pose in enumerate(poses):
-        frame = frame_of(*pose)
-        off = float((angles(*pose, frame, legs) ** 2).sum() + (0.5 * angles(*pose, frame, arms) ** 2).sum())
-        if off < best_off:
-            best, best_off = k, off
-    return best == 0, *poses[best], frame_of(*poses[best])
+    legs = (("thigh", "shin", "femur"), ("shin", "foot", "tibia"))
+    arms = (("arm", "forearm", "humerus"), ("forearm", "hand", "radius"))
+    own = pose(True, *rig.rest)
+    if degrees_off(own, legs).max() <= UPRIGHT:
+        return own
+    count = rig.moving[0].shape[1]
+    frames = range(0, count, max(1, count // POSES))
+    poses = [own, *(pose(False, rig.moving[0][:, k], rig.moving[1][:, k]) for k in frames)]
+    off = [(degrees_off(each, legs) ** 2).sum() + (0.5 * degrees_off(each, arms) ** 2).sum() for each in poses]
+    return poses[int(np.argmin(off))]
 
 
 def _squared(left: Array, above: Array) -> Array:

@@ -2,7 +2,8 @@
 
 | looking for | file |
 |---|---|
-| the folder that appears whole, and goes on where it ended; whether two tracks are the same | folder.py, identity.py |
+| the folder that appears whole | folder.py |
+| what a track goes on from that ended too early; whether two tracks are the same | record.py, identity.py |
 | every file, a line a format; what they are made of | files.py, content.py |
 | pictures: overlay.mp4 and summary.png | picture.py, drawing.py |
 | the page, track.html | page/ |

@@ -1,7 +1,7 @@
 """What the files of a track are made of, and its page."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from posefit.arrays import Array
 from posefit.evaluation.errors import Table, unseen
+from posefit.evaluation.measures import Measures
+from posefit.evaluation.trust import Trust
 from posefit.fitting.tracker import Frame
 from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import ANGLES, JOINTS
@@ -16,6 +18,50 @@ from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
 from posefit.uncertainty.calibration import LEVELS
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
+from posefit.version import __version__
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What was tracked, and how."""
+
+    motion: str
+    source: list[str] | None = None  # one a camera
+    frames_chosen: list[int | None] | None = None
+    view_degrees: Any = None
+    method: str
+    settings: Mapping[str, Mapping[str, Any]]
+    seed: int
+    train: list[str]
+    evaluations_per_frame: int
+    dimensions: int | None
+    translation: str
+    first_pose: str
+    smooth: bool
+    views: int
+    camera: str
+    size_pixels: tuple[int, int]
+    fps: float
+    frames: int
+    version: str = __version__
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackingLog:
+    """How the track went, and what it leaves open."""
+
+    hypotheses: list[dict[str, Any]]
+    build: Mapping[str, Any] | None
+    trace: list[list[float]] | None
+    modes: list[float] | None
+    none_of_modes: float | None
+    unknown_sides: list[int] | None
+    lost_frames: list[int] | None
+    relocalised: list[int]
+    retracked_outside: tuple[int, int] | None
+    backwards_share: float
+    warnings: list[str]
+    guesses: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +72,17 @@ class Content:
     frames: Sequence[Frame]
     table: Table
     gait: Gait
-    summary: dict[str, Any]
+    setup: Setup
+    measures: Measures
+    log: TrackingLog
+    trust: Trust | None
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Everything but the frames, as summary.json holds it."""
+        trust, gait = None if self.trust is None else asdict(self.trust), self.gait.as_dict()
+        values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.log), "trust": trust, "gait": gait}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @cached_property
     def motion(self) -> Motion:

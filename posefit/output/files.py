@@ -1,8 +1,8 @@
-"""The files of a track: a format is a line of `FORMATS`, beside the pictures, which are made frame by frame."""
+"""The files of a track: a format is a line of `write_files`, beside the pictures, which are made frame by frame."""
 
 import csv
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -60,30 +60,31 @@ def _write_table(path: Path, content: Content) -> None:
             writer.writerow([*cells, frame.activity, *places])
 
 
-FORMATS: dict[str, Callable[[Path, Content], Any]] = {
-    "poses.npz": _write_npz,
-    "skeleton.asf": lambda path, content: write_asf(path, content.motion.skeleton),
-    "track.amc": lambda path, content: write_amc(path, content.motion),
-    "track.bvh": lambda path, content: write_bvh(path, content.motion),
-    "track.glb": lambda path, content: write_glb(path, content.motion, content.scene.body.radii),
-    "track.trc": lambda path, content: write_trc(path, content.motion, content.blank),
-    "track.c3d": lambda path, content: write_c3d(path, content.motion, content.blank, content.gait),
-    "track.mot": lambda path, content: write_mot(path, content.motion),
-    "model.osim": lambda path, content: write_osim(path, content.scene.body, PLACES),
-    "frames.csv": _write_table,
-    "angles.csv": lambda path, content: write_angles(path, content.motion, content.blank),
-    "gait.csv": lambda path, content: write_gait(path, content.gait),
-    "camera.json": lambda path, content: path.write_text(content.scene.cameras[0].to_json(), encoding="utf-8"),
-    "summary.json": lambda path, content: path.write_text(json.dumps(content.summary, indent=1) + "\n", "utf-8"),
-}
-FILES = (*FORMATS, "overlay.mp4", "summary.png", "track.html")
+FILES = (
+    "poses.npz", "skeleton.asf", "track.amc", "track.bvh", "track.glb", "track.trc", "track.c3d", "track.mot",
+    "model.osim", "frames.csv", "angles.csv", "gait.csv", "camera.json", "summary.json",
+    "overlay.mp4", "summary.png", "track.html",
+)  # fmt: skip
 
 
 def write_files(folder: Path, content: Content) -> None:
     """Write all `FILES` of a track to a folder."""
-    scene, table, summary = content.scene, content.table, content.summary
-    for name, write in FORMATS.items():
-        write(folder / name, content)
+    scene, table = content.scene, content.table
+    motion, blank = content.motion, content.blank
+    _write_npz(folder / "poses.npz", content)
+    write_asf(folder / "skeleton.asf", motion.skeleton)
+    write_amc(folder / "track.amc", motion)
+    write_bvh(folder / "track.bvh", motion)
+    write_glb(folder / "track.glb", motion, scene.body.radii)
+    write_trc(folder / "track.trc", motion, blank)
+    write_c3d(folder / "track.c3d", motion, blank, content.gait)
+    write_mot(folder / "track.mot", motion)
+    write_osim(folder / "model.osim", scene.body, PLACES)
+    _write_table(folder / "frames.csv", content)
+    write_angles(folder / "angles.csv", motion, blank)
+    write_gait(folder / "gait.csv", content.gait)
+    (folder / "camera.json").write_text(scene.cameras[0].to_json(), encoding="utf-8")
+    (folder / "summary.json").write_text(json.dumps(content.summary, indent=1) + "\n", encoding="utf-8")
     stills, painter = Stills(scene), Painter(scene, table["usable"] == 1.0)
     writer: VideoWriter | None = None
     radii = content.intervals.get("joint_radii", repeat(None))
@@ -97,7 +98,7 @@ def write_files(folder: Path, content: Content) -> None:
         writer.write(image)
     assert writer is not None
     writer.close()
-    notes = ("" if summary["trust"] is None else summary["trust"]["sentence"], undetermined(summary))
+    notes = ("" if content.trust is None else content.trust.sentence, undetermined(content))
     if not cv2.imwrite(opencv_name(folder / "summary.png"), painter.summary(table, [*filter(None, notes)])):
         raise OSError("no room for summary.png")
     page = track_document(track_data(content, stills))

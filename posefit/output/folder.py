@@ -4,14 +4,10 @@ Until it is whole it stands beside its place, hidden, with every frame that was 
 early, because a disk is full or it is stopped, those frames are kept, and the same track can go on from them.
 """
 
-import json
 import os
-import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
-
-import numpy as np
 
 from posefit.errors import InputError
 from posefit.files import MARK, Unfinished, opencv_name, other_entries
@@ -19,8 +15,8 @@ from posefit.fitting.tracker import Frame
 from posefit.output.content import Content
 from posefit.output.files import FILES, write_files
 from posefit.output.identity import Digest, difference
+from posefit.output.record import append_frame, read_frames
 from posefit.reading import cut, parsed_json, read_text
-from posefit.uncertainty.modes import Posterior
 
 _RECORD = "frames.jsonl"
 SUMMARY, MAX_SUMMARY_BYTES = "summary.json", 10_000_000
@@ -106,7 +102,7 @@ class OutputFolder(Recorder):
 
     def earlier(self) -> tuple[list[Frame], dict[str, Any] | None]:
         """Return the frames that were recorded before, and the state of the random generator after them."""
-        frames, state, damage = _read_record(self.building / _RECORD)
+        frames, state, damage = read_frames(self.building / _RECORD)
         if damage:
             self._say(f"warning: {damage}; tracked again from there")
         self._recorded = len(frames)
@@ -114,11 +110,7 @@ class OutputFolder(Recorder):
 
     def record(self, frame: Frame, state: dict[str, Any]) -> None:
         """Record a frame, and the state of the random generator after it."""
-        posterior = None if frame.posterior is None else frame.posterior.as_dict()
-        row = {**vars(frame), "posterior": posterior, "state": state}
-        text = json.dumps(row, default=_encoded).encode()
-        with (self.building / _RECORD).open("ab") as file:
-            file.write(b"%08x %s\n" % (zlib.crc32(text), text))
+        append_frame(self.building / _RECORD, frame, state)
         self._recorded += 1
 
     def finish(self, content: Content) -> None:
@@ -159,28 +151,6 @@ def _interrupted(path: Path, spec: Mapping[str, Digest]) -> Unfinished:
     return place
 
 
-def _read_record(path: Path) -> tuple[list[Frame], dict[str, Any] | None, str]:
-    """Return the frames that a file records, the random generator's state after them, and where the file is damaged.
-
-    From there on it is cut off; a line that was being written when the track ended is no damage.
-    """
-    frames, whole_lines = list[Frame](), list[bytes]()
-    state, damage = None, ""
-    recorded = path.read_bytes() if path.is_file() and not path.is_symlink() else b""
-    for number, line in enumerate(recorded.splitlines(keepends=True), 1):
-        try:
-            frame, state = _frame_of(line)
-        except Exception as error:  # whatever a damaged line raises
-            if line.endswith(b"\n"):
-                damage = f"{path} line {number}: expected a frame, got {cut(' '.join(str(error).split()))}"
-            break
-        frames.append(frame)
-        whole_lines.append(line)
-    if (whole := b"".join(whole_lines)) != recorded:
-        path.write_bytes(whole)
-    return frames, state, damage
-
-
 def _unmarked(folder: Path) -> list[str]:
     """Return the files of a folder whose summary is not one of a track: somebody else's."""
     names = sorted(entry.name for entry in folder.iterdir())
@@ -190,27 +160,3 @@ def _unmarked(folder: Path) -> list[str]:
         return names
     marked = isinstance(summary, dict) and {"version", "method", "evaluations", "trust"} <= summary.keys()
     return [] if marked else names
-
-
-def _encoded(value: Any) -> Any:
-    """Return what JSON holds of a frame's values: arrays with their type, else what it prints as."""
-    if isinstance(value, np.ndarray | np.generic):
-        return {"dtype": str(value.dtype), "values": value.tolist()}
-    return dict(value) if isinstance(value, Mapping) else str(value)
-
-
-def _decoded(mapping: dict[str, Any]) -> Any:
-    if mapping.keys() == {"dtype", "values"}:
-        return np.array(mapping["values"], dtype=mapping["dtype"])
-    return mapping
-
-
-def _frame_of(line: bytes) -> tuple[Frame, dict[str, Any]]:
-    """Return a recorded frame, and the state of the random generator after it. Raises an error where it is damaged."""
-    checksum, _, text = line.rstrip(b"\n").partition(b" ")
-    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
-        raise InputError("a damaged one")
-    row = json.loads(text, object_hook=_decoded)
-    state, posterior = row.pop("state"), row.pop("posterior")
-    np.random.default_rng(0).bit_generator.state = state  # raises where it is none
-    return Frame(**row, posterior=None if posterior is None else Posterior.from_dict(posterior)), state

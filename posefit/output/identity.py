@@ -55,8 +55,8 @@ def _plain(value: Any, files: bool) -> Any:
         return ["named", getattr(value, "__module__", ""), getattr(value, "__qualname__", kind)]
     if is_dataclass(value):
         return [kind, [[field.name, same(getattr(value, field.name))] for field in fields(value)]]
-    held = getattr(value, "__dict__", None)
-    return [kind, same(held) if held is not None else repr(value)]
+    attributes = getattr(value, "__dict__", None)
+    return [kind, same(attributes) if attributes is not None else repr(value)]
 
 
 def _content(path: Path) -> Any:

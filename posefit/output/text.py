@@ -1,11 +1,13 @@
 """The table a track prints: the method beside trivial ones, what was not determined, and the budget."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from posefit.errors import printable
-from posefit.evaluation.measures import BASELINES, MEASURES
+from posefit.evaluation.measures import BASELINES, MEASURES, Measures
 from posefit.evaluation.trust import trust_line
+from posefit.output.content import Content
 from posefit.reading import counted
 
 MIN_BUILD_CHANGE = 0.05  # a part of the build that is off the average by less is not worth a word
@@ -19,46 +21,41 @@ GAIT_ROWS = (  # of a foot: names, labels, units, factors and digits
 MAX_NAMED = 8  # motions that were learned from, and are named
 
 
-def brief(summary: Mapping[str, Any]) -> list[str]:
+def brief(track: Content) -> list[str]:
     """Return in lines what a track is worth, which poses a single frame leaves open, and what it took."""
-    trust = summary["trust"]
-    if trust is None:
-        error = MEASURES["error_degrees"].shown(summary["error_degrees"]["mean"])
-        worth = f"{_shown(summary, 'mpjpe_mm')}, {error}, {_shown(summary, 'lost_rate')} of frames"
-    else:
-        worth = trust["sentence"]
-    guessed = ", camera guessed" if summary["camera"] == "guessed" else ""
-    frames = counted(summary["frames"], "frame")
-    work = f"{summary['motion']}: {frames} by {summary['method']}{guessed}, {_effort(summary)}"
-    open_poses = sum(weight >= MIN_MODE for weight in summary["modes"] or [])
-    modes = [f"one silhouette leaves {open_poses} poses open"] if summary["frames"] == 1 and open_poses > 1 else []
+    setup, measures = track.setup, track.measures
+    worth = track.trust.sentence if track.trust is not None else _worth(measures)
+    guessed = ", camera guessed" if setup.camera == "guessed" else ""
+    work = f"{setup.motion}: {counted(setup.frames, 'frame')} by {setup.method}{guessed}, {_effort(track)}"
+    open_poses = sum(weight >= MIN_MODE for weight in track.log.modes or [])
+    modes = [f"one silhouette leaves {open_poses} poses open"] if setup.frames == 1 and open_poses > 1 else []
     return [printable(line) for line in (worth, *modes, work)]
 
 
-def table(summary: Mapping[str, Any]) -> str:
+def table(track: Content) -> str:
     """Return the lines that `posefit track --verbose` prints."""
-    trust = summary["trust"]
-    lines = [] if trust is None else [trust["sentence"], trust_line(trust)]
-    names = summary["train"]
+    setup, measures, log = track.setup, track.measures, track.log
+    lines = [] if track.trust is None else [track.trust.sentence, trust_line(asdict(track.trust))]
+    names = setup.train
     training = ", ".join(names) if len(names) <= MAX_NAMED else f"{len(names)} clips, {names[0]} to {names[-1]}"
     lines.append(
-        f"{summary['motion']}: {counted(summary['frames'], 'frame')}, {summary['method']}, seed {summary['seed']}, "
-        f"translation {summary['translation']}, trained on {training}"
+        f"{setup.motion}: {counted(setup.frames, 'frame')}, {setup.method}, seed {setup.seed}, "
+        f"translation {setup.translation}, trained on {training}"
     )
-    if (error := summary["error_degrees"]) is not None:
+    if measures.error_degrees is not None:
         lines.append(f"{'':{WIDTH}} {'error deg':>9} {'skill':>7}")
-        lines.append(f"{summary['method']:{WIDTH}} {error['mean']:9.2f}")
-        for name, baseline in summary["baselines_degrees"].items():
-            skill = MEASURES["skill"].number(summary["skill"][name])  # a dash where the baseline has no error at all
+        lines.append(f"{setup.method:{WIDTH}} {measures.error_degrees.mean:9.2f}")
+        for name, baseline in (measures.baselines_degrees or {}).items():
+            skill = MEASURES["skill"].number((measures.skill or {})[name])  # a dash where a baseline has no error
             lines.append(f"{BASELINES[name]:{WIDTH}} {baseline:9.2f} {skill:>7}")
-        if summary["prior_floor_degrees"] is not None:  # a tracker of its own may have no prior
-            projected = MEASURES["prior_floor_degrees"]
-            lines.append(f"{projected.label:{WIDTH}} {projected.number(summary[projected.name]):>9}")
-        shown = (_shown(summary, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
+        if measures.prior_floor_degrees is not None:  # a tracker of its own may have no prior
+            floor = MEASURES["prior_floor_degrees"]
+            lines.append(f"{floor.label:{WIDTH}} {floor.number(measures.prior_floor_degrees):>9}")
+        shown = (_shown(measures, name) for name in ("mpjpe_mm", "pa_mpjpe_mm", "swap_rate", "lost_rate"))
         lines.append(f"{', '.join(shown)} of frames")
-    lines += filter(None, [held_frames(summary), undetermined(summary)])
-    lines += [gait_line(summary["gait"])] if summary["frames"] > 1 else []
-    if (build := summary["build"]) is not None:
+    lines += filter(None, [held_frames(track), undetermined(track)])
+    lines += [gait_line(track.gait.as_dict())] if setup.frames > 1 else []
+    if (build := log.build) is not None:
         parts = [
             f"{name} {factor:.2f} +- {build['spread'][name]:.2f}"
             for name, factor in build["factors"].items()
@@ -67,30 +64,32 @@ def table(summary: Mapping[str, Any]) -> str:
         lines.append(
             f"build: {build['stature_m']:.2f} m tall; against the average {', '.join(parts) or 'nothing notable'}"
         )
-    if summary["camera"] == "guessed":
+    if setup.camera == "guessed":
         lines.append(
             "camera guessed: level, 40 degrees across; distances and size are as good as that, and as --height"
         )
-    if tracks := summary["hypotheses"]:
-        costs = [f"{track['guess']} {track['cost'] + track['motion']:.2f}" for track in tracks]
-        frames = ", ".join(f"{track['frames']} of track {k}" for k, track in enumerate(tracks, 1) if track["frames"])
-        lines.append(f"frames kept: {frames}; trajectory cost by initial guess: {', '.join(costs)}")
-    speed = MEASURES["evaluations_per_second"].number(summary["evaluations_per_second"])
-    lines.append(f"{_effort(summary)}, {speed} poses a second")
+    if tracks := log.hypotheses:
+        best = next(k for k, hypothesis in enumerate(tracks) if hypothesis["kept"])
+        costs = [f"{hypothesis['guess']} {hypothesis['cost'] + hypothesis['motion']:.2f}" for hypothesis in tracks]
+        chosen = f"kept track {best + 1} of {len(tracks)}"
+        lines.append(f"{chosen}; trajectory cost by initial guess: {', '.join(costs)}")
+    speed = MEASURES["evaluations_per_second"].number(measures.evaluations_per_second)
+    lines.append(f"{_effort(track)}, {speed} poses a second")
     return "\n".join(map(printable, lines))  # the names of files are among them
 
 
-def held_frames(summary: Mapping[str, Any]) -> str:
+def held_frames(track: Content) -> str:
     """Return in one sentence how many frames were not searched; empty where that is none."""
-    show = "frame shows" if summary["held_frames"] == 1 else "frames show"
-    what = f"{summary['held_frames']} {show} too little of the person: the pose is held or carried on, not searched"
-    return f"{what}, and may be off the person; IoU is that of the others" if summary["held_frames"] else ""
+    count = track.measures.held_frames
+    show = "frame shows" if count == 1 else "frames show"
+    what = f"{count} {show} too little of the person: the pose is held or carried on, not searched"
+    return f"{what}, and may be off the person; IoU is that of the others" if count else ""
 
 
-def undetermined(summary: Mapping[str, Any]) -> str:
+def undetermined(track: Content) -> str:
     """Return in one sentence what the method says it did not determine; empty where that is nothing."""
-    sides, lost = (len(summary[name] or ()) for name in ("unknown_sides", "lost_frames"))
-    of = f" of {summary['frames']}"
+    sides, lost = len(track.log.unknown_sides or ()), len(track.log.lost_frames or ())
+    of = f" of {track.setup.frames}"
     parts = [f"left and right: unknown in {_frames(sides, of)}"] if sides else []
     parts += [f"{_frames(lost, '' if sides else of)} lost"] if lost else []
     return "; ".join(parts)
@@ -119,17 +118,23 @@ def gait_rows(gait: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def _effort(summary: Mapping[str, Any]) -> str:
-    used = summary["evaluations"] / summary["frames"]
-    budget = summary["evaluations_per_frame"] * max(len(summary["hypotheses"]), 1)
-    seconds = MEASURES["seconds_per_frame"].number(summary["seconds_per_frame"])
+def _worth(measures: Measures) -> str:
+    error = MEASURES["error_degrees"].shown(measures.error_degrees.mean if measures.error_degrees else None)
+    return f"{_shown(measures, 'mpjpe_mm')}, {error}, {_shown(measures, 'lost_rate')} of frames"
+
+
+def _effort(track: Content) -> str:
+    measures, setup = track.measures, track.setup
+    used = measures.evaluations / setup.frames
+    budget = setup.evaluations_per_frame * max(len(track.log.hypotheses), 1)
+    seconds = MEASURES["seconds_per_frame"].number(measures.seconds_per_frame)
     of = f" of {budget:,}" if used <= budget else ""  # frames that are tracked again have more than one budget
-    return f"{_shown(summary, 'iou')}, {used:,.0f}{of} evaluations and {seconds} ms a frame"
+    return f"{_shown(measures, 'iou')}, {used:,.0f}{of} evaluations and {seconds} ms a frame"
 
 
 def _frames(count: int, of: str) -> str:
     return f"{count}{of} frame{'' if count == 1 and not of else 's'}"
 
 
-def _shown(summary: Mapping[str, Any], name: str) -> str:
-    return MEASURES[name].shown(summary[name])
+def _shown(measures: Measures, name: str) -> str:
+    return MEASURES[name].shown(getattr(measures, name))

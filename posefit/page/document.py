@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from posefit.arrays import Array
-
 PART = "<!--part-->"  # in the markup: the places of style, data and script
-SHARED = ("base", "chart", "body", "play")  # scripts of every page, in this order
+SHARED = ("base", "chart")  # scripts of every page, in this order
 _UNSAFE = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 
@@ -50,7 +48,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(name): plain(inner) for name, inner in value.items()}
     if isinstance(value, np.ndarray):
-        return value.tolist() if value.dtype.kind == "i" else _five_digits(value)
+        return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(inner) for inner in value]
     if isinstance(value, np.integer):
@@ -59,20 +57,6 @@ def plain(value: Any) -> Any:
         rounded = float(f"{value:.5g}")
         return None if not np.isfinite(value) else rounded if np.isfinite(rounded) else float(value)
     return value
-
-
-def _five_digits(values: Array) -> Any:
-    """Return floats as lists, each the nearest to five digits: whole numbers over, or times, a power of ten."""
-    finite = np.isfinite(values)
-    sizes = np.where(finite & (values != 0.0), np.abs(values), 1.0)
-    power = 4.0 - np.floor(np.log10(sizes))
-    numbers = np.where(finite, values, 0.0)
-    with np.errstate(over="ignore", invalid="ignore"):  # of the largest and the least numbers, which stay as they are
-        scale = 10.0 ** np.abs(power)
-        rounded = np.where(power >= 0.0, np.round(numbers * scale) / scale, np.round(numbers / scale) * scale)
-    plain_values = np.where(np.isfinite(rounded), rounded, numbers).astype(object)
-    plain_values[~finite] = None
-    return plain_values.tolist()
 
 
 def colour_style(light: dict[str, str], dark: dict[str, str]) -> str:

@@ -1,11 +1,11 @@
-r"""The report of a ledger: a page that any browser opens, figures and tables for papers, files for other tools.
+r"""The report of a ledger: a page that any browser opens, figures for papers, rows for other tools.
 
     from posefit.report.leaderboard import contest_of, leaderboard
     from posefit.report.runs import runs_of
     from posefit.report.write import leaderboard_lines, write_report
     from posefit.sweep.ledger import Ledger
 
-    report = write_report("results", "report.html", warn=print)  # what `posefit report` does
+    report = write_report("results", "report.html")  # what `posefit report` does
     print("\n".join(leaderboard_lines(report)))
     best = leaderboard(contest_of(runs_of(Ledger("results"))))[0]  # the same numbers, without the page
 
@@ -19,10 +19,9 @@ r"""The report of a ledger: a page that any browser opens, figures and tables fo
 | the methods compared on the runs that they share; the leaderboard | contest.py |
 | charts of the page and for papers, as numbers | charts.py |
 | the sentences of the first screen | summary.py |
-| the data of the page, by two lists of sections; its animations | content.py, animations.py |
+| the data of the page, by two lists of sections | content.py |
 | the page: markup, style and scripts as one document | page/ |
-| charts by matplotlib, and the folder of a paper's figures and tables | figures.py |
-| LaTeX, CSV and IOHprofiler's files | export.py |
+| charts by matplotlib, and the folder of a paper's figures | figures.py |
 | the command that runs one row again | repeat.py |
 
 Statistics are in `posefit.statistics`.

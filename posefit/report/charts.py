@@ -96,7 +96,9 @@ def joint_errors(contest: Contest) -> list[Intervals]:
     count = contest.resamples(contest.rows.size * len(JOINTS))
     joints = contest.runs.data["joint_errors"][contest.rows]
     errors = np.moveaxis(joints, -1, 1).astype(np.float64)  # (methods, 27, instances, seeds)
-    return [iqm_intervals(own, contest.rng(), resamples=count) for own in errors] if np.isfinite(errors).all() else []
+    if not np.isfinite(errors).all():
+        return []
+    return [iqm_intervals(method_errors, contest.rng(), resamples=count) for method_errors in errors]
 
 
 def certainty(contest: Contest) -> dict[str, Any] | None:

@@ -17,7 +17,7 @@ from posefit.sweep.cell import run_cell
 from posefit.sweep.command import swept
 from posefit.sweep.drive import Tally
 from posefit.sweep.engine import Limits
-from posefit.sweep.ledger import FILE, Ledger
+from posefit.sweep.ledger import Ledger
 from posefit.sweep.plan import Plan
 from posefit.sweep.pool import Pool, cores
 
@@ -33,22 +33,16 @@ class Comparison:
     tally: Tally
     _temporary: TemporaryDirectory[str] | None = field(repr=False)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Hand over the ledger's file, too, where it lasts no longer than this object."""
-        if self._temporary is None:
-            return Comparison, (self.ledger, self.tally, None)
-        return _restored, (self.ledger.files[0].read_bytes(), self.tally)
-
     def to_pandas(self) -> "pd.DataFrame":
         """Return a table of one row a cell. Raises ImportError where pandas is not installed."""
         return self.ledger.frame()
 
     def report(self, path: str | Path) -> dict[str, Any]:
         """Write the report, one page, and return what it says as a mapping."""
-        return write_report(str(self.ledger.path), str(path), warn=interactive().log)
+        return write_report(str(self.ledger.path), str(path))
 
     def __str__(self) -> str:
-        return "\n".join(leaderboard_lines(write_report(str(self.ledger.path), None, warn=interactive().log)))
+        return "\n".join(leaderboard_lines(write_report(str(self.ledger.path), None)))
 
 
 def compare(
@@ -80,13 +74,6 @@ def compare(
     pool = Pool(cores() if workers is None else workers, Limits(), run_cell, partial(register, factories))
     tally = swept(plan, folder, pool, interactive().log)
     return Comparison(Ledger(folder), tally, temporary)
-
-
-def _restored(content: bytes, tally: Tally) -> Comparison:
-    temporary = TemporaryDirectory(prefix="posefit-")
-    path = Path(temporary.name) / FILE
-    path.write_bytes(content)
-    return Comparison(Ledger(path.parent), tally, temporary)
 
 
 def _named(entry: Any, factories: dict[str, tuple[Callable[..., Any], str]]) -> Any:

@@ -2,17 +2,14 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from posefit.errors import printable
-from posefit.geometry.skeleton import JOINTS, PARENTS, SIDES
+from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.centres import PLACES
 from posefit.reading import counted
 from posefit.report import charts
-from posefit.report.animations import animations_of
 from posefit.report.kind import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard, paired_tests
 from posefit.report.page import COLOURS
@@ -28,7 +25,7 @@ FEW_RUNS = 20  # of a method, below which intervals are called wide
 POINTS = max(charts.POINTS, len(JOINTS))  # at which very many runs are drawn by some of them
 
 
-def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str, Any]:
+def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
     """Return the data of the page about a ledger's runs; `sections` names the parts that it has."""
     contest, kind = contest_of(runs), runs.kind
     warnings = list(dict.fromkeys(text for texts in runs.warnings.values() for text in texts))
@@ -41,8 +38,6 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
         "joints": [place.replace("_", " ") for place in PLACES],
-        "parents": PARENTS,
-        "sides": SIDES,
         "colours": COLOURS,
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
         "score": vars(kind.score),
@@ -59,14 +54,14 @@ def data_of(ledger: Ledger, runs: Runs, warn: Callable[[str], None]) -> dict[str
             "taking_part": contest.methods,
         }
     if kind.name == "track":
-        data |= _track_part(ledger, runs, contest, data, warn)
+        data |= _track_part(runs, contest)
     else:
         data |= _search_part(contest)
     data["sections"] += ["failures"] if runs.failures else []
     return data
 
 
-def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, warn: Any) -> dict[str, Any]:
+def _track_part(runs: Runs, contest: Contest | None) -> dict[str, Any]:
     """Return what the page has of tracks alone, and their list of sections."""
     part: dict[str, Any] = {"sections": ["rows"] if len(runs) else []}
     if contest is not None:
@@ -76,7 +71,6 @@ def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, 
         part = {
             "sections": [name for name, present in names.items() if present] + part["sections"],
             "pairs": paired_tests(contest),
-            "examples": three_tracks(contest, data["leaderboard"][0]["method"]),
             "charts": [chart.as_dict() for chart in charts.track_charts(contest, drawn)],
             "joint_errors": [vars(intervals) for intervals in errors],
             "certainty": certainty,
@@ -92,7 +86,6 @@ def _track_part(ledger: Ledger, runs: Runs, contest: Contest | None, data: Any, 
         },
         "seeds": [_exact(seed) for seed in runs.seeds],
         "heads": runs.heads,
-        "animations": animations_of(ledger, runs, warn, first=[row for _, row in part.get("examples", [])]),
     }
 
 
@@ -194,14 +187,6 @@ def _track_notes(contest: Contest) -> list[str]:
     if some[1] * some[2] < instances * seeds:
         notes.append(f"Curves and joints use {some[1]:,} instances with {some[2]:,} seeds each, not all.")
     return notes
-
-
-def three_tracks(contest: Contest, method: int) -> list[tuple[str, int]]:
-    """Return the rows of a method's best, median and worst run by error, with these names; fewer of fewer runs."""
-    rows = contest.rows_of(method)
-    ranked = rows[np.argsort(contest.runs.figures["error"][rows], kind="stable")].tolist()
-    tracks = [("best", ranked[0]), ("median", ranked[(len(ranked) - 1) // 2]), ("worst", ranked[-1])]
-    return tracks[:1] if len(ranked) == 1 else tracks[::2] if len(ranked) == 2 else tracks  # two have no median
 
 
 def _exact(number: int) -> int | str:

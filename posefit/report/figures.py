@@ -1,4 +1,4 @@
-"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures and tables.
+"""Figures for papers, drawn by matplotlib (posefit[figures]), and the folder of a report's figures.
 
 `methods` (m,) are names: a method has the same colour in every figure with the same names.
 """
@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from posefit.errors import InputError
-from posefit.files import new_file, new_folder
+from posefit.files import new_folder
 from posefit.report.charts import Chart, track_charts
-from posefit.report.export import latex_table, write_csv
 from posefit.report.kind import Runs
 from posefit.report.leaderboard import contest_of, leaderboard
+from posefit.sweep.table import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,17 +21,13 @@ if TYPE_CHECKING:
 # Okabe and Ito, Color universal design, 2008, without their yellow; lines of the first seven methods, the next, ...
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES = ("-", "--", ":", "-.")
-METADATA: dict[str, dict[str, Any]] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}  # of formats
 _SIZE = (6.4, 3.6)  # inches
 
 
-def save(figure: "Figure", path: str | Path) -> None:
-    """Write a figure as a new file, whose suffix is its format; the same figure gives the same bytes."""
-    kind = Path(path).suffix.lower()
-    if kind not in METADATA:
-        raise InputError(f"{path}: expected a figure that ends in {', '.join(METADATA)}, got {kind!r}")
-    with new_file(path) as building, library("").rc_context({"svg.hashsalt": "posefit"}):
-        figure.savefig(building, dpi=200, bbox_inches="tight", metadata=METADATA[kind])  # long names too
+def save(figure: "Figure", path: Path) -> None:
+    """Write a figure as a new .png or .pdf; the same figure gives the same bytes."""
+    metadata = {"CreationDate": None} if path.suffix == ".pdf" else {}
+    figure.savefig(path, dpi=200, bbox_inches="tight", metadata=metadata)  # long names too
 
 
 def chart_figure(methods: Sequence[str], chart: Chart) -> "Figure":
@@ -63,7 +59,7 @@ def library(name: str) -> Any:
 
 
 def write_figures(runs: Runs, path: str | Path) -> None:
-    """Write a new folder of figures, as PNG and PDF, and the leaderboard as LaTeX and CSV.
+    """Write a new folder of figures, as PNG and PDF, and the leaderboard as CSV.
 
     Figures are left out where the runs do not have the data. Raises ValueError where no run has an error, or where the
     folder exists or cannot be written.
@@ -74,13 +70,11 @@ def write_figures(runs: Runs, path: str | Path) -> None:
     names = [runs.methods[m] for m in contest.methods]
     figures = {chart.name: chart_figure(names, chart) for chart in track_charts(contest, contest)}
     columns, (error, *others) = runs.kind.columns, runs.table_figures
-    table = {"method": "name", columns[error].heading: error, "low": "low", "high": "high", "group": "letters"}
+    table = {"method": "name", columns[error].heading: error, "low": "low", "high": "high"}
     table |= {**{columns[name].heading: name for name in others}, "runs": "runs"}
     rows = [{title: row[key] for title, key in table.items()} for row in leaderboard(contest)]
     with new_folder(path) as folder:
         for name, figure in figures.items():
             for kind in ("png", "pdf"):
                 save(figure, folder / f"{name}.{kind}")
-        latex = latex_table(list(table), [list(row.values()) for row in rows])
-        (folder / "leaderboard.tex").write_text(latex, encoding="utf-8")
         write_csv(rows, folder / "leaderboard.csv")

@@ -1,10 +1,9 @@
 """What a report knows of runs: their table, what their kind says of it, and the contest of methods that share them."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,53 +20,28 @@ WORK = 1e8  # numbers that the resamples of one study may come to
 Place = Mapping[str, Any]  # the fields of a plan that make an instance
 
 
-class Kind(ABC):
+class Kind(NamedTuple):
     """A kind of runs, tracks or single searches: the figures and words that a report has of them."""
 
-    name: ClassVar[str]
-    noun: ClassVar[str]
-    title: ClassVar[str]
-    columns: ClassVar[Mapping[str, Column]]
-    named: ClassVar[tuple[str, ...]]  # the fields that an instance's name says
-    data: ClassVar[tuple[str, ...]]  # what a row has besides its figures
-    baselines: ClassVar[Mapping[str, str]]
-    score: ClassVar[Score]
-
-    @abstractmethod
-    def read(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data; `shared` has arrays that many rows have."""
-
-    @abstractmethod
-    def rank(self, place: Place) -> tuple[Any, ...]:
-        """Return what instances are sorted by."""
-
-    @abstractmethod
-    def place_name(self, place: Place) -> str:
-        """Return the name of an instance."""
-
-    @abstractmethod
-    def tested_errors(self, contest: "Contest") -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare."""
-
-    @abstractmethod
-    def board(self, contest: "Contest") -> dict[int, dict[str, Any]]:
-        """Return what each method's row of the leaderboard has besides averages: an interval, for one."""
-
-    @abstractmethod
-    def baseline_rows(self, contest: "Contest") -> list[dict[str, Any]]:
-        """Return a row for each baseline, on the same runs as the methods."""
-
-    @abstractmethod
-    def place_words(self, contest: "Contest") -> str:
-        """Return what a contest was on."""
-
-    @abstractmethod
-    def baseline_sentences(self, first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
-        """Return how the best baseline compares with the leader; none if there is none."""
-
-    @abstractmethod
-    def facts(self, runs: "Runs") -> dict[str, Any]:
-        """Return what was run."""
+    name: str
+    noun: str
+    title: str
+    columns: Mapping[str, Column]
+    named: tuple[str, ...]  # the fields that an instance's name says
+    data: tuple[str, ...]  # what a row has besides its figures
+    baselines: Mapping[str, str]
+    score: Score
+    # the figures of a row and its other data, given a table for arrays that many rows have
+    read: Callable[[Mapping[str, Any], dict[bytes, Any]], tuple[Array, tuple[Any, ...]]]
+    rank: Callable[[Place], tuple[Any, ...]]  # what instances are sorted by
+    place_name: Callable[[Place], str]
+    tested_errors: Callable[["Contest"], Array]  # the errors (methods, blocks, 1) that tests compare
+    board: Callable[["Contest"], dict[int, dict[str, Any]]]  # what each method's row has besides averages
+    baseline_rows: Callable[["Contest"], list[dict[str, Any]]]  # on the same runs as the methods
+    place_words: Callable[["Contest"], str]  # what a contest was on
+    # how the best baseline compares with the leader, given its row and those of the baselines
+    baseline_sentences: Callable[[Mapping[str, Any], Sequence[Any]], list[str]]
+    facts: Callable[["Runs"], dict[str, Any]]  # what was run
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,13 +1,11 @@
 """The methods of a sweep compared on the runs that they share."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import astuple
 from typing import Any
 
 from posefit.report.kind import Contest, Runs
 from posefit.statistics.pairing import most_shared
-from posefit.statistics.ranks import LEVEL, compact_letters
 
 
 def contest_of(runs: Runs) -> Contest | None:
@@ -24,36 +22,28 @@ def leaderboard(contest: Contest) -> list[dict[str, Any]]:
 
     Figures are averages, the score has an interval, and the kind of runs adds its own: see `board` of `Tracks` and
     `Searches`. `behind` is the median difference from the leader in paired runs with its interval, `p` is Wilcoxon's
-    after Holm. Methods that share one of their `letters` do not differ significantly.
+    after Holm.
     """
     runs, score = contest.runs, contest.runs.kind.score
     more = runs.kind.board(contest)
     board: list[dict[str, Any]] = []
     for m, name in enumerate(runs.methods):
-        own = contest.rows_of(m)
+        rows = contest.rows_of(m)
         row = {
             "method": m,
             "name": name,
-            "runs": len(own),
+            "runs": len(rows),
             "failed": runs.failed[m],
-            "warned": sum(k in runs.warnings for k in own.tolist()),
+            "warned": sum(k in runs.warnings for k in rows.tolist()),
             "taking_part": m in contest.methods,
         }
-        row |= {figure: column.average(runs.figures[figure][own]) for figure, column in runs.kind.columns.items()}
+        row |= {figure: column.average(runs.figures[figure][rows]) for figure, column in runs.kind.columns.items()}
         board.append({**row, **more[m]})
     sign = -1.0 if score.down else 1.0
     worst = [math.inf if row[score.name] is None else sign * row[score.name] for row in board]
     board.sort(key=lambda row: (not row["taking_part"], worst[row["method"]], row.get("above", 0.0)))
-    best_first = [row["method"] for row in board if row["taking_part"]]
-    letters, comparisons = _letters(contest, best_first), _leader_comparisons(contest, best_first[0])
-    return [{**row, **comparisons[row["method"]], "letters": letters.get(row["method"], "")} for row in board]
-
-
-def _letters(contest: Contest, best_first: Sequence[int]) -> dict[int, str]:
-    """Return the letters of each method that takes part; none where too few runs are shared for any test."""
-    places = [best_first.index(m) for m in contest.methods]
-    different = [(places[pair.first], places[pair.second]) for pair in contest.comparisons if pair.adjusted < LEVEL]
-    return dict(zip(best_first, compact_letters(len(best_first), different), strict=True)) if contest.testable else {}
+    comparisons = _leader_comparisons(contest, board[0]["method"])
+    return [{**row, **comparisons[row["method"]]} for row in board]
 
 
 def _leader_comparisons(contest: Contest, leader: int) -> dict[int, dict[str, float | None]]:

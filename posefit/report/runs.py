@@ -1,43 +1,52 @@
 """The finished rows of a ledger as one table, small enough for a hundred thousand of them."""
 
 import json
-import marshal
-import sys
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posefit.arrays import Array
 from posefit.errors import InputError, printable
 from posefit.report.kind import Kind, Runs
 from posefit.report.repeat import LAST_FIELDS, command_head, repeat_command
-from posefit.report.searches import Searches
-from posefit.report.tracks import Tracks
+from posefit.report.searches import SEARCHES
+from posefit.report.tracks import TRACKS
 from posefit.settings import setting_text, settings_text
 from posefit.sweep.cell import cell_from
 
 if TYPE_CHECKING:
+    from posefit.arrays import Array
     from posefit.sweep.ledger import Ledger
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (Tracks(), Searches())}
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (TRACKS, SEARCHES)}
 # what a method chooses; all else but the seed makes an instance
 _METHOD_FIELDS = ("method", "name", "settings", "evaluations", "hypotheses", "infeasible", "version")
 
 
-class _Row(NamedTuple):
-    """A finished row: its place, method and head as texts, and what `Runs` has of it."""
+class _Distinct:
+    """Distinct values, numbered as they come."""
 
-    place: str
-    method: str
-    head: str
-    seed: int  # of any size
-    key: str
-    warnings: tuple[str, ...]
-    figures: Array
-    data: tuple[Any, ...]
+    def __init__(self) -> None:
+        self.values: list[dict[str, Any]] = []
+        self._numbers: dict[Hashable, int] = {}
+
+    def number(self, value: dict[str, Any]) -> int:
+        """Return the number of a value."""
+        if (key := _frozen(value)) not in self._numbers:
+            self._numbers[key] = len(self.values)
+            self.values.append(value)
+        return self._numbers[key]
+
+
+def _frozen(value: Any) -> Hashable:
+    """Return a key that two values of JSON share if they are the same: 1, 1.0 and true are not."""
+    if isinstance(value, dict):
+        return tuple(sorted((name, _frozen(inner)) for name, inner in value.items()))
+    if isinstance(value, list):
+        return tuple(map(_frozen, value))
+    return value if isinstance(value, str) else (type(value), value)
 
 
 def runs_of(ledger: "Ledger") -> Runs:
@@ -47,78 +56,84 @@ def runs_of(ledger: "Ledger") -> Runs:
     both tracks and single searches.
     """
     quarantined = ledger.quarantined()
-    rows: list[_Row] = []
-    kinds: set[str] = set()
+    methods, places, heads = _Distinct(), _Distinct(), _Distinct()
+    numbers: list[tuple[int, int, int]] = []  # of instance, method and head of each row
+    seeds: list[int] = []  # of any size
+    keys: list[str] = []
+    warnings: list[tuple[str, ...]] = []
+    measured: list[tuple[Array, tuple[Any, ...]]] = []
     shared: dict[bytes, Any] = {}  # arrays that many rows have
-    places: dict[tuple[bytes, int], str] = {}  # by a spec without instance and seed, and the instance
-    heads: dict[bytes, tuple[str, str]] = {}  # method and head of a spec without instance and seed
+    kinds: dict[str, None] = {}
     for row in chain(ledger.rows(), quarantined):
         spec = row["spec"]
-        kinds.add(spec["kind"])
+        kinds[spec["kind"]] = None
         if len(kinds) > 1:
             raise InputError(f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one")
-        if row["status"] != "done":
-            continue
-        fields = marshal.dumps({**spec, **dict.fromkeys(LAST_FIELDS)}, 2)
-        if fields not in heads:
-            heads[fields] = _text(_variant(spec)), command_head(spec)
-        if (place := (fields, spec["instance"])) not in places:
-            places[place] = sys.intern(_text(_place(spec)))
-        measured = KINDS[spec["kind"]].read(row, shared)
-        rows.append(_Row(places[place], *heads[fields], spec["seed"], row["key"], tuple(row["warnings"]), *measured))
+        if row["status"] == "done":
+            head = {name: value for name, value in spec.items() if name not in LAST_FIELDS}
+            numbers.append((places.number(_place(spec)), methods.number(_variant(spec)), heads.number(head)))
+            seeds.append(spec["seed"])
+            keys.append(row["key"])
+            warnings.append(tuple(row["warnings"]))
+            measured.append(KINDS[spec["kind"]].read(row, shared))
     if not kinds:
         raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    return _sorted_runs(ledger.version, KINDS[kinds.pop()], rows, quarantined)
+    (kind,) = map(KINDS.__getitem__, kinds)
+    figures = np.array([values for values, _ in measured], dtype=float).reshape(-1, len(kind.columns))
+    instance, method, head_number = np.array(numbers, dtype=int).reshape(-1, 3).T
 
-
-def _sorted_runs(version: str, kind: Kind, rows: list[_Row], quarantined: Sequence[Mapping[str, Any]]) -> Runs:
-    error = list(kind.columns).index("error")
-    errors: dict[str, list[float]] = {}
-    for row in rows:
-        errors.setdefault(row.method, []).append(np.nan_to_num(row.figures[error], nan=np.inf))
-    failed = Counter(_text(_variant(cell["spec"])) for cell in quarantined)
-    methods = sorted(errors, key=lambda text: (np.mean(errors[text]), text))
-    every = [*methods, *sorted(failed.keys() - errors.keys())]
-    variants = [json.loads(text) for text in every]
+    errors = np.nan_to_num(figures[:, list(kind.columns).index("error")], nan=np.inf)
+    count = len(methods.values)  # those that only failed come after them
+    failed = Counter(methods.number(_variant(cell["spec"])) for cell in quarantined)
+    means = [errors[method == m].mean() if m < count else np.inf for m in range(len(methods.values))]
+    best_first = _order([(m >= count, means[m], _text(variant)) for m, variant in enumerate(methods.values)])
+    variants = [methods.values[m] for m in best_first]
     labels = distinct([fields["name"] or fields["method"] for fields in variants], map(_variation, variants))
-    names = dict(zip(every, labels, strict=True))
-    by_text = {text: json.loads(text) for text in {row.place for row in rows}}
-    texts = sorted(by_text, key=lambda text: (kind.rank(by_text[text]), text))
-    places = [by_text[text] for text in texts]
-    details = [{name: _text(v).strip('"') for name, v in place.items() if name not in kind.named} for place in places]
-    heads, seeds = sorted({row.head for row in rows}), sorted({row.seed for row in rows})
-    rank = {value: k for values in (methods, texts, heads, seeds) for k, value in enumerate(values)}
-    rows.sort(key=lambda row: (rank[row.place], rank[row.method], row.seed))
-    method, instance, head, seed = (
-        np.array([[rank[name] for name in (row.method, row.place, row.head, row.seed)] for row in rows], dtype=int)
-        .reshape(-1, 4)
-        .T
-    )
-    figures = np.array([row.figures for row in rows], dtype=float).reshape(-1, len(kind.columns))
-    data = dict(zip(kind.data, zip(*(row.data for row in rows), strict=True), strict=False))  # none without rows
+    label_of = dict(zip(best_first, labels, strict=True))
+
+    place_order = _order([(kind.rank(place), _text(place)) for place in places.values])
+    sorted_places = [places.values[i] for i in place_order]
+    details = [
+        {name: _text(value).strip('"') for name, value in place.items() if name not in kind.named}
+        for place in sorted_places
+    ]
+    commands = [command_head(spec) for spec in heads.values]
+    rising = sorted(set(seeds))
+    rank = {seed: k for k, seed in enumerate(rising)}
+    seed = np.array([rank[seed] for seed in seeds], dtype=int)
+    instance, method = np.argsort(place_order)[instance], np.argsort(best_first)[method]
+    head_number = np.argsort(_order(commands))[head_number]
+    order = np.lexsort((seed, method, instance))
+    data = zip(*(measured[k][1] for k in order), strict=True)
     return Runs(
         kind=kind,
-        version=version,
-        methods=tuple(names[text] for text in methods),
-        variants=tuple(
-            {**v, "settings": printable(", ".join(settings_text(v["settings"])))} for v in variants[: len(methods)]
-        ),
-        instances=distinct([kind.place_name(place) for place in places], details),
-        places=tuple(places),
-        method=method,
-        instance=instance,
-        seed=seed,
-        seeds=tuple(seeds),
-        keys=tuple(row.key for row in rows),
-        figures=dict(zip(kind.columns, figures.T, strict=True)),
-        data={name: np.array(own) if isinstance(own[0], np.ndarray) else own for name, own in data.items()},
-        warnings={k: tuple(map(printable, row.warnings)) for k, row in enumerate(rows) if row.warnings},
-        failures=tuple(_failure(cell, names[_text(_variant(cell["spec"]))]) for cell in quarantined),
-        failed=tuple(failed[text] for text in methods),
-        unfinished=tuple(names[text] for text in every[len(methods) :]),
-        heads=tuple(heads),
-        head=head,
+        version=ledger.version,
+        methods=labels[:count],
+        variants=tuple({**v, "settings": printable(", ".join(settings_text(v["settings"])))} for v in variants[:count]),
+        instances=distinct([kind.place_name(place) for place in sorted_places], details),
+        places=tuple(sorted_places),
+        method=method[order],
+        instance=instance[order],
+        seed=seed[order],
+        seeds=tuple(rising),
+        keys=tuple(keys[k] for k in order),
+        figures=dict(zip(kind.columns, figures[order].T, strict=True)),
+        data={
+            name: np.array(values) if isinstance(values[0], np.ndarray) else values
+            for name, values in zip(kind.data, data, strict=False)  # none without rows
+        },
+        warnings={k: tuple(map(printable, warnings[row])) for k, row in enumerate(order) if warnings[row]},
+        failures=tuple(_failure(cell, label_of[methods.number(_variant(cell["spec"]))]) for cell in quarantined),
+        failed=tuple(failed[m] for m in best_first[:count]),
+        unfinished=labels[count:],
+        heads=tuple(sorted(commands)),
+        head=head_number[order],
     )
+
+
+def _order(keys: Sequence[Any]) -> list[int]:
+    """Return the places of keys in the order of the keys."""
+    return sorted(range(len(keys)), key=keys.__getitem__)
 
 
 def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -133,6 +148,7 @@ def _failure(cell: Mapping[str, Any], name: str) -> dict[str, Any]:
 def _variant(spec: Mapping[str, Any]) -> dict[str, Any]:
     """Return what makes a method; the budget of a search is that of each dimension."""
     fields = {name: spec[name] for name in _METHOD_FIELDS if name in spec}
+    fields["settings"] = dict(sorted(spec["settings"].items()))
     if "dimension" in spec:
         fields["budget"] = fields.pop("evaluations") / spec["dimension"]
     return fields

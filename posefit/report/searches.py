@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -30,102 +30,95 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-class Searches(Kind):
-    """The kind of runs that are single searches."""
+SCORE = Score(
+    name="reached",
+    axis="share of targets reached",
+    sentence="{} of all targets reached",
+    unit=" %",
+    points=" points",
+    digits=1,
+    down=True,
+    paired="instances",
+    caption="Share of all runs and targets that a method reached, with the 95 % interval that other instances "
+    "would give, if a function has several; a dashed line is random search.",
+    leaderboard="Shares of targets are means over all runs and targets. Above is the median of the best costs "
+    "above the true pose's. ",
+)
 
-    name = "search"
-    noun = "searches"
-    title = "Report of single searches"
-    columns: ClassVar = {column.name: column for column in _COLUMNS}
-    named = ("function", "dimension", "instance")
-    data = ("runs", "hits")  # `SuiteRun`; evaluations (targets,), inf for never
-    baselines: ClassVar = {RANDOM: "random search"}
-    score = Score(
-        name="reached",
-        axis="share of targets reached",
-        sentence="{} of all targets reached",
-        unit=" %",
-        points=" points",
-        digits=1,
-        down=True,
-        paired="instances",
-        caption="Share of all runs and targets that a method reached, with the 95 % interval that other instances "
-        "would give, if a function has several; a dashed line is random search.",
-        leaderboard="Shares of targets are means over all runs and targets. Above is the median of the best costs "
-        "above the true pose's. ",
-    )
 
-    def read(self, row: Mapping[str, Any], _: dict[bytes, Any]) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data."""
-        run = search_run(row)
-        evaluations = hits((run.evaluations, run.costs), run.targets)
-        reached = 100.0 * float(np.isfinite(evaluations).mean())
-        return np.array([reached, run.cost - run.truth_cost, 100.0 - reached]), (run, evaluations)
+def _read(row: Mapping[str, Any], _: dict[bytes, Any]) -> tuple[Array, tuple[Any, ...]]:
+    run = search_run(row)
+    evaluations = hits((run.evaluations, run.costs), run.targets)
+    reached = 100.0 * float(np.isfinite(evaluations).mean())
+    return np.array([reached, run.cost - run.truth_cost, 100.0 - reached]), (run, evaluations)
 
-    def rank(self, place: Place) -> tuple[Any, ...]:
-        """Return what instances are sorted by."""
-        return place["function"], place["dimension"], place["instance"], place["suite"]
 
-    def place_name(self, place: Place) -> str:
-        """Return the name of an instance."""
-        return f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
+def _rank(place: Place) -> tuple[Any, ...]:
+    return place["function"], place["dimension"], place["instance"], place["suite"]
 
-    def tested_errors(self, contest: Contest) -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare.
 
-        A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
-        """
-        poses = [(place["function"], place["instance"], place["suite"]) for place in contest.places()]
-        index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
-        block = np.array([index[pose] for pose in poses])
-        sums = np.array([np.bincount(block, row) for row in contest.of("error").mean(axis=2)])
-        return np.asarray((sums / np.bincount(block))[:, :, None])
+def _place_name(place: Place) -> str:
+    return f"f{place['function']} in {place['dimension']}D, instance {place['instance']}"
 
-    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
-        """Return each method's mean share of targets, with the interval of other instances."""
-        strata, clusters = ([place[name] for place in contest.places()] for name in ("function", "instance"))
-        variants = contest.runs.variants
-        board: dict[int, dict[str, Any]] = {
-            m: {"low": None, "high": None, "is_random": v["method"] == RANDOM} for m, v in enumerate(variants)
-        }
-        for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2), strict=True):
-            share = mean_interval(shares, strata, clusters)
-            board[m] |= {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
-        return board
 
-    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
-        """Return a row for random search, the best of its variants that take part; none if there is none."""
-        random = [k for k, m in enumerate(contest.methods) if contest.runs.variants[m]["method"] == RANDOM]
-        shares = [float(own.mean()) for own in contest.of("reached")[random]]
-        return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
+def _tested_errors(contest: Contest) -> Array:
+    """Return the errors (methods, blocks, 1) that tests compare.
 
-    def place_words(self, contest: Contest) -> str:
-        """Return what a contest was on."""
-        places = contest.places()
-        functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
-        instances = counted(len({(place["function"], place["instance"]) for place in places}), "instance")
-        noun = "function" if len(functions) == 1 else "functions"
-        numbers = f"{listed(functions, len(functions))} in {listed(dimensions, len(dimensions))}"
-        return f"{noun} {numbers} dimensions, {instances} in all"
+    A block is an instance of a function, the same pose in every dimension: the mean over seeds and dimensions.
+    """
+    poses = [(place["function"], place["instance"], place["suite"]) for place in contest.places()]
+    index = {pose: k for k, pose in enumerate(dict.fromkeys(poses))}
+    block = np.array([index[pose] for pose in poses])
+    sums = np.array([np.bincount(block, row) for row in contest.of("error").mean(axis=2)])
+    return np.asarray((sums / np.bincount(block))[:, :, None])
 
-    def baseline_sentences(self, first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
-        """Return how random search compares with the leader."""
-        if first["is_random"]:
-            return ["That is random search: no method does better."]
-        return [f"Random search reached {self.score.text(row['reached'])}." for row in rows]
 
-    def facts(self, runs: Runs) -> dict[str, Any]:
-        """Return what was run."""
-        return {
-            "instances": f"{len(runs.instances):,}",
-            "suite": runs.values("suite"),
-            "functions": [_function(number) for number in runs.values("function")],
-            "dimensions": runs.values("dimension"),
-            "seeds": f"{len(runs.seeds):,}",
-            "evaluations for each dimension": [f"{budget:g}" for budget in runs.values("budget")],
-            "infeasible proposals": runs.values("infeasible"),
-            "targets of a problem": f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's",
-        }
+def _board(contest: Contest) -> dict[int, dict[str, Any]]:
+    """Return each method's mean share of targets, with the interval of other instances."""
+    strata, clusters = ([place[name] for place in contest.places()] for name in ("function", "instance"))
+    variants = contest.runs.variants
+    board: dict[int, dict[str, Any]] = {
+        m: {"low": None, "high": None, "is_random": v["method"] == RANDOM} for m, v in enumerate(variants)
+    }
+    for m, shares in zip(contest.methods, contest.of("reached").mean(axis=2), strict=True):
+        share = mean_interval(shares, strata, clusters)
+        board[m] |= {"reached": share.value, "low": max(share.low, 0.0), "high": min(share.high, 100.0)}
+    return board
+
+
+def _baseline_rows(contest: Contest) -> list[dict[str, Any]]:
+    """Return a row for random search, the best of its variants that take part; none if there is none."""
+    random = [k for k, m in enumerate(contest.methods) if contest.runs.variants[m]["method"] == RANDOM]
+    shares = [float(shares_of_runs.mean()) for shares_of_runs in contest.of("reached")[random]]
+    return [{"baseline": RANDOM, "reached": max(shares)}] if shares else []
+
+
+def _place_words(contest: Contest) -> str:
+    places = contest.places()
+    functions, dimensions = (sorted({place[name] for place in places}) for name in ("function", "dimension"))
+    instances = counted(len({(place["function"], place["instance"]) for place in places}), "instance")
+    noun = "function" if len(functions) == 1 else "functions"
+    numbers = f"{listed(functions, len(functions))} in {listed(dimensions, len(dimensions))}"
+    return f"{noun} {numbers} dimensions, {instances} in all"
+
+
+def _baseline_sentences(first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
+    if first["is_random"]:
+        return ["That is random search: no method does better."]
+    return [f"Random search reached {SCORE.text(row['reached'])}." for row in rows]
+
+
+def _facts(runs: Runs) -> dict[str, Any]:
+    return {
+        "instances": f"{len(runs.instances):,}",
+        "suite": runs.values("suite"),
+        "functions": [_function(number) for number in runs.values("function")],
+        "dimensions": runs.values("dimension"),
+        "seeds": f"{len(runs.seeds):,}",
+        "evaluations for each dimension": [f"{budget:g}" for budget in runs.values("budget")],
+        "infeasible proposals": runs.values("infeasible"),
+        "targets of a problem": f"{len(TARGETS)} costs, {TARGETS[0]:g} to {TARGETS[-1]:g} above the true pose's",
+    }
 
 
 def search_charts(contest: Contest) -> list[Chart]:
@@ -185,3 +178,24 @@ def running_times(contest: Contest) -> list[dict[str, Any]]:
 
 def _function(number: int) -> str:
     return f"{number} {suite_function(number).name}"
+
+
+SEARCHES = Kind(
+    name="search",
+    noun="searches",
+    title="Report of single searches",
+    columns={column.name: column for column in _COLUMNS},
+    named=("function", "dimension", "instance"),
+    data=("runs", "hits"),  # `SuiteRun`; evaluations (targets,), inf for never
+    baselines={RANDOM: "random search"},
+    score=SCORE,
+    read=_read,
+    rank=_rank,
+    place_name=_place_name,
+    tested_errors=_tested_errors,
+    board=_board,
+    baseline_rows=_baseline_rows,
+    place_words=_place_words,
+    baseline_sentences=_baseline_sentences,
+    facts=_facts,
+)

@@ -5,7 +5,7 @@ Label, unit, digits and meaning of figures come from `posefit.evaluation.measure
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -75,112 +75,106 @@ COLUMNS = (
 )
 
 
-class Tracks(Kind):
-    """The kind of runs that are tracks."""
+SCORE = Score(
+    name="error",
+    axis="error in degrees",
+    sentence="an error of {}",
+    unit="°",
+    points="°",
+    digits=2,
+    down=False,
+    paired="runs",
+    caption="Interquartile mean of a method's errors, with its 95 % interval from several seeds and eight runs on; "
+    "dashed lines are baselines.",
+    leaderboard="Each figure is the interquartile mean of a method's runs; shares of frames and joints are means. "
+    "Skill is 1 − error / baseline, of the errors in this table: 0 is no better than the baseline, which uses the "
+    "true root and translation. ",
+)
 
-    name = "track"
-    noun = "tracks"
-    title = "Report of a sweep"
-    columns: ClassVar = {column.name: column for column in COLUMNS}
-    named = ("motion", "view_degrees", "corruption", "instance")
-    data = ("joint_errors", "modes", "traces")  # (27,) mm; (bins, 3), see `_binned`; evaluations and best costs
-    baselines = BASELINES
-    score = Score(
-        name="error",
-        axis="error in degrees",
-        sentence="an error of {}",
-        unit="°",
-        points="°",
-        digits=2,
-        down=False,
-        paired="runs",
-        caption="Interquartile mean of a method's errors, with its 95 % interval from several seeds and eight runs on; "
-        "dashed lines are baselines.",
-        leaderboard="Each figure is the interquartile mean of a method's runs; shares of frames and joints are means. "
-        "Skill is 1 − error / baseline, of the errors in this table: 0 is no better than the baseline, which uses the "
-        "true root and translation. ",
-    )
 
-    def read(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> tuple[Array, tuple[Any, ...]]:
-        """Return the figures of a row and its other data; many rows share the evaluations of their traces."""
-        used = np.array(row["trace"]["evaluations"], np.float32)
-        trace = shared.setdefault(used.tobytes(), used), np.array(row["trace"]["cost"], np.float32)
-        joints = np.array(row["joint_errors_mm"], dtype=np.float32)
-        figures = np.array([column.value(row) for column in COLUMNS])
-        return figures, (joints, _binned(row["mode_reliability"]), trace)
+def _read(row: Mapping[str, Any], shared: dict[bytes, Any]) -> tuple[Array, tuple[Any, ...]]:
+    """Return the figures of a row and its other data; many rows share the evaluations of their traces."""
+    used = np.array(row["trace"]["evaluations"], np.float32)
+    trace = shared.setdefault(used.tobytes(), used), np.array(row["trace"]["cost"], np.float32)
+    joints = np.array(row["joint_errors_mm"], dtype=np.float32)
+    figures = np.array([column.value(row) for column in COLUMNS])
+    return figures, (joints, _binned(row["mode_reliability"]), trace)
 
-    def rank(self, place: Place) -> tuple[Any, ...]:
-        """Return what instances are sorted by: undamaged ones come before damaged ones."""
-        corruption = sorted(place["corruption"].items())
-        return place["motion"], place["view_degrees"], len(corruption), corruption, place["instance"]
 
-    def place_name(self, place: Place) -> str:
-        """Return the name of an instance."""
-        directions = ", ".join(f"{view}°" for view in views(place))
-        return ", ".join([f"{place['motion']}, view {directions}", *damage(place), f"instance {place['instance']}"])
+def _rank(place: Place) -> tuple[Any, ...]:
+    corruption = sorted(place["corruption"].items())  # undamaged instances come first
+    return place["motion"], place["view_degrees"], len(corruption), corruption, place["instance"]
 
-    def tested_errors(self, contest: Contest) -> Array:
-        """Return the errors (methods, blocks, 1) that tests compare: a block is an instance with a seed."""
-        return np.asarray(contest.runs.figures["error"][contest.blocks][:, :, None])
 
-    def board(self, contest: Contest) -> dict[int, dict[str, Any]]:
-        """Return what each method's row has besides averages: an interval, skills, and how many tracks lost frames.
+def _place_name(place: Place) -> str:
+    directions = ", ".join(f"{view}°" for view in views(place))
+    return ", ".join([f"{place['motion']}, view {directions}", *damage(place), f"instance {place['instance']}"])
 
-        A skill is 1 - the row's error / the baseline's on the same runs.
-        """
-        errors, figures = contest.of("error"), contest.runs.figures
-        intervals = iqm_intervals(errors, contest.rng(), resamples=contest.resamples(errors.size))
-        ends: dict[int, dict[str, Any]] = {
-            m: {"low": low, "high": high}
-            for m, low, high in zip(contest.methods, intervals.low.tolist(), intervals.high.tolist(), strict=True)
-        }
-        shared = {row["baseline"]: row["error"] for row in self.baseline_rows(contest)}
-        board = {}
-        for m in range(len(contest.runs.methods)):
-            own = contest.rows_of(m)
-            error = interquartile_mean(figures["error"][own])
-            theirs = {name: interquartile_mean(figures[f"baseline_{name}"][own]) for name in BASELINES}
-            board[m] = ends.get(m, {"low": None, "high": None}) | _skills(error, shared if m in ends else theirs)
-            board[m]["lost_tracks"] = int((figures["lost"][own] > 0.0).sum())
-        return board
 
-    def baseline_rows(self, contest: Contest) -> list[dict[str, Any]]:
-        """Return a row for each baseline, on the same runs as the methods: means over the methods that have a value."""
-        values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
-        errors = {name: interquartile_mean(own.mean(axis=0).filled(np.nan)) for name, own in values.items()}
-        return [{"baseline": name, "error": error, **_skills(error, errors)} for name, error in errors.items()]
+def _tested_errors(contest: Contest) -> Array:
+    """Return the errors (methods, blocks, 1) that tests compare: a block is an instance with a seed."""
+    return np.asarray(contest.runs.figures["error"][contest.blocks][:, :, None])
 
-    def place_words(self, contest: Contest) -> str:
-        """Return what a contest was on."""
-        motions = sorted({str(place["motion"]) for place in contest.places()})
-        names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
-        return f"{counted(len(contest.instances), 'instance')} of {names}"
 
-    def baseline_sentences(self, first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
-        """Return how the best baseline compares with the leader; none if there is none."""
-        known = [row for row in rows if row["error"] is not None]
-        if not known:
-            return []
-        best = min(known, key=lambda row: float(row["error"]))
-        text = f"best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°."
-        return [f"The {text}" if best["error"] > first["error"] else f"It does not beat the baselines: the {text}"]
+def _board(contest: Contest) -> dict[int, dict[str, Any]]:
+    """Return what each method's row has besides averages: an interval, skills, and how many tracks lost frames.
 
-    def facts(self, runs: Runs) -> dict[str, Any]:
-        """Return what was run."""
-        frames = np.array([place["frames"] for place in runs.places], dtype=int)[runs.instance]
-        hours = float(np.nansum(runs.figures["ms"] * frames) / 3.6e6)
-        seeds = [*map(str, runs.seeds[:MAX_SEEDS])]
-        return {
-            "instances": f"{len(runs.instances):,}",
-            "motions": runs.values("motion"),
-            "views, degrees": sorted({", ".join(views(place)) for place in runs.places}),
-            "corruptions": sorted({", ".join(damage(place)) or "none" for place in runs.places}),
-            "frames": runs.values("frames"),
-            "translation": runs.values("translation"),
-            "seeds": [*seeds, f"… ({len(runs.seeds):,})"] if len(runs.seeds) > MAX_SEEDS else seeds,
-            "evaluations a frame": [f"{budget:,}" for budget in runs.values("evaluations")],
-            "time of the searches": f"{60 * hours:.1f} minutes" if hours < 0.1 else f"{hours:.1f} hours",
-        }
+    A skill is 1 - the row's error / the baseline's on the same runs.
+    """
+    errors, figures = contest.of("error"), contest.runs.figures
+    intervals = iqm_intervals(errors, contest.rng(), resamples=contest.resamples(errors.size))
+    ends: dict[int, dict[str, Any]] = {
+        m: {"low": low, "high": high}
+        for m, low, high in zip(contest.methods, intervals.low.tolist(), intervals.high.tolist(), strict=True)
+    }
+    shared = {row["baseline"]: row["error"] for row in _baseline_rows(contest)}
+    board = {}
+    for m in range(len(contest.runs.methods)):
+        rows = contest.rows_of(m)
+        error = interquartile_mean(figures["error"][rows])
+        unshared = {name: interquartile_mean(figures[f"baseline_{name}"][rows]) for name in BASELINES}
+        board[m] = ends.get(m, {"low": None, "high": None}) | _skills(error, shared if m in ends else unshared)
+        board[m]["lost_tracks"] = int((figures["lost"][rows] > 0.0).sum())
+    return board
+
+
+def _baseline_rows(contest: Contest) -> list[dict[str, Any]]:
+    """Return a row for each baseline, on the same runs as the methods: means over the methods that have a value."""
+    values = {name: np.ma.masked_invalid(contest.of(f"baseline_{name}")) for name in BASELINES}
+    errors = {name: interquartile_mean(errors.mean(axis=0).filled(np.nan)) for name, errors in values.items()}
+    return [{"baseline": name, "error": error, **_skills(error, errors)} for name, error in errors.items()]
+
+
+def _place_words(contest: Contest) -> str:
+    motions = sorted({str(place["motion"]) for place in contest.places()})
+    names = listed(motions) if len(motions) <= NAMED else f"{len(motions)} motions"
+    return f"{counted(len(contest.instances), 'instance')} of {names}"
+
+
+def _baseline_sentences(first: Mapping[str, Any], rows: Sequence[Any]) -> list[str]:
+    known = [row for row in rows if row["error"] is not None]
+    if not known:
+        return []
+    best = min(known, key=lambda row: float(row["error"]))
+    text = f"best baseline, the {BASELINES[best['baseline']]}, has {best['error']:.2f}°."
+    return [f"The {text}" if best["error"] > first["error"] else f"It does not beat the baselines: the {text}"]
+
+
+def _facts(runs: Runs) -> dict[str, Any]:
+    frames = np.array([place["frames"] for place in runs.places], dtype=int)[runs.instance]
+    hours = float(np.nansum(runs.figures["ms"] * frames) / 3.6e6)
+    seeds = [*map(str, runs.seeds[:MAX_SEEDS])]
+    return {
+        "instances": f"{len(runs.instances):,}",
+        "motions": runs.values("motion"),
+        "views, degrees": sorted({", ".join(views(place)) for place in runs.places}),
+        "corruptions": sorted({", ".join(damage(place)) or "none" for place in runs.places}),
+        "frames": runs.values("frames"),
+        "translation": runs.values("translation"),
+        "seeds": [*seeds, f"… ({len(runs.seeds):,})"] if len(runs.seeds) > MAX_SEEDS else seeds,
+        "evaluations a frame": [f"{budget:,}" for budget in runs.values("evaluations")],
+        "time of the searches": f"{60 * hours:.1f} minutes" if hours < 0.1 else f"{hours:.1f} hours",
+    }
 
 
 def _binned(modes: Sequence[Sequence[float]]) -> Array:
@@ -208,3 +202,24 @@ def views(place: Place) -> list[str]:
 def damage(place: Place) -> list[str]:
     """Return the kinds of damage of an instance with their strengths."""
     return [f"{kind} {strength:g}" for kind, strength in sorted(place["corruption"].items())]
+
+
+TRACKS = Kind(
+    name="track",
+    noun="tracks",
+    title="Report of a sweep",
+    columns={column.name: column for column in COLUMNS},
+    named=("motion", "view_degrees", "corruption", "instance"),
+    data=("joint_errors", "modes", "traces"),  # (27,) mm; (bins, 3), see `_binned`; evaluations and best costs
+    baselines=BASELINES,
+    score=SCORE,
+    read=_read,
+    rank=_rank,
+    place_name=_place_name,
+    tested_errors=_tested_errors,
+    board=_board,
+    baseline_rows=_baseline_rows,
+    place_words=_place_words,
+    baseline_sentences=_baseline_sentences,
+    facts=_facts,
+)

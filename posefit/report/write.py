@@ -1,6 +1,6 @@
 """What `posefit report` does: a page, and on request figures, tables and files for other tools."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +10,12 @@ from posefit.files import check_new, check_place, replaceable, replaced_file
 from posefit.page.document import plain
 from posefit.reading import cut
 from posefit.report.content import data_of
-from posefit.report.export import write_csv
 from posefit.report.page import MARK, document
 from posefit.report.runs import runs_of
 from posefit.sweep.ledger import Ledger
-from posefit.sweep.table import flat
+from posefit.sweep.table import flat, write_csv
 
 SKILL_OF = "mean_pose"  # the baseline that the printed skill compares with
-WRITTEN = 1_000_000  # characters of a page that are encoded together
 PRINTED = ("header", "answer", "leaderboard", "baselines", "times")
 
 
@@ -27,13 +25,12 @@ def write_report(
     *,
     figures: str | None = None,
     csv: str | None = None,
-    warn: Callable[[str], None],
 ) -> dict[str, Any]:
     """Write the report of a ledger, or of several together, to a file, and return what the command prints.
 
     That is the header, the answer, the leaderboard, the baselines, and the running times of single searches. Without
     `out` no page is written; an earlier report of that name is replaced, nothing else is. `figures` is a new folder for
-    figures (PNG, PDF) and tables (LaTeX, CSV), `csv` a new file of all rows.
+    figures (PNG, PDF) and the leaderboard (CSV), `csv` a new file of all rows.
     Raises ValueError where the ledger has no finished row or something cannot be written, and ImportError where figures
     need matplotlib: before anything is written, if possible.
     """
@@ -47,12 +44,10 @@ def write_report(
     runs = runs_of(ledger)
     if runs.kind.name == "search" and figures is not None:
         raise InputError("--figures must be given with a sweep of tracks, got one of single searches")
-    data = data_of(ledger, runs, warn)
+    data = data_of(ledger, runs)
     if out is not None:
         with replaced_file(out, MARK.encode()) as building:
-            page = document(data)
-            with building.open("w", encoding="utf-8", newline="\n") as file:  # at once it takes thrice the memory
-                file.writelines(page[start : start + WRITTEN] for start in range(0, len(page), WRITTEN))
+            building.write_text(document(data), encoding="utf-8", newline="\n")
     if figures is not None:
         write_figures(runs, figures)
     if csv is not None:

@@ -62,15 +62,11 @@ def areas(
         return areas_on_device(body, camera, silhouette, poses, translations)
     out = np.empty((len(poses), 3), dtype=np.int64)
     drawing = drawing_of(body, camera, silhouette)
-    parts = parts_of(len(poses), threads)
-    if len(parts) == 1:
-        kernels.count_areas(*drawing, poses, translations, out)
-        return out
 
-    def count(_part: slice, *rows: NDArray[Any]) -> None:
-        kernels.count_areas(*drawing, *rows)
+    def count(part: slice) -> None:
+        kernels.count_areas(*drawing, poses[part], translations[part], out[part])
 
-    work_through(parts, threads, lambda part: (poses[part], translations[part], out[part]), count)
+    work_through(parts_of(len(poses), threads), threads, lambda _: (), count)
     return out
 
 

@@ -18,6 +18,6 @@ from a numpy Generator alone.
 | paired runs, and what can be compared of a sweep with gaps | paired, blocked design | pairing.py |
 | the mean of the middle half, with its interval | interquartile mean, studentised bootstrap | intervals.py |
 | the mean of runs of which some have a draw in common | stratified cluster sample | means.py |
-| which method is better, by order alone | Wilcoxon, Holm, compact letter display | ranks.py |
+| which method is better, by order alone | Wilcoxon, Holm | ranks.py |
 | shares of runs and targets reached in time, or within an error | ECDF, ERT, performance profiles | profiles.py |
 """

@@ -92,8 +92,8 @@ def _estimate(runs: Array) -> tuple[Array, Array]:
     ends = ordered[:, [cut, count - cut - 1], None, None]
     winsorised = np.clip(runs, ends[:, 0], ends[:, 1])
     variance = winsorised.var(axis=2, ddof=1).sum(axis=1) / (instances * instances * seeds)
-    kept = 1.0 - 2.0 * cut / count
-    return ordered[:, cut : count - cut].mean(axis=1), np.sqrt(variance) / kept
+    remaining = 1.0 - 2.0 * cut / count
+    return ordered[:, cut : count - cut].mean(axis=1), np.sqrt(variance) / remaining
 
 
 def check_bootstrap(resamples: int, level: float) -> None:

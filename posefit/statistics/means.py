@@ -46,12 +46,12 @@ def mean_intervals(values: ArrayLike, strata: ArrayLike, clusters: ArrayLike, *,
     means = array.mean(axis=1)
     variance, weighed = np.zeros(rows), np.zeros(rows)
     for kind in np.unique(kinds):
-        mine = array[:, kinds == kind]
+        of_kind = array[:, kinds == kind]
         names, cluster = np.unique(drawn[kinds == kind], return_inverse=True)
         if (number := len(names)) < 2:
             return Intervals(means, np.full(rows, np.nan), np.full(rows, np.nan))
         totals = np.zeros((number, rows))
-        np.add.at(totals, cluster, (mine - mine.mean(axis=1, keepdims=True)).T)
+        np.add.at(totals, cluster, (of_kind - of_kind.mean(axis=1, keepdims=True)).T)
         part = number / (number - 1.0) * (totals**2).sum(axis=0) / count**2
         variance += part
         weighed += part**2 / (number - 1.0)

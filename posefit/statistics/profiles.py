@@ -16,8 +16,8 @@ Trace = tuple[Array, Array]
 
 def hits(run: Trace, targets: ArrayLike) -> Array:
     """Return after how many evaluations (targets,) a run had a cost as low as each target; inf where it never had."""
-    wanted = finite("targets", targets, ("targets",))
-    first = np.searchsorted(-run[1], -wanted, side="left")
+    levels = finite("targets", targets, ("targets",))
+    first = np.searchsorted(-run[1], -levels, side="left")
     return np.append(run[0], np.inf)[first]
 
 
@@ -67,12 +67,12 @@ def running_time_interval(
     if count < 2:
         return np.full(times.shape[1], np.nan), np.full(times.shape[1], np.nan)
     reached = np.isfinite(times)
-    spent, found = np.zeros((2, count, times.shape[1]))
-    np.add.at(spent, cluster, np.where(reached, times, used[:, None]))
-    np.add.at(found, cluster, reached)
+    cluster_used, cluster_hits = np.zeros((2, count, times.shape[1]))
+    np.add.at(cluster_used, cluster, np.where(reached, times, used[:, None]))
+    np.add.at(cluster_hits, cluster, reached)
     drawn = rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES).astype(np.float64)
-    spent, found = drawn @ spent, drawn @ found
-    resampled = np.divide(spent, found, out=np.full(spent.shape, np.inf), where=found > 0.0)
+    cluster_used, cluster_hits = drawn @ cluster_used, drawn @ cluster_hits
+    resampled = np.divide(cluster_used, cluster_hits, out=np.full(cluster_used.shape, np.inf), where=cluster_hits > 0.0)
     # an end is one of the resamples and never a mean of two, of which one may be infinite
     low, high = np.quantile(resampled, [0.5 - level / 2.0, 0.5 + level / 2.0], axis=0, method="inverted_cdf")
     return low, high

@@ -6,10 +6,9 @@ result holds for these instances. For a claim about instances like these, make e
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from string import ascii_letters
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +20,6 @@ from posefit.statistics.pairing import finite
 
 LEVEL = 0.05  # of significance
 MAX_EXACT_TIES = 13  # blocks, for which scipy has exact p-values with ties, too, and goes through all signs one by one
-LETTERS = ascii_letters  # of as many groups at most
 _SHAPE = ("methods", "instances", "seeds")
 
 
@@ -87,27 +85,3 @@ def holm(p_values: ArrayLike) -> Array:
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
     return adjusted
-
-
-def compact_letters(count: int, apart: Iterable[tuple[int, int]]) -> list[str]:
-    """Return letters for each of `count` methods, such that two share one exactly where they do not differ.
-
-    `apart` names the pairs, of 0 to count - 1, that differ by some test. The letters are given in the order of the
-    methods, so best first makes `a` the best group. All are empty where 52 letters are not enough. The compact letter
-    display by inserting and absorbing: Piepho, An algorithm for a letter-based representation of all-pairwise
-    comparisons, 2004.
-    """
-    groups = [frozenset(range(count))]
-    for first, second in apart:
-        if first == second or not {first, second} <= set(range(count)):
-            raise InputError(f"apart must be of two different methods of 0 to {count - 1}, got {(first, second)}")
-        split = {
-            part
-            for group in groups
-            for part in ((group - {first}, group - {second}) if {first, second} <= group else (group,))
-        }
-        groups = [group for group in split if not any(group < other for other in split)]
-        if len(groups) > len(LETTERS):
-            return [""] * count
-    named = dict(zip(LETTERS, sorted(groups, key=sorted), strict=False))
-    return ["".join(letter for letter, group in named.items() if method in group) for method in range(count)]

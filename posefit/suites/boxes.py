@@ -25,6 +25,7 @@ SIZES = (6, 7, 13, 17, 21, 37)  # components of the boxes of 9, 10, 16, 20, 24 a
 SHOW_NOTHING = (49, 61)  # joint angles that turn a hand about its forearm, unless fingers move as well
 FRAMES = 8  # of a sequence
 VALUES = (2, 4, 8, 16)  # how many each of four mixed latents may have; each fifth one has any
+CONSTANT = math.radians(10.0)  # to either side: the range of joint angles that are constant in the data
 HELD_OUT_GROUP = "held out"  # the name of the box learned from all people for training
 
 
@@ -109,6 +110,7 @@ class AngleBox(Components):
         self.angles = np.sort(order[:count])
         low, high = learned.low[self.angles], learned.high[self.angles]
         self.reach = 0.5 * (high - low)
+        self.constant = self.angles[np.abs(self.reach - CONSTANT) < 10.0 * STEP]  # of the data
         self._rotation = np.eye(count)
         if rng is not None:
             rotation, signs = np.linalg.qr(rng.standard_normal((count, count)))

@@ -23,6 +23,7 @@ from posefit.silhouette.corruption import corrupted
 from posefit.silhouette.cost import mean_over_views, project
 from posefit.silhouette.mask import Silhouette
 from posefit.suites.boxes import (
+    CONSTANT,
     FRAMES,
     HELD_OUT_PEOPLE,
     TRAINING_PEOPLE,
@@ -182,12 +183,9 @@ def _single(draft: _Draft, views: int = 1) -> SuiteInstance:
 
 def _still(draft: _Draft, pose: Array) -> Array:
     """Return a pose (66,) with random values of the angles that are constant in the data, off the box's middle."""
-    offs = draft.rng.uniform(-0.5, 0.5, 66)
-    if not isinstance(draft.box, AngleBox):
-        return pose
-    moved = pose.copy()
-    still = 3 + draft.box.angles[np.abs(draft.box.reach - np.radians(10.0)) < 1e-3]
-    moved[still] += np.radians(10.0) * offs[still]
+    moved, offs = pose.copy(), draft.rng.uniform(-0.5, 0.5, 66)
+    if isinstance(draft.box, AngleBox):
+        moved[3 + draft.box.constant] += CONSTANT * offs[3 + draft.box.constant]
     return moved
 
 

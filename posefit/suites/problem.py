@@ -64,7 +64,6 @@ class Problem:
 
     number_of_objectives = 1
     number_of_constraints = 0
-    number_of_integer_variables = 0
     evaluations_constraints = 0
 
     def __init__(
@@ -84,7 +83,8 @@ class Problem:
         self.index = 0  # in a `Suite`
         self.id_function = function.number
         self.instance = self.id_instance = made.number
-        self.dimension = self.number_of_variables = d = len(made.truth)
+        self.dimension = d = len(made.truth)
+        self.lower_bounds, self.upper_bounds = np.full(d, -1.0), np.ones(d)
         # without blanks, as in posefit-2026.3_f001_i00017_d09; and in words
         self.id = f"{suite}_f{function.number:03d}_i{made.number:05d}_d{d:02d}"
         self.name = f"{suite} f{function.number} {function.name}, instance {made.number} in {d}D"
@@ -124,16 +124,6 @@ class Problem:
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""
         return self.made.repaired(self._checked(proposals).reshape(-1, self.dimension))
-
-    @property
-    def lower_bounds(self) -> Array:
-        """-1 (d,)."""
-        return np.full(self.dimension, -1.0)
-
-    @property
-    def upper_bounds(self) -> Array:
-        """1 (d,)."""
-        return np.ones(self.dimension)
 
     @property
     def initial_solution(self) -> Array:

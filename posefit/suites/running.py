@@ -166,13 +166,6 @@ def method_name(run: SuiteRun) -> str:
     return f"{run.method} ({chosen})" if chosen else run.method
 
 
-def budgets_differ(results: Sequence[SuiteRun] | Sequence[SuiteScore]) -> bool:
-    """Return whether in some dimension runs, or those behind scores, have several budgets."""
-    return len({(result.dimension, result.budget) for result in results}) > len(
-        {result.dimension for result in results}
-    )
-
-
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     """Return the score of runs that differ only in their instances, seeds and functions."""
     dimension, budget = runs[0].dimension, runs[0].budget

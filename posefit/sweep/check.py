@@ -1,17 +1,21 @@
-"""Checks a cell's spec before anything runs: options of a track by their one declaration, all other fields here."""
+"""Checks a cell's spec before anything runs, and a row of a ledger where it is read.
+
+Options of a track are checked by their one declaration, all other fields here.
+"""
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Set
 from dataclasses import fields
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import inf
 from pathlib import Path
 from typing import Any
 
 from posefit import settings
 from posefit.errors import InputError
-from posefit.fitting.check import between, finite_number, one_of, whole
+from posefit.fitting.check import between, one_of, whole
+from posefit.geometry.skeleton import JOINTS
 from posefit.motion import built_in, recorded
 from posefit.motion.clips import FPS, MOTIONS, load_motion, training_clips
 from posefit.reading import SHOWN, quoted, suggestion
@@ -19,13 +23,14 @@ from posefit.registry import Offer, registry, version_of
 from posefit.silhouette.corruption import CORRUPTIONS
 from posefit.suites.functions import DIMENSIONS, SUITES, checked_address, suite_function
 from posefit.suites.problem import INFEASIBLE
-from posefit.sweep.cell import ALL_AROUND, DROPPED, SearchCell, TrackCell, digest_of, json_of
+from posefit.sweep.cell import ALL_AROUND, DROPPED, KINDS, SearchCell, TrackCell, digest_of, json_of
 from posefit.tracking.method import method_names, parsed_settings, places_of
-from posefit.tracking.options import TrackOptions, declared
+from posefit.tracking.options import Check, TrackOptions, choice, declared, within
 
 FIELDS = tuple(field.name for field in fields(TrackCell) if field.name not in ("files", "version"))
 MAX_VIEWS, MAX_FRAMES = 100, 100_000  # of a cell
 MAX_BODY_OFF = 50.0  # percent that a body may be off
+LARGEST = 1e30  # of a figure in a row: its square is finite, and so is itself in 32 bits
 
 
 def cell_of(spec: Mapping[str, Any]) -> TrackCell:
@@ -71,8 +76,8 @@ def search_of(spec: Mapping[str, Any]) -> SearchCell | None:
 def search_method(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry of a list of optimisers with its settings, checked, by their names alone."""
     method = _name("method", entry.get("method"))
-    given = flattened("settings", entry.get("settings", {})).items()
-    chosen = {name.rpartition(".")[2]: value for name, value in given}
+    entered = flattened("settings", entry.get("settings", {})).items()
+    chosen = {name.rpartition(".")[2]: value for name, value in entered}
     return {**entry, "settings": settings.check(method, registry().optimiser(method), chosen)}
 
 
@@ -204,7 +209,7 @@ def _corruption(field: str, value: Any) -> dict[str, float]:
     for kind in value:
         if kind not in kinds:
             raise InputError(f"{field} must be of {', '.join(kinds)}, got {quoted(kind)}{suggestion(kind, kinds)}")
-    strengths = {kind: _within(1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
+    strengths = {kind: within(0.0, 1.0)(f"{field} {kind}", value[kind]) for kind in sorted(value)}
     return {kind: strength for kind, strength in strengths.items() if strength > 0.0}
 
 
@@ -222,16 +227,7 @@ def flattened(field: str, value: Any) -> dict[str, Any]:
     return flat
 
 
-def _within(high: float) -> Callable[[str, Any], float]:
-    def check(field: str, value: Any) -> float:
-        number = finite_number(field, value)
-        between(field, number, 0.0, high)
-        return number
-
-    return check
-
-
-def _whole(least: int, most: float = inf) -> "Check":
+def _whole(least: int, most: float = inf) -> Check:
     def check(field: str, value: Any) -> int:
         between(field, number := whole(field, value, least), least, most)
         return number
@@ -239,16 +235,7 @@ def _whole(least: int, most: float = inf) -> "Check":
     return check
 
 
-def _choice(*choices: object) -> "Check":
-    def checked(field: str, value: Any) -> Any:
-        one_of(field, value, choices)
-        return value
-
-    return checked
-
-
 _OPTIONS = {option.name: check for option in fields(TrackOptions) if (check := declared(option).check) is not None}
-Check = Callable[[str, Any], Any]
 Checks = Mapping[str, Check]
 CHECKS: Checks = {
     **{name: _OPTIONS[name] for name in FIELDS if name in _OPTIONS},
@@ -261,18 +248,125 @@ CHECKS: Checks = {
     "instance": _whole(0),
     "name": _label,
     "frames": _whole(1, MAX_FRAMES),
-    "yaw_off_degrees": _within(ALL_AROUND),
-    "body_off_percent": _within(MAX_BODY_OFF),
+    "yaw_off_degrees": within(0.0, ALL_AROUND),
+    "body_off_percent": within(0.0, MAX_BODY_OFF),
 }
 SEARCH_CHECKS: Checks = {
-    "suite": _choice(*SUITES),
+    "suite": choice(*SUITES),
     "method": _name,
     "function": lambda _, value: suite_function(value).number,
-    "dimension": _choice(*DIMENSIONS),
+    "dimension": choice(*DIMENSIONS),
     "instance": _whole(0),
     "budget": _whole(1),
     "settings": flattened,
-    "infeasible": _choice(*INFEASIBLE),
+    "infeasible": choice(*INFEASIBLE),
     "seed": _whole(0),
     "name": _label,
 }
+
+
+def _of(outer: type, *inner: type) -> Check:
+    """Return the check of a list or table of plain values."""
+
+    def check(field: str, value: Any) -> Any:
+        parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        if type(value) is not outer or not all(type(part) in inner for part in parts):
+            raise InputError(f"{field} must be what posefit writes, got {quoted(value)}")
+        return value
+
+    return check
+
+
+def _number(field: str, value: Any) -> float:
+    if type(value) not in (int, float) or not -LARGEST < value < LARGEST:
+        raise InputError(f"{field} must be a number that a cell can measure, got {quoted(value)}")
+    return float(value)
+
+
+def _figure(field: str, value: Any) -> None:
+    for part in value.values() if isinstance(value, dict) else [value]:
+        if part is not None:
+            _number(field, part)
+
+
+def _numbers(field: str, value: Any, count: int | None = None) -> list[float]:
+    numbers = [_number(field, part) for part in _of(list, int, float)(field, value)]
+    if count is not None and len(numbers) != count:
+        raise InputError(f"{field} must be {count} numbers, got {len(numbers)}")
+    return numbers
+
+
+def _trace(field: str, value: Any) -> None:
+    trace = _of(dict, list)(field, value)
+    used, costs = (_numbers(field, trace.get(name)) for name in ("evaluations", "cost"))
+    rising = used == sorted(set(used)) and costs == sorted(costs, reverse=True) and all(number >= 1 for number in used)
+    if not rising or len(used) != len(costs):
+        raise InputError(f"{field} must be rising evaluations from 1 and the best cost after each, got {quoted(value)}")
+
+
+def _modes(field: str, value: Any) -> None:
+    for part in _of(list, list)(field, value):
+        between(f"the probability of {field}", _numbers(field, part, 3)[1], 0.0, 1.0)
+
+
+# what a ledger holds of a cell: names of methods, motions and files as they were wherever it was written
+WRITTEN: Checks = {
+    **CHECKS,
+    **SEARCH_CHECKS,
+    **dict.fromkeys(("kind", "method", "motion", "version"), _of(str, str)),
+    "train": _of(list, str),
+    "files": _of(dict, str),
+    "settings": _of(dict, int, float, str, bool, type(None), list),
+    "evaluations": _whole(1),
+}
+# the figures that a row must have; others are numbers
+FIGURES: Mapping[str, Checks] = {
+    "track": {
+        "warnings": _of(list, str),
+        "trace": _trace,
+        "joint_errors_mm": partial(_numbers, count=len(JOINTS)),
+        "mode_reliability": _modes,
+    },
+    "search": {"warnings": _of(list, str), "trace": _trace, "truth_cost": _number},
+}
+
+
+def checked_row(key: str, spec: str, status: str, faults: str, row: str | None) -> dict[str, Any]:
+    """Return a row of a ledger as a mapping. Raises InputError saying what was expected instead."""
+    values = _parsed(spec)
+    one_of("kind", kind := str(values.get("kind")), KINDS)
+    _check_names(values, {"kind", *(field.name for field in fields(KINDS[kind]))})
+    for name, value in values.items():
+        checked = WRITTEN[name](name, value)
+        if (list(checked) if isinstance(checked, tuple) else checked) != value:
+            raise InputError(f"{name} must be what posefit writes, got {quoted(value)}")
+    if kind == "search":
+        checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
+    if status != "done":
+        reasons = _of(list, str)("reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons"))
+        return {"key": key, "spec": values, "status": "quarantined", "reasons": reasons}
+    figures = _parsed(row or "")
+    _check_names(figures, FIGURES[kind].keys() | figures.keys())
+    for name, value in figures.items():
+        check: Check = FIGURES[kind].get(name, _figure)
+        check(name, value)
+    if kind == "search" and not figures["trace"]["cost"]:
+        raise InputError("trace must have an evaluation, got none")
+    return {"key": key, "spec": values, "status": "done", **figures}
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    try:
+        values = json.loads(text)
+        json.dumps(values, ensure_ascii=False, allow_nan=False).encode()  # finite numbers, whole characters
+    except (ValueError, TypeError, RecursionError) as error:
+        raise InputError(f"expected JSON of finite numbers and whole characters, got {quoted(str(error))}") from None
+    if not isinstance(values, dict):
+        raise InputError(f"expected a table of values, got {quoted(values)}")
+    return values
+
+
+def _check_names(values: Mapping[str, Any], names: Set[str]) -> None:
+    if values.keys() != names:
+        came = "one more" if (wrong := min(values.keys() ^ names)) in values else "none"
+        raise InputError(f"a row must hold what posefit writes, got {came}: {quoted(wrong)}")

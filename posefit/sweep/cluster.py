@@ -89,11 +89,11 @@ class Cluster:
 
 def _call(run: Run, limits: Limits, job: Any) -> tuple[Any, str | None, bool]:
     """Return, on a thread of a worker, what a function makes of a job; or None, why, and whose fault it is."""
-    if getattr(_thread, "runs", None) != (wanted := (pickle.dumps(run), limits)):
+    if getattr(_thread, "runs", None) != (current := (pickle.dumps(run), limits)):
         if hasattr(_thread, "pool"):
             _thread.pool.close()
         multiprocessing.current_process().daemon = False  # which Dask's nanny makes it, and no daemon has processes
-        _thread.runs, _thread.pool = wanted, Pool(1, limits, run)
+        _thread.runs, _thread.pool = current, Pool(1, limits, run)
     _thread.pool.submit(job)
     while not (outcomes := _thread.pool.wait(POLL_SECONDS)):
         pass

@@ -1,6 +1,5 @@
 """What `posefit sweep` does."""
 
-import json
 import os
 import re
 import shlex
@@ -81,32 +80,30 @@ def cells_of(plan: Iterable[Cell], shard: str | None) -> Iterator[Cell]:
     return islice(plan, int(first) - 1, None, int(count))
 
 
-def preview(plan: str, out: str | None, shard: str | None, as_json: bool) -> Iterator[str]:
-    """Yield the lines of a preview: how many cells of a plan have which values, and how many are to run.
-
-    Or those of one JSON object with each cell, and whether it is done. A million cells are never in memory together.
-    """
+def previewed(plan: str, out: str | None, shard: str | None) -> Iterator[tuple[Cell, bool]]:
+    """Yield the cells of a plan or of a shard, and whether each is done."""
     path = None if out is None else Path(out) / file_of(shard)
     ledger = Ledger(path) if path is not None and path.exists() else None
+    for cell in cells_of(Plan.read(plan), shard):
+        yield cell, ledger is not None and cell.key in ledger
+
+
+def preview_lines(cells: Iterable[tuple[Cell, bool]]) -> list[str]:
+    """Return how many cells have which values, and how many are to run."""
     counts: dict[str, Counter[str]] = {}
-    number = to_run = evaluations = 0
-    for number, cell in enumerate(cells_of(Plan.read(plan), shard), 1):
-        done = ledger is not None and cell.key in ledger
+    total = to_run = evaluations = 0
+    for cell, done in cells:
+        total += 1
         to_run, evaluations = to_run + (not done), evaluations + (not done) * cell.total_evaluations
-        if as_json:
-            yield ("," if number > 1 else '{"cells": [') + json.dumps({"key": cell.key, "done": done, **cell.spec})
-        else:
-            for name, value in cell.spec.items():
-                counts.setdefault(name, Counter())[value if isinstance(value, str) else json_of(value)] += 1
-    if as_json:
-        yield "]}"
-        return
+        for name, value in cell.spec.items():
+            counts.setdefault(name, Counter())[value if isinstance(value, str) else json_of(value)] += 1
+    lines = []
     for name, values in counts.items():
         if name in ("method", "motion") or (len(values) > 1 and name not in ("version", "files")):
             shown = [f"{count:,} x {cut(value)}" for value, count in islice(values.items(), VALUES)]
             more = [f"and {len(values) - VALUES:,} other values"] * (len(values) > VALUES)
-            yield f"{name:16}  {', '.join(shown + more)}"
-    yield f"{number:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"
+            lines.append(f"{name:16}  {', '.join(shown + more)}")
+    return [*lines, f"{total:,} cells, {to_run:,} of them to run, {evaluations:,} evaluations"]
 
 
 def engine(

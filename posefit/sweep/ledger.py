@@ -6,8 +6,8 @@ Cells are in the table `cells`: key, kind ("track" or "search"), spec (JSON: wha
 "quarantined"), faults (JSON: the reasons of failed attempts), losses (times that something outside ended it), row
 (JSON: the figures) and arrays (an .npz). The view `runs` has what queries ask for most as columns.
 
-One driver writes a file: it holds a transaction open in a second one beside it, FILE.driver, which names its process.
-SQLite and the operating system drop that lock when the process ends in any way.
+One driver writes a file: it holds a lock on a second one beside it, FILE.driver, which names its process. The operating
+system drops that lock when the process ends in any way.
 """
 
 import io
@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from posefit.errors import InputError
-from posefit.geometry.skeleton import JOINTS
+from posefit.files import lock
 from posefit.reading import counted, cut, quoted
 from posefit.sweep.cell import Cell, CellResult, cell_from
-from posefit.sweep.row import checked_row
+from posefit.sweep.check import checked_row
 from posefit.version import posefit_build
 
 if TYPE_CHECKING:
@@ -68,7 +68,6 @@ class Ledger:
 
     def __init__(self, *paths: str | Path) -> None:
         self.path = Path(paths[0])
-        self._paths = paths
         self.files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
         self._open = [(file, _reader(file)) for file in self.files]
         # of cells in several files the first finished one counts, or the first
@@ -77,9 +76,6 @@ class Ledger:
             for key, status in self._query(k, "SELECT key, status FROM cells WHERE status != 'planned'"):
                 if key not in self._places or (status == "done" and not self._places[key][1]):
                     self._places[key] = k, status == "done"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Ledger, tuple(Path(path).absolute() for path in self._paths)
 
     def __len__(self) -> int:
         return sum(done for _, done in self._places.values())
@@ -113,14 +109,6 @@ class Ledger:
         yield from self.rows()
         yield from self.quarantined()
 
-    def row(self, key: str) -> dict[str, Any]:
-        """Return the row of a cell. Raises KeyError where there is none."""
-        if key not in self:
-            raise KeyError(key)
-        k, _ = self._places[key]
-        (values,) = self._query(k, f"{SELECT} WHERE key = ?", key)
-        return self._checked(k, *values)
-
     def joints(self, key: str) -> dict[str, "Array"]:
         """Return the joints (T, 27, 3) of a cell's frames in metres, as `estimate` and `truth`, float32."""
         import numpy as np
@@ -129,18 +117,14 @@ class Ledger:
         try:
             ((data,),) = self._query(k, "SELECT arrays FROM cells WHERE key = ?", key)
             with zipfile.ZipFile(io.BytesIO(data)) as archive:
-                unpacked = sum(member.file_size for member in archive.infolist())
-            if unpacked <= MAX_JOINTS_BYTES:
-                with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-                    joints: dict[str, Any] = {
-                        name: np.asarray(stored[name], dtype=np.float32) for name in ("estimate", "truth")
-                    }
-                shapes = {array.shape for array in joints.values() if np.isfinite(array).all()}
-                if len(shapes) == 1 and (shape := shapes.pop())[1:] == (len(JOINTS), 3) and shape[0]:
-                    return joints
+                if sum(member.file_size for member in archive.infolist()) > MAX_JOINTS_BYTES:
+                    raise ValueError("more than a cell has")
+            with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+                return {name: stored[name] for name in ("estimate", "truth")}
         except Exception:  # whatever a hostile archive raises
-            pass
-        raise InputError(f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones")
+            raise InputError(
+                f"{self._open[k][0]}: the joints of cell {key[:8]} must be whole, got damaged ones"
+            ) from None
 
     def frame(self) -> "pd.DataFrame":
         """Return a table of all cells, finished or quarantined; see `posefit.sweep.table`."""
@@ -192,8 +176,8 @@ class Writer:
         _check_place(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(self.path)
             self._db = sqlite3.connect(self.path, timeout=BUSY_SECONDS, isolation_level=None)
+            self._lock = _locked(self.path)
         except (OSError, sqlite3.Error) as error:
             raise _unwritable(self.path, error) from None
         try:
@@ -219,9 +203,8 @@ class Writer:
 
     def close(self) -> None:
         """Let others drive it."""
-        for database in (getattr(self, "_db", None), self._lock):
-            if database is not None:
-                database.close()
+        self._db.close()
+        os.close(self._lock)
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -343,29 +326,22 @@ def _check_place(path: Path) -> None:
         raise InputError(f"{folder}: expected a new folder or a ledger, got one with {names[0]}")
 
 
-def _locked(path: Path) -> sqlite3.Connection:
-    """Return what says, as long as it is open, that this process drives a file. Raises InputError where one does."""
-    database = sqlite3.connect(f"{path}{DRIVER}", timeout=0.0, isolation_level=None)
-    try:
-        database.execute("BEGIN IMMEDIATE")
-        database.execute("CREATE TABLE IF NOT EXISTS driver (process INTEGER, host TEXT)")
-        database.execute("DELETE FROM driver")
-        database.execute("INSERT INTO driver VALUES (?, ?)", [os.getpid(), socket.gethostname()])
-        database.execute("COMMIT")
-        database.execute("BEGIN IMMEDIATE")
-    except sqlite3.OperationalError as error:
-        if "locked" not in str(error):
-            raise
-        try:
-            process, host = database.execute("SELECT process, host FROM driver").fetchone()
-        except (sqlite3.Error, TypeError):
-            process, host = "another", "this disk"
-        database.close()
+def _locked(path: Path) -> int:
+    """Return an open file that says, as long as it is locked, that this process drives another.
+
+    Raises InputError where another process does.
+    """
+    file = os.open(f"{path}{DRIVER}", os.O_RDWR | os.O_CREAT, 0o666)
+    if not lock(file):
+        driver = os.read(file, 1000).decode(errors="replace") or "another process"
+        os.close(file)
         raise InputError(
-            f"{path}: expected a ledger that no other sweep writes to, got one that process {process} of {host} "
-            "drives; --shard I/N writes to a file of its own"
-        ) from None
-    return database
+            f"{path}: expected a ledger that no other sweep writes to, got one that {cut(driver)} drives; "
+            "--shard I/N writes to a file of its own"
+        )
+    os.ftruncate(file, 0)
+    os.write(file, f"process {os.getpid()} of {socket.gethostname()}".encode())
+    return file
 
 
 def _damaged(file: Path, error: Exception) -> InputError:

@@ -202,13 +202,14 @@ def _gridded(methods: Sequence[Any], grid: Any, names_of: Callable[[str], Sequen
         method = entry.get("method")
         names = names_of(method) if lists and isinstance(method, str) else ()
         known.update(names)
-        mine = [name for name in lists if name.partition(".")[0] in names]
-        own = flattened("settings", entry.get("settings", {}))
-        if twice := [name for name in mine if {name, name.rpartition(".")[2]} & own.keys()]:
+        applicable = [name for name in lists if name.partition(".")[0] in names]
+        entry_settings = flattened("settings", entry.get("settings", {}))
+        if twice := [name for name in applicable if {name, name.rpartition(".")[2]} & entry_settings.keys()]:
             raise InputError(f"grid must hold what no entry of methods sets itself, got {twice[0]}, which one does")
-        used.update(mine)
-        for chosen in product(*(lists[name] for name in mine)):
-            entries.append({**entry, "settings": own | dict(zip(mine, chosen, strict=True))} if mine else entry)
+        used.update(applicable)
+        for chosen in product(*(lists[name] for name in applicable)):
+            settings = entry_settings | dict(zip(applicable, chosen, strict=True))
+            entries.append({**entry, "settings": settings} if applicable else entry)
     if unused := [name for name in lists if name not in used]:
         raise InputError(
             f"grid must hold settings of {', '.join(sorted(known))}, the plan's methods, got {quoted(unused[0])}"

@@ -1,4 +1,4 @@
-"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it; or as runs of a suite.
+"""The rows of a ledger as a table of pandas, one row a cell: `Ledger.frame` gives it; as CSV; or as runs of a suite.
 
 Columns are `key`, `version`, `status` ("done" or "quarantined"), `reason`; the cell's spec, with `settings`,
 `corruption`, `train`, `view_degrees` and `size` as text, so that rows can be grouped by them; every figure, those of a
@@ -7,12 +7,15 @@ and `seconds`, `seconds_per_frame` and `cpu_seconds_per_frame`, the only ones th
 are sorted by what the spec says, not by when they were finished.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+import csv
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from posefit.errors import InputError
+from posefit.files import new_file
 from posefit.geometry.skeleton import JOINTS
 from posefit.measuring.tables import import_pandas
 from posefit.settings import settings_text
@@ -32,18 +35,10 @@ _TEXTS = (
 def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
     """Return the table of rows, finished or quarantined. Raises ImportError where pandas is not installed."""
     pandas = import_pandas()
-    columns: dict[str, list[Any]] = {name: [] for name in _TEXTS}
-    count = 0
-    for row in rows:
-        for name, value in flat(row).items():
-            column = columns.setdefault(name, [])
-            column.extend([None] * (count - len(column)))
-            column.append(value)
-        count += 1
-    for values in columns.values():
-        values.extend([None] * (count - len(values)))
-    table: pd.DataFrame = pandas.DataFrame({name: pandas.Series(values) for name, values in columns.items()})
-    return table.sort_values(list(ORDER), ignore_index=True) if count else table
+    table: pd.DataFrame = pandas.DataFrame([{**dict.fromkeys(_TEXTS), **flat(row)} for row in rows])
+    if table.empty:
+        return table.reindex(columns=list(_TEXTS))
+    return table.sort_values(list(ORDER), ignore_index=True)
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -72,16 +67,19 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def search_runs(rows: Iterable[Mapping[str, Any]], path: object) -> Iterator[SuiteRun]:
-    """Yield the runs of a ledger's rows. Raises ValueError, naming its path, where there are none, or other ones."""
-    count = 0
-    for row in rows:
-        if row["spec"]["kind"] != "search":
-            raise InputError(f"{path}: expected a ledger of single searches, got one of tracks: posefit report")
-        count += 1
-        yield search_run(row)
-    if not count:
-        raise InputError(f"{path}: expected a ledger with finished rows, got one with none")
+def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:
+    """Write rows as a new CSV file, in UTF-8; columns are all that any row has, in the order of their first row.
+
+    Missing values are left empty. Raises ValueError where there is no row, and where the file exists or cannot be
+    written.
+    """
+    table = list(rows)
+    if not table:
+        raise InputError("rows must be at least one, got none")
+    with new_file(path) as building, building.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in table for name in row)), restval="")
+        writer.writeheader()
+        writer.writerows(table)
 
 
 def search_run(row: Mapping[str, Any]) -> SuiteRun:

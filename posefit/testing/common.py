@@ -32,9 +32,18 @@ class PluginCase:
         """Return a new plugin, with more settings or others."""
         return self.factory(**{**self.settings, **more})
 
-    def use(self, **more: Any) -> None:
+    def use(self, **more: Any) -> object:
         """Build a plugin, and use it where a setting that makes no sense may show only then."""
-        self.build(**more)
+        return self.build(**more)
+
+    @property
+    def random_unchanged(self) -> bool:
+        """Whether a first use, once for all rules, has left the global random generators alone."""
+        return False
+
+    def use_fully(self) -> object:
+        """Use a new plugin as its caller does."""
+        return self.use()
 
 
 def construction(case: PluginCase) -> None:
@@ -62,6 +71,13 @@ def silence(case: PluginCase) -> None:
     with redirect_stdout(io.StringIO()) as printed:
         case.use()
     expect(not printed.getvalue(), f"a plugin must print nothing, got {quoted(printed.getvalue())}")
+
+
+def global_randomness(case: PluginCase) -> None:
+    """The global random generators are neither used nor changed."""
+    if not case.random_unchanged:  # a library that was imported meanwhile may have seeded them
+        with left_alone():
+            case.use_fully()
 
 
 def unknown_setting(case: PluginCase) -> None:

@@ -15,7 +15,7 @@ from posefit.fitting.optimiser import Filter, NextFrame, Optimiser, populations
 from posefit.fitting.validation import BrokenRuleError, CheckedOptimiser
 from posefit.settings import planned
 from posefit.testing import common
-from posefit.testing.common import PluginCase, check_speed, duplicates, left_alone, unchanged
+from posefit.testing.common import PluginCase, check_speed, duplicates, unchanged
 from posefit.testing.problem import pose_problem
 from posefit.testing.results import BrokenError, SkippedError, expect
 from posefit.testing.toy import Toy, ball, shell, sphere
@@ -60,6 +60,10 @@ class Case(PluginCase):
         """Check a few populations of an optimiser."""
         for proposals, _ in self.steps(self.build(Toy(5), **more), Toy(5), sphere, 3):
             check_population(proposals, Toy(5))
+
+    def use_fully(self) -> list[Array]:
+        """Return the populations of a search."""
+        return self.trace()
 
     def steps(
         self, optimiser: Optimiser, space: Space, evaluate: Evaluate, count: int
@@ -243,12 +247,6 @@ def new_process(case: Case) -> None:
     expect(same(case.trace(), pickle.loads(trace)), "one seed must give one trace in every process, got two")
 
 
-def global_randomness(case: Case) -> None:
-    """The global random generators are neither used nor changed."""
-    with left_alone():
-        case.trace()
-
-
 def inputs(case: Case) -> None:
     """The method tell leaves its arguments as they were."""
     optimiser = case.build(SPACE)
@@ -363,7 +361,7 @@ RULES = [
     nonsense_settings,
     seeds,
     new_process,
-    global_randomness,
+    common.global_randomness,
     inputs,
     copies,
     start,

@@ -43,19 +43,20 @@ class Case(PluginCase):
         returned = prior.fit(angles, built_in.average_skeleton())
         return Fitting(prior, returned, inputs_unchanged(), random == global_random_state())
 
-    def use(self, **more: Any) -> None:
-        """Let a prior learn."""
-        self.build(**more).fit(walking_angles(), built_in.average_skeleton())
+    def use(self, **more: Any) -> Prior:
+        """Return another prior that has learned the same."""
+        prior: Prior = self.build(**more)
+        return prior.fit(walking_angles(), built_in.average_skeleton())
+
+    @property
+    def random_unchanged(self) -> bool:
+        """Whether the first fit has left the global random generators alone."""
+        return self.first.random_unchanged
 
     @property
     def fitted(self) -> Prior:
         """The prior that has learned, as `fit` returned it."""
         return self.first.returned
-
-    def fitted_again(self) -> Prior:
-        """Return another prior that has learned the same."""
-        prior: Prior = self.build()
-        return prior.fit(walking_angles(), built_in.average_skeleton())
 
     @property
     def latents(self) -> Array:
@@ -136,7 +137,7 @@ def same_bits(case: Case) -> None:
 
 def same_again(case: Case) -> None:
     """Learning the same poses again gives the same space."""
-    again = case.fitted_again()
+    again = case.use()
     same = np.array_equal(case.fitted.low, again.low) and _same(case.fitted, again, case.latents)
     expect(same, "fitting twice must give the same space, got two")
 
@@ -151,10 +152,8 @@ def inputs(case: Case) -> None:
 
 
 def global_randomness(case: Case) -> None:
-    """The global random generators are left alone."""
-    if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
-        with left_alone():
-            case.fitted_again()
+    """The global random generators are neither used nor changed."""
+    common.global_randomness(case)
     with left_alone():
         case.fitted.inverse_transform(case.latents)
 

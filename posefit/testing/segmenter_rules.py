@@ -16,7 +16,7 @@ from posefit.silhouette.cost import project
 from posefit.silhouette.foreground import Image, Segmenter
 from posefit.silhouette.mask import Mask
 from posefit.testing import common
-from posefit.testing.common import PluginCase, check_speed, left_alone, unchanged
+from posefit.testing.common import PluginCase, check_speed, unchanged
 from posefit.testing.results import SkippedError, expect
 
 SIZE = (320, 240)
@@ -87,7 +87,7 @@ class Case(PluginCase):
         for image in painted()[0].frames(stop=EMPTY, step=4):
             segmenter.segment(image)
 
-    def segment(self) -> list[tuple[Mask, Mask]]:
+    def use_fully(self) -> list[tuple[Mask, Mask]]:
         """Return the masks and shadows of every fourth frame, in order."""
         segmenter, pairs = self.build(), list[tuple[Mask, Mask]]()
         for image in painted()[0].frames(step=4):
@@ -100,8 +100,8 @@ class Case(PluginCase):
 
     @cached_property
     def masks(self) -> list[tuple[Mask, Mask]]:
-        """What `segment` returns, once for all rules."""
-        return self.segment()
+        """What `use_fully` returns, once for all rules."""
+        return self.use_fully()
 
 
 def masks(case: Case) -> None:
@@ -126,7 +126,7 @@ def overlap(case: Case) -> str:
 
 def same_again(case: Case) -> None:
     """The same film gives the same masks."""
-    same = np.array_equal(case.masks, case.segment())
+    same = np.array_equal(case.masks, case.use_fully())
     expect(same, "two segmenters of one film must give the same masks, got others")
 
 
@@ -162,13 +162,6 @@ def landmarks(case: Case) -> str:
     return ""
 
 
-def global_randomness(case: Case) -> None:
-    """The global random generators are left alone."""
-    segmenter = case.build()
-    with left_alone():
-        segmenter.segment(painted()[0].images[20])
-
-
 def speed(case: Case) -> str:
     """A picture of 320 x 240 takes less than a second."""
     segmenter, images = case.build(), painted()[0].images[16:20]
@@ -183,7 +176,7 @@ RULES = [
     inputs,
     background,
     landmarks,
-    global_randomness,
+    common.global_randomness,
     common.silence,
     common.nonsense_settings,
     speed,

@@ -18,7 +18,7 @@ from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import common
-from posefit.testing.common import PluginCase, global_random_state, left_alone, unchanged
+from posefit.testing.common import PluginCase, global_random_state, unchanged
 from posefit.testing.problem import SIZE
 from posefit.testing.results import BrokenError, expect
 
@@ -68,6 +68,15 @@ class Case(PluginCase):
     def use(self, **more: Any) -> None:
         """Track two frames."""
         list(self.build(**more).track(scene()[2][:2], np.random.default_rng(0)))
+
+    @property
+    def random_unchanged(self) -> bool:
+        """Whether the first track has left the global random generators alone."""
+        return self.first.random_unchanged
+
+    def use_fully(self) -> bool:
+        """Track all frames."""
+        return self.same(self.build())
 
     def same(self, tracker: Tracker) -> bool:
         """Return whether a tracker gives the first track's poses."""
@@ -133,13 +142,6 @@ def used_twice(case: Case) -> None:
     expect(case.same(case.first.tracker), "a second track must be as the first, got another")
 
 
-def global_randomness(case: Case) -> None:
-    """The global random generators are left alone."""
-    if not case.first.random_unchanged:  # a library that was imported meanwhile may have seeded them
-        with left_alone():
-            case.same(case.build())
-
-
 def inputs(case: Case) -> None:
     """Observations and task stay as they were."""
     expect(case.first.inputs_unchanged, "observations and task must stay as they are, got others")
@@ -164,7 +166,7 @@ RULES = [
     audit,
     same_seed,
     used_twice,
-    global_randomness,
+    common.global_randomness,
     inputs,
     follows,
     common.silence,

@@ -12,10 +12,11 @@ from posefit.fitting.shape import Shape
 from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
 from posefit.measuring.gait import backwards_warning, gait_of, walks_backwards
+from posefit.output.content import Setup, TrackingLog
 from posefit.tracking.method import Method
 from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RELOCALISED
-from posefit.tracking.result import Setup, Track, TrackingLog
+from posefit.tracking.result import Track
 from posefit.tracking.trajectory import Tracked
 from posefit.uncertainty.modes import modes_of, track_modes
 

@@ -59,7 +59,9 @@ def declared(field: "Field[Any]") -> Option:
     return field.metadata["option"]  # type: ignore[no-any-return]
 
 
-def _one_of(*choices: str) -> Check:
+def choice(*choices: object) -> Check:
+    """Return the check of one of some values."""
+
     def check(name: str, value: Any) -> Any:
         one_of(name, value, choices)
         return value
@@ -67,7 +69,9 @@ def _one_of(*choices: str) -> Check:
     return check
 
 
-def _between(low: float, high: float, unit: str = "") -> Check:
+def within(low: float, high: float, unit: str = "") -> Check:
+    """Return the check of a number in a range."""
+
     def check(name: str, value: Any) -> float:
         if not low <= finite_number(name, value) <= high:
             raise InputError(f"{name} must lie in {low:g} to {high:g}{unit}, got {quoted(value)}")
@@ -82,7 +86,7 @@ def _int(default: int | None, text: str, least: int, placeholder: str = "N", **o
 
 
 def _float(text: str, ends: tuple[float, float], placeholder: str, unit: str = "", **others: Any) -> Any:
-    return option(None, text, _between(*ends, unit), placeholder, parse=float, **others)
+    return option(None, text, within(*ends, unit), placeholder, parse=float, **others)
 
 
 def _size(name: str, value: Any) -> tuple[int, int]:
@@ -120,7 +124,7 @@ def _device(_name: str, value: Any) -> str:
 
 def _degrees(name: str, value: Any) -> tuple[float, ...]:
     several = hasattr(value, "__len__") and not isinstance(value, str)
-    return tuple(_between(-360.0, 360.0, " degrees")(name, degrees) for degrees in (value if several else [value]))
+    return tuple(within(-360.0, 360.0, " degrees")(name, degrees) for degrees in (value if several else [value]))
 
 
 def _method(name: str, value: Any) -> Any:
@@ -188,13 +192,13 @@ class TrackOptions:
     up: "Up | None" = option(
         None,
         "Axis that points up: in the calibration's world, or in that of a .bvh or .amc file; recognised where absent.",
-        _one_of("x", "y", "z"),
+        choice("x", "y", "z"),
         "x|y|z",
     )
     unit: "Unit | None" = option(
         None,
         "Unit of lengths in a calibration, or in a .bvh or .asf file; recognised where absent.",
-        _one_of(*UNITS),
+        choice(*UNITS),
         "|".join(UNITS),
     )
     rate: float | None = _float("Rate of .amc files that do not state it; by default 120.", RATES, "HZ")
@@ -269,12 +273,12 @@ class TrackOptions:
     translation: "Translation | None" = option(
         None,
         "Of the root: known (the truth), searched, or aligned.",
-        _one_of("known", "searched", "aligned"),
+        choice("known", "searched", "aligned"),
         "HOW",
         heading="How it is followed",
     )
     first_pose: Literal["searched", "given"] = option(
-        "searched", "searched, or given (the true one).", _one_of("searched", "given"), "HOW"
+        "searched", "searched, or given (the true one).", choice("searched", "given"), "HOW"
     )
     restarts: int | None = _int(
         None, "Searches of an unknown first pose, at most; by default 8, or 0 for a tracker that looks ahead.", 0

@@ -5,8 +5,7 @@ Everything but `save`, `page` and `show` is a plain value, and pickles.
 
 import importlib
 import webbrowser
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
@@ -24,63 +23,19 @@ from posefit.footage.scene import Scene
 from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
-from posefit.output.content import Content
+from posefit.output.content import Content, Setup, TrackingLog
 from posefit.output.files import page_of
 from posefit.output.folder import OutputFolder
 from posefit.output.text import table
 from posefit.progress import QUIET
 from posefit.reading import quoted, suggestion
 from posefit.uncertainty.modes import TrackMode
-from posefit.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
     from PIL.Image import Image
 
 INLINE_HEIGHT = 720  # pixels of the page in a notebook
-
-
-@dataclass(frozen=True, kw_only=True)
-class Setup:
-    """What was tracked, and how."""
-
-    motion: str
-    source: list[str] | None = None  # one a camera
-    frames_chosen: list[int | None] | None = None
-    view_degrees: Any = None
-    method: str
-    settings: Mapping[str, Mapping[str, Any]]
-    seed: int
-    train: list[str]
-    evaluations_per_frame: int
-    dimensions: int | None
-    translation: str
-    first_pose: str
-    smooth: bool
-    views: int
-    camera: str
-    size_pixels: tuple[int, int]
-    fps: float
-    frames: int
-    version: str = __version__
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrackingLog:
-    """How the track went, and what it leaves open."""
-
-    hypotheses: list[dict[str, Any]]
-    build: Mapping[str, Any] | None
-    trace: list[list[float]] | None
-    modes: list[float] | None
-    none_of_modes: float | None
-    unknown_sides: list[int] | None
-    lost_frames: list[int] | None
-    relocalised: list[int]
-    retracked_outside: tuple[int, int] | None
-    backwards_share: float
-    warnings: list[str]
-    guesses: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,19 +57,18 @@ class Track:
         return len(self.frames)
 
     def __str__(self) -> str:
-        return table(self.summary)
+        return table(self.content)
 
     @property
     def summary(self) -> dict[str, Any]:
         """Everything but the frames, as `posefit track --json` prints it."""
-        trust, gait = None if self.trust is None else asdict(self.trust), self.gait.as_dict()
-        values = {**asdict(self.setup), **asdict(self.measures), **asdict(self.log), "trust": trust, "gait": gait}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+        return self.content.summary
 
     @property
     def content(self) -> Content:
         """What its files are made of."""
-        return Content(self.scene, self.frames, self.table, self.gait, self.summary)
+        values = {each.name: getattr(self, each.name) for each in fields(Content)}
+        return Content(**values)
 
     @property
     def truth(self) -> Motion | None:

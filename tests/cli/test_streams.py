@@ -31,22 +31,16 @@ def shell(command: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(words, capture_output=True, text=True, env={**os.environ, **variables})
 
 
-@each("unbuffered", ["", "1"])
-def test_messages_that_nobody_can_read_end_no_work(unbuffered: str, tmp_path: Path) -> None:
-    for number, redirected in enumerate(("2>&-", "2>/dev/full", "<&- 2>&-")):
+def test_messages_that_nobody_can_read_end_no_work(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(PLAN)
+    for number, redirected in enumerate(("2>/dev/full", "<&- 2>&-")):
         out = tmp_path / str(number)
-        ran = shell(f"posefit {TRACK} --json --out {out} {redirected}", PYTHONUNBUFFERED=unbuffered)
+        ran = shell(f"posefit {TRACK} --json --out {out} {redirected}")
         assert ran.returncode == 0
         assert json.loads(ran.stdout)["frames"] == 2
         assert (out / "summary.json").is_file()
-    assert shell("posefit track wlak 2>/dev/full").returncode == 2
-    assert shell("posefit track wlak 2>&-").returncode == 2
-
-
-def test_a_sweep_goes_on_without_standard_error(tmp_path: Path) -> None:
-    (tmp_path / "plan.toml").write_text(PLAN)
-    for number, redirected in enumerate(("2>&-", "2>/dev/full")):
-        ran = shell(f"posefit sweep {tmp_path}/plan.toml --workers 1 --json --out {tmp_path}/{number} {redirected}")
+        assert shell(f"posefit track wlak {redirected}").returncode == 2
+        ran = shell(f"posefit sweep {tmp_path}/plan.toml --workers 1 --json --out {out}-rows {redirected}")
         assert ran.returncode == 0
         assert json.loads(ran.stdout)["done"] == 1
 
@@ -54,13 +48,12 @@ def test_a_sweep_goes_on_without_standard_error(tmp_path: Path) -> None:
 @each("unbuffered", ["", "1"])
 def test_results_that_cannot_be_written_are_one_line(unbuffered: str) -> None:
     line = "posefit: standard output: expected room to write results to, got No space left on device\n"
-    for words in ("plugins", "plugins --json", "--version", "--help", "motions"):
+    for words in ("plugins --json", "--version", "--help"):
         ran = shell(f"posefit {words} >/dev/full", PYTHONUNBUFFERED=unbuffered)
         assert (ran.returncode, ran.stderr) == (2, line)
-    for words in ("plugins --json", f"{TRACK} --json", f"{TRACK} --quiet"):
-        closed = shell(f"posefit {words} >&-", PYTHONUNBUFFERED=unbuffered)
-        assert closed.returncode == 0
-        assert "Traceback" not in closed.stderr
+    closed = shell(f"posefit {TRACK} --json >&-", PYTHONUNBUFFERED=unbuffered)
+    assert closed.returncode == 0
+    assert "Traceback" not in closed.stderr
 
 
 def test_a_file_gets_messages_and_no_bars(tmp_path: Path) -> None:

@@ -283,14 +283,6 @@ def test_gymnasiums_wrappers_and_a_loop_as_in_cleanrl_run_on_it() -> None:
     assert stored[:, :, :, :, 0].any()
 
 
-def test_frames_are_stacked_by_gymnasiums_wrappers() -> None:
-    single = gym.wrappers.FrameStackObservation(gym.make("posefit/Track-v0", frames=2), 4)
-    observation, _ = single.reset(seed=0)
-    assert observation.shape == (4, 48, 64, 2)
-    stacked, *_ = single.step(single.action_space.sample())
-    np.testing.assert_array_equal(stacked[:-1], observation[1:])
-
-
 def test_an_episode_is_recorded_as_a_video(tmp_path: Path) -> None:
     env: Any = gym.make("posefit/FitImage-v0", render_mode="rgb_array", max_evaluations=3)
     env = gym.wrappers.RecordEpisodeStatistics(gym.wrappers.RecordVideo(env, str(tmp_path / "video")))

@@ -11,7 +11,7 @@ from posefit.silhouette.cost import project
 from posefit.sweep.cell import cell_scene
 from posefit.sweep.plan import Plan
 from posefit_envs.instance import SPLITS, Episode, first_episode, instance, world_of
-from posefit_envs.stage import Stage
+from posefit_envs.stage import Stage, values_of
 from tests.cases import each
 
 
@@ -81,7 +81,7 @@ def staged(numbers: tuple[int, ...], **arguments: Any) -> tuple[Stage, list[Epis
     world = world_of(**arguments)
     stage, episodes = Stage(world, len(numbers)), [first_episode(world, number, 10) for number in numbers]
     for row, episode in enumerate(episodes):
-        stage.set_problem(row, episode.problem)
+        stage.set_values(row, values_of(episode.problem))
     return stage, episodes
 
 

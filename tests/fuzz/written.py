@@ -69,7 +69,7 @@ def readers() -> dict[str, Callable[[Path], object]]:
 
     def reported(file: Path) -> object:
         out = file.parent / NAME
-        summary = write_report(str(file), f"{out}.html", warn=checked_message, csv=f"{out}.csv")
+        summary = write_report(str(file), f"{out}.html", csv=f"{out}.csv")
         Ledger(file).frame()
         return leaderboard_lines(summary)
 

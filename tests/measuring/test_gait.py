@@ -263,7 +263,7 @@ def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> No
     true = gait_of(tracked.truth)
     assert gait["cadence"] == pytest.approx(true.cadence, abs=3.0)
     assert gait["speed"] == pytest.approx(true.speed, abs=0.05)
-    assert gait_line(gait) in table(tracked.summary).splitlines()
+    assert gait_line(gait) in table(tracked.content).splitlines()
     assert gait_line(gait).startswith(f"gait: {gait['cadence']:.0f} steps a minute, {gait['speed']:.2f} m/s, over ")
     steps = csv_rows(out / "gait.csv")
     assert sum(step["step_seconds"] != "" for step in steps) == gait["steps"]
@@ -271,10 +271,10 @@ def test_a_track_of_a_walk_has_its_gait(tracked: posefit.Track, out: Path) -> No
 
 def test_a_track_of_no_walk_reports_why_and_a_single_frame_nothing() -> None:
     quick: dict[str, Any] = {"size": (80, 60), "evaluations": 30}
-    summary = posefit.track("jacks", frames=(0, 20), **quick).summary
-    assert summary["gait"]["walk"] is False
-    assert "no figures of gait: no strikes of a foot detected" in table(summary).splitlines()
-    assert "gait" not in table(posefit.fit("walk", **quick).summary)
+    track = posefit.track("jacks", frames=(0, 20), **quick)
+    assert track.summary["gait"]["walk"] is False
+    assert "no figures of gait: no strikes of a foot detected" in str(track).splitlines()
+    assert "gait" not in str(posefit.fit("walk", **quick).track)
 
 
 def test_unknown_frames_have_their_numbers_as_filmed() -> None:

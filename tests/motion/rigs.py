@@ -37,6 +37,7 @@ BONES = {  # of each joint of a rig: after which of posefit's joints its bone st
 }
 LEG = ("thigh", "shin", "foot", "toe")
 ARM = ("clavicle", "arm", "forearm", "hand")
+SHORT = ("L", "R")
 TRUNK = ("spine", "spine1", "chest", "neck", "neck1", "head")
 
 
@@ -54,96 +55,55 @@ class Style:
     no_ends: bool = False
 
 
-def named(prefix: str = "", **names: str) -> dict[str, str]:
-    return {joint: prefix + name for joint, name in names.items()}
+NAMES = """\
+mixamo | Hips, {}UpLeg, {}Leg, {}Foot, {}ToeBase, Spine, Spine1, Spine2, Neck, -, Head, {}Shoulder, {}Arm, {}ForeArm, {}Hand
+motionbuilder | Hips, {}UpLeg, {}Leg, {}Foot, {}ToeBase, Spine, Spine1, Spine2, Neck, Neck1, Head, {}Shoulder, {}Arm, {}ForeArm, {}Hand
+lafan1 | Hips, {}UpLeg, {}Leg, {}Foot, {}Toe, Spine, Spine1, Spine2, Neck, -, Head, {}Shoulder, {}Arm, {}ForeArm, {}Hand
+rokoko | Hips, {}Thigh, {}Shin, {}Foot, {}Toe, Spine, Spine1, Spine2, Neck, -, Head, {}Shoulder, {}Arm, {}ForeArm, {}Hand
+without a spine | Hips, {}UpLeg, {}Leg, {}Foot, -, -, -, -, -, -, Head, -, {}Arm, {}ForeArm, {}Hand
+bandai-namco | Hips, UpperLeg_{}, LowerLeg_{}, Foot_{}, Toes_{}, Spine, -, Chest, Neck, -, Head, Shoulder_{}, UpperArm_{}, LowerArm_{}, Hand_{}
+biped | Pelvis, {} Thigh, {} Calf, {} Foot, {} Toe0, Spine, -, Spine1, Neck, -, Head, {} Clavicle, {} UpperArm, {} Forearm, {} Hand
+biovision | Hips, {}Hip, {}Knee, {}Ankle, {}Toe, Chest, -, Chest2, Neck, -, Head, {}Collar, {}Shoulder, {}Elbow, {}Wrist
+biovision without toes | Hips, {}Hip, {}Knee, {}Ankle, -, Chest, -, Chest2, Neck, -, Head, {}Collar, {}Shoulder, {}Elbow, {}Wrist
+biovision to wrists and ankles | Hips, {}Hip, {}Knee, -, -, Chest, -, Chest2, Neck, -, Head, {}Collar, {}Shoulder, {}Elbow, -
+poser | hip, {}Thigh, {}Shin, {}Foot, -, abdomen, -, chest, neck, -, head, {}Collar, {}Shldr, {}ForeArm, {}Hand
+smpl | Pelvis, {}_Hip, {}_Knee, {}_Ankle, {}_Foot, Spine1, Spine2, Spine3, Neck, -, Head, {}_Collar, {}_Shoulder, {}_Elbow, {}_Wrist
+unreal | pelvis, thigh_{}, calf_{}, foot_{}, ball_{}, spine_01, spine_02, spine_03, neck_01, -, head, clavicle_{}, upperarm_{}, lowerarm_{}, hand_{}
+vrm | C_Hips, {}_UpperLeg, {}_LowerLeg, {}_Foot, {}_ToeBase, C_Spine, C_Chest, C_UpperChest, C_Neck, -, C_Head, {}_Shoulder, {}_UpperArm, {}_LowerArm, {}_Hand
+freemocap | pelvis, thigh.{}, shin.{}, foot.{}, -, spine, -, spine.001, neck, -, face, shoulder.{}, upper_arm.{}, forearm.{}, hand.{}
+motive | Hip, {}Thigh, {}Shin, {}Foot, {}Toe, Ab, -, Chest, Neck, -, Head, {}Shoulder, {}UArm, {}FArm, {}Hand
+"""  # of each program, in the order of `BONES`; - is none
+PROGRAMS = dict(line.split(" | ") for line in NAMES.splitlines())
 
 
-MIXAMO = {
-    "hips": "Hips", "spine": "Spine", "spine1": "Spine1", "chest": "Spine2", "neck": "Neck", "head": "Head",
-    "clavicle": "{}Shoulder", "arm": "{}Arm", "forearm": "{}ForeArm", "hand": "{}Hand",
-    "thigh": "{}UpLeg", "shin": "{}Leg", "foot": "{}Foot", "toe": "{}ToeBase",
-}  # fmt: skip
-LAFAN1 = {**MIXAMO, "toe": "{}Toe"}
-BIOVISION = {
-    "hips": "Hips", "spine": "Chest", "chest": "Chest2", "neck": "Neck", "head": "Head",
-    "clavicle": "{}Collar", "arm": "{}Shoulder", "forearm": "{}Elbow", "hand": "{}Wrist",
-    "thigh": "{}Hip", "shin": "{}Knee", "foot": "{}Ankle", "toe": "{}Toe",
-}  # fmt: skip
+def named(program: str, prefix: str = "") -> dict[str, str]:
+    """Return a program's names of the joints."""
+    names = zip(BONES, PROGRAMS[program].split(", "), strict=True)
+    return {joint: prefix + name for joint, name in names if name != "-"}
+
+
 STYLES: dict[str, Style] = {
-    "mixamo": Style(named("mixamorig:", **MIXAMO), ends={"head": "mixamorig:HeadTop_End", "toe": "mixamorig:{}Toe_End"}),
-    "mixamo without colons": Style(named("mixamorig1_", **MIXAMO)),
-    "humanik": Style(named("Character1_", **MIXAMO), above=("Character1_Reference",), order="ZYX", positions=True),
-    "motionbuilder": Style({**MIXAMO, "neck1": "Neck1"}, order="XYZ", positions=True),
-    "lafan1": Style(LAFAN1, order="ZYX", positions=True),
-    "bandai-namco": Style(
-        {
-            "hips": "Hips", "spine": "Spine", "chest": "Chest", "neck": "Neck", "head": "Head",
-            "clavicle": "Shoulder_{}", "arm": "UpperArm_{}", "forearm": "LowerArm_{}", "hand": "Hand_{}",
-            "thigh": "UpperLeg_{}", "shin": "LowerLeg_{}", "foot": "Foot_{}", "toe": "Toes_{}",
-        }, ("L", "R"), above=("joint_Root",), positions=True, order="XYZ",
+    "mixamo": Style(
+        named("mixamo", "mixamorig:"), ends={"head": "mixamorig:HeadTop_End", "toe": "mixamorig:{}Toe_End"}
     ),
-    "biped": Style(
-        named(
-            "Bip01 ", hips="Pelvis", spine="Spine", chest="Spine1", neck="Neck", head="Head",
-            clavicle="{} Clavicle", arm="{} UpperArm", forearm="{} Forearm", hand="{} Hand",
-            thigh="{} Thigh", shin="{} Calf", foot="{} Foot", toe="{} Toe0",
-        ), ("L", "R"), above=("Bip01",), shoulders_on="neck",
-    ),
-    "biovision": Style(BIOVISION),
-    "biovision without toes": Style({joint: name for joint, name in BIOVISION.items() if joint != "toe"}),
-    "biovision to wrists and ankles": Style(
-        {joint: name for joint, name in BIOVISION.items() if joint not in ("hand", "foot", "toe")}
-    ),
-    "poser": Style(
-        {
-            "hips": "hip", "spine": "abdomen", "chest": "chest", "neck": "neck", "head": "head",
-            "clavicle": "{}Collar", "arm": "{}Shldr", "forearm": "{}ForeArm", "hand": "{}Hand",
-            "thigh": "{}Thigh", "shin": "{}Shin", "foot": "{}Foot",
-        }, ("l", "r"), order="XZY",
-    ),
-    "smpl": Style(
-        {
-            "hips": "Pelvis", "spine": "Spine1", "spine1": "Spine2", "chest": "Spine3", "neck": "Neck", "head": "Head",
-            "clavicle": "{}_Collar", "arm": "{}_Shoulder", "forearm": "{}_Elbow", "hand": "{}_Wrist",
-            "thigh": "{}_Hip", "shin": "{}_Knee", "foot": "{}_Ankle", "toe": "{}_Foot",
-        }, ("L", "R"),
-    ),
-    "unreal": Style(
-        {
-            "hips": "pelvis", "spine": "spine_01", "spine1": "spine_02", "chest": "spine_03", "neck": "neck_01", "head": "head",
-            "clavicle": "clavicle_{}", "arm": "upperarm_{}", "forearm": "lowerarm_{}", "hand": "hand_{}",
-            "thigh": "thigh_{}", "shin": "calf_{}", "foot": "foot_{}", "toe": "ball_{}",
-        }, ("l", "r"), above=("root",),
-    ),
-    "vrm": Style(
-        named(
-            "J_Bip_", hips="C_Hips", spine="C_Spine", spine1="C_Chest", chest="C_UpperChest", neck="C_Neck", head="C_Head",
-            clavicle="{}_Shoulder", arm="{}_UpperArm", forearm="{}_LowerArm", hand="{}_Hand",
-            thigh="{}_UpperLeg", shin="{}_LowerLeg", foot="{}_Foot", toe="{}_ToeBase",
-        ), ("L", "R"), no_ends=True,
-    ),
-    "freemocap": Style(
-        {
-            "hips": "pelvis", "spine": "spine", "chest": "spine.001", "neck": "neck", "head": "face",
-            "clavicle": "shoulder.{}", "arm": "upper_arm.{}", "forearm": "forearm.{}", "hand": "hand.{}",
-            "thigh": "thigh.{}", "shin": "shin.{}", "foot": "foot.{}",
-        }, ("L", "R"),
-    ),
-    "motive": Style(
-        named(
-            "Skeleton 001:", hips="Hip", spine="Ab", chest="Chest", neck="Neck", head="Head",
-            clavicle="{}Shoulder", arm="{}UArm", forearm="{}FArm", hand="{}Hand",
-            thigh="{}Thigh", shin="{}Shin", foot="{}Foot", toe="{}Toe",
-        ), ("L", "R"),
-    ),
-    "rokoko": Style({**MIXAMO, "thigh": "{}Thigh", "shin": "{}Shin", "toe": "{}Toe"}),
-    "without a spine": Style(
-        {
-            "hips": "Hips", "head": "Head", "arm": "{}Arm", "forearm": "{}ForeArm", "hand": "{}Hand",
-            "thigh": "{}UpLeg", "shin": "{}Leg", "foot": "{}Foot",
-        }, shoulders_on="hips",
-    ),
-}  # fmt: skip
+    "mixamo without colons": Style(named("mixamo", "mixamorig1_")),
+    "humanik": Style(named("mixamo", "Character1_"), above=("Character1_Reference",), order="ZYX", positions=True),
+    "motionbuilder": Style(named("motionbuilder"), order="XYZ", positions=True),
+    "lafan1": Style(named("lafan1"), order="ZYX", positions=True),
+    "rokoko": Style(named("rokoko")),
+    "without a spine": Style(named("without a spine"), shoulders_on="hips"),
+    "bandai-namco": Style(named("bandai-namco"), SHORT, above=("joint_Root",), positions=True, order="XYZ"),
+    "biped": Style(named("biped", "Bip01 "), SHORT, above=("Bip01",), shoulders_on="neck"),
+    "biovision": Style(named("biovision")),
+    "biovision without toes": Style(named("biovision without toes")),
+    "biovision to wrists and ankles": Style(named("biovision to wrists and ankles")),
+    "poser": Style(named("poser"), ("l", "r"), order="XZY"),
+    "smpl": Style(named("smpl"), SHORT),
+    "unreal": Style(named("unreal"), ("l", "r"), above=("root",)),
+    "vrm": Style(named("vrm", "J_Bip_"), SHORT, no_ends=True),
+    "freemocap": Style(named("freemocap"), SHORT),
+    "motive": Style(named("motive", "Skeleton 001:"), SHORT),
+}
 
 
 def joint_after(role: str, style: Style) -> str:

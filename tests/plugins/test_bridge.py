@@ -4,6 +4,7 @@ import copy
 import gc
 import pickle
 import threading
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,7 @@ import pytest
 from posefit import minimise
 from posefit.arrays import Array
 from posefit.testing.toy import Toy, ball, sphere
-from posefit_bridges.nevergrad import GlobalRandom
-from posefit_bridges.scipy import Bridged
+from posefit_bridges.optimisers import Bridge, GlobalRandom, called_back
 from tests.cases import each
 
 
@@ -34,11 +34,13 @@ def fails(space: Toy, rng: np.random.Generator, objective: Any) -> None:
 
 def bridges() -> set[threading.Thread]:
     gc.collect()
-    return {thread for thread in threading.enumerate() if thread.name == "posefit_bridges.scipy"}
+    return {thread for thread in threading.enumerate() if thread.name == "posefit_bridges.optimisers"}
 
 
 def test_a_library_is_asked_and_told_until_it_ends() -> None:
-    best = minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), climbs), 10_000, budget_known=True)
+    best = minimise(
+        sphere, Bridge(Toy(3), np.random.default_rng(0), partial(called_back, climbs)), 10_000, budget_known=True
+    )
     assert best.evaluations == 100
     assert best.cost < 2.0
 
@@ -51,7 +53,7 @@ def test_costs_reach_the_proposals_they_belong_to() -> None:
             asked = np.full((3, 2), 0.1 * k) + [[0.0], [0.01], [0.02]]
             calls.append((asked, objective(asked)))
 
-    optimiser = Bridged(Toy(2), np.random.default_rng(0), library)
+    optimiser = Bridge(Toy(2), np.random.default_rng(0), partial(called_back, library))
     while len(asked := optimiser.ask()):
         np.testing.assert_array_equal(optimiser.ask(), asked)  # asking again changes nothing
         optimiser.tell(asked, asked.sum(axis=1))
@@ -63,7 +65,7 @@ def test_costs_reach_the_proposals_they_belong_to() -> None:
 def test_no_thread_outlives_its_search_or_an_error_in_it() -> None:
     before = bridges()
     for steps in (0, 1, 7, 20):
-        optimiser = Bridged(Toy(3), np.random.default_rng(steps), climbs)
+        optimiser = Bridge(Toy(3), np.random.default_rng(steps), partial(called_back, climbs))
         for _ in range(steps):
             proposals = optimiser.ask()
             optimiser.tell(proposals, sphere(proposals))
@@ -74,19 +76,19 @@ def test_no_thread_outlives_its_search_or_an_error_in_it() -> None:
         raise RuntimeError("the cost failed")
 
     with pytest.raises(RuntimeError, match="the cost failed"):
-        minimise(breaks, Bridged(Toy(3), np.random.default_rng(0), climbs), 100)
+        minimise(breaks, Bridge(Toy(3), np.random.default_rng(0), partial(called_back, climbs)), 100)
     assert bridges() <= before
 
 
 def test_what_the_library_raises_is_raised_where_it_is_asked() -> None:
     with pytest.raises(RuntimeError, match="the library failed: OSError: out of paper"):
-        minimise(sphere, Bridged(Toy(3), np.random.default_rng(0), fails), 100)
+        minimise(sphere, Bridge(Toy(3), np.random.default_rng(0), partial(called_back, fails)), 100)
 
 
 @each("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
 def test_a_copy_goes_on_as_the_original(copied: Any) -> None:
     space = Toy(3, ball)
-    first = Bridged(space, np.random.default_rng(0), climbs)
+    first = Bridge(space, np.random.default_rng(0), partial(called_back, climbs))
     for _ in range(4):
         proposals = first.ask()
         first.tell(proposals, sphere(proposals))

@@ -13,17 +13,9 @@ PAGES = {
     for path in sorted(ROOT.rglob("*.py"))
     if (tree := ast.parse(path.read_text("utf-8"))).body
 }
-SECONDS = ("posefit_bridges.nevergrad",)  # that take some
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if name in SECONDS else name
-        for name, text in PAGES.items()
-        if ">>> " in text
-    ],
-)
+@pytest.mark.parametrize("name", [name for name, text in PAGES.items() if ">>> " in text])
 def test_the_example_of_a_manual_page_runs(name: str) -> None:
     try:
         result = doctest.testmod(import_module(name))

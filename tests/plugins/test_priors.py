@@ -22,15 +22,6 @@ def floor(prior: Any, poses: Array) -> float:
     return float(np.degrees(np.abs(prior.inverse_transform(prior.transform(poses)) - poses)).mean())
 
 
-def test_poses_are_the_mean_and_a_weighted_sum_of_the_components() -> None:
-    for m in range(1, 8):
-        prior, rng = PCA(), np.random.default_rng(m)
-        prior.mean, prior.components = rng.normal(size=63), rng.normal(size=(m, 63))
-        latents = rng.normal(size=(5, m))
-        twin = prior.mean + (latents[:, :, None] * prior.components).sum(axis=1)
-        np.testing.assert_allclose(prior.inverse_transform(latents), twin, atol=1e-12)
-
-
 def test_the_full_space_has_the_limits_that_the_skeleton_states() -> None:
     skeleton = built_in.average_skeleton()
     prior = Full().fit(angles("walk-a"), skeleton)

@@ -1,4 +1,4 @@
-"""The vsmm trackers on what goes wrong: nothing to see, pieces, borders, wrong files; and whole, by name."""
+"""The vsmm tracker on what goes wrong: nothing to see, pieces, borders, wrong files; and whole, by name."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +11,11 @@ from click.testing import CliRunner
 from posefit.cli import main
 from posefit.fitting import metrics
 from posefit.fitting.landmarks import GROUPS, MIRRORED
-from posefit.fitting.space import SearchSpace
 from posefit.fitting.tracker import Frame, Observation, Task
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import joint_distances
 from posefit.motion import built_in
-from posefit.registry import registry
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
 from posefit.testing import check_tracker
@@ -25,10 +23,9 @@ from posefit_vsmm import tracker
 from posefit_vsmm.groups import most_probable, read_topology
 from posefit_vsmm.motion import library as library_of_models
 from posefit_vsmm.preprocess import lines_of
-from posefit_vsmm.search import Search
-from posefit_vsmm.state import AT, ENDS, ERROR, decode, encode, plus
+from posefit_vsmm.state import AT, ENDS, ERROR, encode
 from posefit_vsmm.switching import Switching
-from posefit_vsmm.tracker import MAX_BLIND_FRAMES, VSMM, swarm_led_by_models
+from posefit_vsmm.tracker import MAX_BLIND_FRAMES, VSMM
 from tests.cases import each
 
 SIZE = (200, 240)
@@ -51,8 +48,8 @@ def blank(one: Observation) -> Observation:
     return Observation([Silhouette.of(np.zeros_like(one.silhouettes[0].mask))])
 
 
-def follow(task: Task, observations: list[Observation], factory: Any = VSMM, **settings: Any) -> list[Frame]:
-    frames = list(factory(task, **settings).track(observations, np.random.default_rng(0)))
+def follow(task: Task, observations: list[Observation], **settings: Any) -> list[Frame]:
+    frames = list(VSMM(task, **settings).track(observations, np.random.default_rng(0)))
     assert len(frames) == len(observations)
     for frame in frames:
         assert np.isfinite(frame.pose).all()
@@ -69,34 +66,9 @@ def iou(frames: list[Frame]) -> np.ndarray:
 
 
 @pytest.mark.slow
-@each("factory", [VSMM, swarm_led_by_models])
-def test_it_keeps_the_rules_of_a_tracker(factory: Any) -> None:
-    result = check_tracker(factory)
+def test_it_keeps_the_rules_of_a_tracker() -> None:
+    result = check_tracker(VSMM)
     assert result, str(result)
-
-
-def test_each_angle_of_the_root_is_searched_as_far_as_the_filter_is_unsure_of_it() -> None:
-    # deviations of the whole body's turn about its x, y and z: upright, these are its pitch, its yaw and its roll
-    task, observations = seen(frames=1)
-    task = replace(task, translation="known")
-    dependent = library_of_models().dependent
-    deviations = np.array([0.3, 0.5, 0.7])
-    spread = np.diag(np.concatenate([np.full(3, 1e-4), deviations**2, np.full(27, 1e-4)]))
-    state = encode(np.zeros((1, 66)), np.zeros((1, 3)))[0]
-    for axis, angle in enumerate(("pitch", "yaw", "roll")):
-        turned, _ = decode(plus(state, 0.1 * np.eye(33)[3 + axis])[None], dependent)
-        assert turned[0, :3].argmax() == ("yaw", "pitch", "roll").index(angle)
-    spaces: list[SearchSpace] = []
-
-    def factory(space: SearchSpace, rng: np.random.Generator) -> Any:
-        spaces.append(space)
-        return registry().optimiser("random")(space, rng)
-
-    search = Search(task, dependent, factory, 0.25)
-    search.best(state, spread, observations[0], 200, np.random.default_rng(0))
-    # 3.5 deviations to either side, of the filter's and 4 degrees more
-    yaw, pitch, roll = 3.5 * np.hypot([0.5, 0.3, 0.7], np.radians(4.0))
-    assert spaces[0].half[:3] == pytest.approx([yaw, pitch, roll])
 
 
 @each("exchanged", [False, True])
@@ -146,8 +118,7 @@ def test_nothing_is_ever_seen() -> None:
     assert all(frame.evaluations == 0 for frame in frames)
 
 
-@pytest.mark.parametrize("factory", [VSMM, pytest.param(swarm_led_by_models, marks=pytest.mark.slow)])
-def test_what_is_no_person_is_no_reason_to_fail(factory: Any) -> None:
+def test_what_is_no_person_is_no_reason_to_fail() -> None:
     task, observations = seen(frames=24)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
     disc = (rows - 120) ** 2 + (columns - 100) ** 2 < 40**2  # its skeleton is a point: no end points
@@ -163,7 +134,7 @@ def test_what_is_no_person_is_no_reason_to_fail(factory: Any) -> None:
     ):
         mask = change(observations[6 + 3 * k].silhouettes[0].mask)
         observations[6 + 3 * k] = Observation([Silhouette.of(mask)])
-    frames = follow(task, observations, factory)
+    frames = follow(task, observations)
     assert iou(frames)[:6].mean() > 0.5
 
 
@@ -198,8 +169,6 @@ def test_an_activity_is_as_probable_as_its_models_together() -> None:
         ("vsmm", "joint_noise=0", "joint_noise must be above 0, got 0"),
         ("vsmm", "groups=no.toml", "no.toml: expected a file of groups, got none"),
         ("vsmm:letter", "structure=all", "variant must be one of default, patent, got 'letter'"),
-        ("sapso+vsmm", "weight=0", "weight must be"),
-        ("sapso+vsmm", "optimiser=spaso", "optimiser must be"),
     ],
 )
 def test_a_senseless_setting_is_one_line_and_status_2(method: str, setting: str, message: str) -> None:

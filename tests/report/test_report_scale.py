@@ -11,11 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.report.animations import MAX_CHARACTERS
-from posefit.report.write import write_report
 from posefit.sweep.cell import CellResult
-from posefit.sweep.ledger import FILE
-from tests.effort import effort
 from tests.report.browser import ledger, result, row_of
 from tests.sweep.fake import cells
 
@@ -27,7 +23,7 @@ REPORT = """
 import json, sys, time
 from posefit.report.write import write_report
 began = time.perf_counter()
-done = write_report(sys.argv[1], sys.argv[2], warn=print)["header"]["done"]
+done = write_report(sys.argv[1], sys.argv[2])["header"]["done"]
 taken = time.perf_counter() - began
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))
 print(json.dumps([done, taken, 1024 * int(status["VmHWM"].split()[0])]))
@@ -46,20 +42,6 @@ def rows(instances: int, seeds: int, methods: int = METHODS) -> Iterator[CellRes
                 yield CellResult(row_of(cell, error, trace=trace), picture)
 
 
-@counted
-@pytest.mark.slow
-def test_twice_the_rows_take_twice_the_calls_and_every_byte_is_read_some_times(tmp_path: Path) -> None:
-    efforts = []
-    for instances, seeds in ((3, 5), (5, 5), (10, 5), (20, 5)):  # the first imports what the others need
-        made = ledger(tmp_path / f"{instances}", rows(instances, seeds))
-        page = tmp_path / f"{instances}.html"
-        efforts.append(effort(lambda made=made, page=page: write_report(made, page, warn=lambda _: None)))  # type: ignore[misc]
-        size = (made / FILE).stat().st_size
-        assert instances == 3 or efforts[-1].read < 6.0 * size
-    calls = [taken.calls for taken in efforts]
-    assert calls[3] - calls[2] < 1.2 * 2.0 * (calls[2] - calls[1])
-
-
 @pytest.mark.slow
 @counted
 @pytest.mark.parametrize(("instances", "seeds"), [(100, 100), (5000, 2)])
@@ -72,4 +54,4 @@ def test_100_000_rows_are_reported_in_2_gigabytes(tmp_path: Path, instances: int
     print(f"{done} rows in {taken:.1f} s, {peak / 1e9:.2f} GB, a page of {size / 1e6:.1f} MB")
     assert done == METHODS * instances * seeds
     assert peak < 2e9
-    assert size < MAX_CHARACTERS + 100 * done
+    assert size < 100 * done + 2e5

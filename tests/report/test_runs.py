@@ -11,7 +11,7 @@ import numpy as np
 
 from posefit.report.kind import Runs
 from posefit.report.runs import distinct, runs_of
-from posefit.report.tracks import Tracks
+from posefit.report.tracks import TRACKS
 from posefit.sweep.cell import CellResult, TrackCell
 from posefit.sweep.ledger import Ledger
 from tests.report.browser import EVIL, ledger, result
@@ -126,7 +126,7 @@ def test_a_row_without_a_figure_has_nan(tmp_path: Path) -> None:
     skill = {"mean_pose": None, "persistence": 0.5, "nearest": 0.25}
     empty = {"evaluations": [], "cost": []}
     runs = read(tmp_path, result(FIRST, 1.0, error_degrees=None, skill=skill, baselines_degrees=None, trace=empty))
-    assert {name for name in Tracks.columns if np.isnan(runs.figures[name][0])} == {
+    assert {name for name in TRACKS.columns if np.isnan(runs.figures[name][0])} == {
         "error", "skill_mean_pose", "baseline_mean_pose", "baseline_persistence", "baseline_nearest", "unknown",
         *(f"{kind}_{level}" for kind in ("coverage", "interval") for level in (50, 80, 95)),
     }  # fmt: skip

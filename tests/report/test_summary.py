@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from posefit.report.columns import listed
-from posefit.report.content import three_tracks
 from posefit.report.leaderboard import leaderboard
 from posefit.report.summary import unpaired_sentence
 from tests.report.contests import contest_of_errors, full, sentences, three_methods
@@ -75,18 +74,6 @@ def test_names_with_commas_stand_between_semicolons() -> None:
     assert listed(["a", "b", "c"]) == "a, b and c"
     assert listed(["a", "b", "c", "d", "e"]) == "a, b, c and 2 others"
     assert listed(["a (x 1, y 2)"]) == "a (x 1, y 2)"
-
-
-def test_the_best_the_median_and_the_worst_track_are_examples(tmp_path: Path) -> None:
-    for errors, examples in (
-        ([3.0, 1.0, 2.0, 9.0], [("best", 1.0), ("median", 2.0), ("worst", 9.0)]),
-        ([3.0, 1.0], [("best", 1.0), ("worst", 3.0)]),
-        ([1.0], [("best", 1.0)]),
-    ):
-        runs = {("a", i, 0): error for i, error in enumerate(errors)}
-        contest = contest_of_errors(tmp_path / str(len(errors)), runs)
-        error = contest.runs.figures["error"]
-        assert [(name, error[row]) for name, row in three_tracks(contest, 0)] == examples
 
 
 def test_runs_without_a_pair_are_counted(tmp_path: Path) -> None:

@@ -3,10 +3,8 @@
 import csv
 import json
 import re
-import sqlite3
 import subprocess
 import sys
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,10 +12,8 @@ import numpy as np
 import pytest
 
 from posefit.page.document import embedded, plain
-from posefit.report.content import data_of
 from posefit.report.page import MARK
-from posefit.report.runs import runs_of
-from posefit.sweep.ledger import FILE, Ledger
+from posefit.sweep.table import write_csv
 from tests.commands import error_of, run
 from tests.report.browser import data_in, ledger, result, sure
 from tests.report.contests import FIRST, full
@@ -58,7 +54,7 @@ def test_the_report_is_one_file_that_links_to_nothing_but_itself(results: Path, 
     assert all(link.startswith("#") for link in links)
     assert not re.search(r"<(link|img|iframe|object)\b", page)
     data = data_in(page)
-    assert data["header"]["done"] == len(data["animations"]["tracks"]) == 8
+    assert data["header"]["done"] == 8
     assert data["failures"][0]["reasons"] == ["its process died", "ValueError: it had to"]
     assert data["certainty"] is None
     assert not [name for name in (*data["columns"], *data["rows"]) if re.match("coverage|interval|unknown", name)]
@@ -139,8 +135,7 @@ def test_figures_tables_and_rows_on_demand(results: Path, tmp_path: Path) -> Non
     written(results, "--figures", figures, "--csv", rows)
     names = ("convergence", "profile")
     drawn = {f"{name}.{kind}" for name in names for kind in ("png", "pdf")}
-    assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.tex", "leaderboard.csv"}
-    assert "sapso@pca & 1.06" in (figures / "leaderboard.tex").read_text()
+    assert {path.name for path in figures.iterdir()} == drawn | {"leaderboard.csv"}
     with rows.open(newline="", encoding="utf-8") as file:
         statuses = [row["status"] for row in csv.DictReader(file)]
     assert sorted(statuses) == ["done"] * 8 + ["quarantined"]
@@ -195,7 +190,7 @@ def test_mistakes_are_one_line_and_write_nothing(results: Path, tmp_path: Path) 
 def test_only_figures_need_a_library_beyond_the_core(results: Path, tmp_path: Path) -> None:
     code = """
 import sys
-for name in ("matplotlib", "pandas", "distributed", "iohinspector", "playwright"):
+for name in ("matplotlib", "pandas", "distributed", "playwright"):
     sys.modules[name] = None
 from posefit.cli import main
 main(sys.argv[1:])
@@ -211,16 +206,6 @@ main(sys.argv[1:])
     assert not (tmp_path / "b.html").exists()
 
 
-def test_damaged_joints_are_left_out_with_a_warning(results: Path) -> None:
-    with closing(sqlite3.connect(results / FILE)) as database, database:
-        database.execute("UPDATE cells SET arrays = substr(arrays, 2) WHERE rowid = 1")
-    warnings: list[str] = []
-    content = data_of(Ledger(results), runs_of(Ledger(results)), warnings.append)
-    assert len(content["animations"]["tracks"]) == 7
-    (warning,) = warnings
-    assert "must be whole, got damaged ones; this run has no animation" in warning
-
-
 def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
     for text in ("</script>", "<!--", "]]>", "&lt;", "\u2028\u2029", '"\\', "\U0001f600é"):
         json_text = embedded({text: [text, float("nan"), float("inf"), 1.23456789]})
@@ -231,3 +216,24 @@ def test_embedded_data_cannot_leave_its_element_and_numbers_are_plain() -> None:
     assert plain({"a": np.arange(2), "b": np.array([0.5, np.nan]), "c": (np.int64(2**60), True, None)}) == {
         "a": [0, 1], "b": [0.5, None], "c": [2**60, True, None],
     }  # fmt: skip
+
+
+def test_csv_is_read_back_with_what_would_break_it(tmp_path: Path) -> None:
+    rows = [{"method": 'a,"b"\nc', "error": 0.1 + 0.2}, {"method": "Ä", "lost": None, "error": 1}]
+    write_csv(rows, tmp_path / "rows.csv")
+    with (tmp_path / "rows.csv").open(newline="", encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
+    assert read == [
+        {"method": 'a,"b"\nc', "error": "0.30000000000000004", "lost": ""},
+        {"method": "Ä", "error": "1", "lost": ""},
+    ]
+
+
+def test_csv_without_rows_or_over_a_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="rows must be at least one, got none"):
+        write_csv([], tmp_path / "rows.csv")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "rows.csv").write_text("mine")
+    with pytest.raises(ValueError, match="rows.csv: expected a new name to write to, got one that exists"):
+        write_csv([{"a": 1}], tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").read_text() == "mine"

@@ -16,7 +16,17 @@ from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit_vsmm.groups import Topology, read_topology
 from posefit_vsmm.imm import Belief, Measurement
-from posefit_vsmm.joints import _TIPS, JointFilter, _knees, _tips, detect, nearest_crossings, rules, two_crossings
+from posefit_vsmm.joints import (
+    _TIPS,
+    JointFilter,
+    _knees,
+    _tips,
+    default_rules,
+    detect,
+    nearest_crossings,
+    patent_rules,
+    two_crossings,
+)
 from posefit_vsmm.measurement import JointCameras, JointMeasurement
 from posefit_vsmm.motion import MotionModels, library, lifted, ridge, without_heading
 from posefit_vsmm.preprocess import Lines, lines_of
@@ -38,7 +48,6 @@ from posefit_vsmm.tracker import VSMM, TrackFilter
 from tests.cases import each
 
 SIZE = (240, 320)  # rows, columns
-NO_BIAS = np.zeros((len(POINTS), 2))
 
 
 def canvas() -> np.ndarray:
@@ -106,14 +115,13 @@ def detection() -> tuple[dict[str, Array], dict[str, float], Array]:
     """Return the points detected in the stick figure, the rules' confidence, and where points were expected."""
     image, places = figure()
     expected = places + np.random.default_rng(0).normal(0.0, 6.0, places.shape)
-    points, confidence = joints_in(image, expected)
+    points, confidence, _ = joints_in(image, expected)
     return dict(zip(POINTS, points, strict=True)), dict(zip(POINTS, confidence, strict=True)), expected
 
 
-def joints_in(image: np.ndarray, expected: Array, **how: Any) -> tuple[Array, Array]:
-    return detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules(**how)._replace(bias=NO_BIAS))[
-        :2
-    ]
+def joints_in(image: np.ndarray, expected: Array) -> tuple[Array, Array, int]:
+    rules = default_rules()._replace(bias=np.zeros((len(POINTS), 2)))
+    return detect(lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules)
 
 
 def test_the_head_is_where_a_ring_catches_most_of_the_contour() -> None:  # VSMM 2.1
@@ -147,9 +155,7 @@ def test_an_end_point_out_of_reach_is_not_assigned() -> None:  # Interpretation 
     image, places = figure()
     expected = places.copy()
     expected[AT["left hand"]] += [0.0, 60.0]
-    points, sure, unassigned = detect(
-        lines(image), expected, np.full(len(POINTS), 30.0), 85.0, 14.0, rules()._replace(bias=NO_BIAS)
-    )
+    points, sure, unassigned = joints_in(image, expected)
     assert sure[AT["left hand"]] == 0.0
     assert np.array_equal(points[AT["left hand"]], expected[AT["left hand"]])
     assert unassigned == 1
@@ -161,16 +167,16 @@ def test_to_the_letter_the_nearest_end_point_is_taken_first_and_by_one_joint() -
     _, expected = figure()
     ends = np.array([[130.0, 215.0], [60.0, 215.0]])
     expected[AT["left foot"]], expected[AT["right foot"]] = (128.0, 215.0), (131.0, 215.0)
-    for nearest in (False, True):
+    for nearest, rules in enumerate((default_rules(), patent_rules())):
         gates = np.full(len(POINTS), 1e3 if nearest else 30.0)
-        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], rules(nearest).pairs)
+        tips, unassigned = _tips(ends, expected[_TIPS], gates[_TIPS], rules.pairs)
         assert np.array_equal(tips["right foot"], ends[0])
         assert (("left foot" in tips), unassigned) == (nearest, not nearest)
     assert np.array_equal(tips["left foot"], ends[1])
 
 
 def test_plain_joint_errors_are_unbiased_and_the_torsos_are_the_roots() -> None:  # Interpretation V8
-    (bias, deviation, *_), (plain_bias, plain_deviation, *_) = rules(), rules(patent=True)
+    (bias, deviation, *_), (plain_bias, plain_deviation, *_) = default_rules(), patent_rules()
     assert bias.any()
     assert not plain_bias.any()
     assert (deviation[AT["torso"]] > deviation[AT["root"]]).all()
@@ -215,9 +221,9 @@ def test_the_parallel_leans_as_the_line_between_the_feet_does() -> None:  # VSMM
     np.testing.assert_allclose(knees["right knee"], [80.0, 144.0], atol=1.1)
     together = np.array([[50.0, y] for y in range(100, 201)])  # both legs are one line, with one crossing
     wide = np.full(len(POINTS), 90.0)
-    for nearest in (False, True):
-        one_line = Lines(together, together, together, legs[:0])
-        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, rules(nearest).crossings) == {}
+    one_line = Lines(together, together, together, legs[:0])
+    for rules in (default_rules(), patent_rules()):
+        assert _knees(one_line, expected, np.ones(len(POINTS)), expected, wide, rules.crossings) == {}
 
 
 def test_to_the_letter_the_knees_are_two_crossings_also_where_both_are_expected_at_one() -> None:  # Interpretation V15
@@ -351,13 +357,17 @@ def test_process_noise_is_a_multiple_of_the_models_own() -> None:  # Interpretat
 NOBODY = np.zeros((len(POINTS), 2))  # points that ask for no group
 
 
+def as_likely(log_likelihoods: Array) -> Measurement:
+    """Return a measurement that moves no state, by which states (r,) are so likely, but for a common factor."""
+    count, residuals = len(log_likelihoods), np.sqrt(2.0 * (log_likelihoods.max() - log_likelihoods))
+    return Measurement(residuals[:, None], np.zeros((count, 1, ERROR)), np.eye(1))
+
+
 def telling(name: str, switching: Switching) -> Callable[[Array], Measurement]:
     """Return a measurement of nothing, but that the model's prediction is the most likely."""
 
     def measure(states: Array) -> Measurement:
-        likelihoods = np.array([0.0 if model == name else -3.0 for model in switching.active])
-        count = len(states)
-        return Measurement(np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0)), likelihoods)
+        return as_likely(np.array([0.0 if model == name else -3.0 for model in switching.active]))
 
     return measure
 
@@ -503,9 +513,7 @@ def test_the_cycle_over_both_groups_is_run_again_and_judged_in_the_frame_of_the_
 
         def measure(states: Array, sign: float = sign, state: Array = state) -> Measurement:
             near = np.abs(states[:, 7:] - state[7:]).sum(axis=1)  # the old group's models keep near to the state
-            count = len(states)
-            nothing = np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0))
-            return Measurement(*nothing, -100.0 * sign * near)
+            return as_likely(-100.0 * sign * near)
 
         for points in swinging([[2.0, 2.0, 3.0, 3.0], [4.1, 4.1, 3.0, 3.0]]):
             assert (switching.group, switching.candidate_group) == ("G1", None)
@@ -536,8 +544,7 @@ def test_the_cycle_that_is_run_again_starts_from_the_frame_before(variant: str) 
 
 def nothing(states: Array) -> Measurement:
     """Return a measurement of nothing, by which all models are equally likely."""
-    count = len(states)
-    return Measurement(np.zeros((count, 0)), np.zeros((count, 0, ERROR)), np.zeros((0, 0)), np.zeros(count))
+    return as_likely(np.zeros(len(states)))
 
 
 def test_a_new_model_is_as_probable_as_the_most_probable_one() -> None:  # VSMM 8.1

@@ -1,4 +1,4 @@
-"""Wilcoxon and Holm against scipy and sums by hand, and letters by their definition."""
+"""Wilcoxon and Holm against scipy and sums by hand."""
 
 from itertools import combinations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from posefit.statistics.ranks import LETTERS, compact_letters, holm, wilcoxon
+from posefit.statistics.ranks import holm, wilcoxon
 from tests.cases import each
 
 
@@ -86,36 +86,3 @@ def test_holm_by_hand():
 def test_invalid_errors_and_pairs_are_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
-
-
-@each(
-    ("different", "letters"),
-    [([], ["a", "a", "a"]), ([(0, 1), (0, 2), (1, 2)], ["a", "b", "c"]), ([(0, 2)], ["a", "ab", "b"])],
-)
-def test_methods_share_a_letter_where_they_do_not_differ(different: list[tuple[int, int]], letters: list[str]) -> None:
-    assert compact_letters(3, different) == letters
-
-
-def test_piephos_definition_holds_for_random_differences() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(200):
-        count = int(rng.integers(2, 9))
-        different = [pair for pair in combinations(range(count), 2) if rng.random() < rng.choice([0.1, 0.5, 0.9])]
-        letters = compact_letters(count, different)
-        for pair in combinations(range(count), 2):
-            assert (not set(letters[pair[0]]) & set(letters[pair[1]])) == (pair in different)
-        used = sorted(set("".join(letters)))
-        assert used == list(LETTERS[: len(used)])
-        members = [{m for m in range(count) if letter in letters[m]} for letter in used]
-        assert not any(group <= other for group in members for other in members if group is not other)
-
-
-def test_too_many_groups_have_no_letters() -> None:
-    count = 2 * 6  # six pairs that differ within themselves alone are 2^6 groups
-    assert compact_letters(count, [(2 * k, 2 * k + 1) for k in range(6)]) == [""] * count
-
-
-@each("pair", [(0, 0), (0, 3), (-1, 1)])
-def test_an_invalid_pair_is_refused(pair: tuple[int, int]) -> None:
-    with pytest.raises(ValueError, match="apart must be of two different methods of 0 to 2"):
-        compact_letters(3, [pair])

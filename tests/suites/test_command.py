@@ -6,7 +6,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import iohinspector
 import numpy as np
 import pytest
 
@@ -16,7 +15,7 @@ from posefit.suites.running import run_of, run_on, suite_scores
 from posefit.sweep.cell import run_cell
 from posefit.sweep.ledger import FILE, Ledger, Writer
 from posefit.sweep.plan import Plan
-from posefit.sweep.table import search_runs
+from posefit.sweep.table import search_run
 from tests.cases import each
 from tests.commands import run
 
@@ -52,22 +51,16 @@ def test_the_functions_are_listed() -> None:
     assert [one["number"] for one in json.loads(run("suite", "--json").stdout)] == list(range(1, 10))
 
 
-def test_a_run_prints_what_it_reaches_and_writes_what_iohinspector_opens(tmp_path: Path) -> None:
-    words = ("run", "random", "--function", 2, "--instances", "10000:10003", "--budget", 5, "--out", tmp_path / "ioh")
+def test_a_run_prints_what_it_reaches() -> None:
+    words = ("run", "random", "--function", 2, "--instances", "10000:10003", "--budget", 5)
     done = run("suite", *words, "--json")
     assert done.exit_code == 0, done.stderr
     (score,) = json.loads(done.stdout)
-    assert (score["method"], score["function"], score["dimension"], score["runs"]) == ("random", 2, 9, 3)
-    manager = iohinspector.DataManager()
-    manager.add_folder(str(tmp_path / "ioh"))
-    assert set(manager.overview["dimension"]) == {9}
-    assert set(manager.overview["function_name"]) == {"next frame"}
-    data = manager.load(monotonic=False)
     problems = posefit.Suite(functions=[2], dimensions=[9], instances=range(10_000, 10_003))
     runs = [run_on(problem, "random", evaluations=45) for problem in problems]
-    expected = sorted((int(used), cost) for one in runs for used, cost in zip(one.evaluations, one.costs, strict=True))
-    assert sorted(zip(data["evaluations"], data["raw_y"], strict=True)) == expected
     assert [one.evaluations[0] for one in runs] == [1.0, 1.0, 1.0]
+    expected = {"method": "random", "function": 2, "dimension": 9, "runs": 3, "reached": suite_scores(runs)[0].reached}
+    assert {name: score[name] for name in expected} == expected
 
 
 def test_a_function_without_a_chosen_dimension_is_left_out_and_named() -> None:
@@ -92,9 +85,10 @@ def test_scores_follow_from_the_traces() -> None:
 @each("infeasible", ["repair", "reject", "penalise"])
 def test_any_loop_makes_a_run_whose_improvements_cost_the_same_again(infeasible: Any) -> None:
     problem = posefit.suite(function=1, instance=10_000, budget=200, infeasible=infeasible)
+    assert [len(part) for part in problem.trace] == [0, 0]
     rng = np.random.default_rng(5)
     proposals = rng.uniform(-1.2, 1.2, (100, 9)) * rng.uniform(0.2, 1.0, (100, 1))
-    costs = problem(proposals)
+    costs = np.append(problem(proposals[:60]), [problem(proposal) for proposal in proposals[60:]])
     falls = [k for k in range(100) if costs[k] < min([np.inf, *costs[:k]])]
     run = run_of(problem, "my own", {"width": 1.2}, seed=7)
     assert np.array_equal(run.evaluations, [*(k + 1.0 for k in falls), 100.0][: len(run.evaluations)])
@@ -116,35 +110,22 @@ def test_a_run_without_a_budget_or_beyond_it_is_no_run() -> None:
             run_of(problem, "my own", budget=budget)
 
 
-def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together(tmp_path: Path) -> None:
-    plan = """
-suite = "posefit-2026.3"
-methods = ["random"]
-functions = [1]
-instances = [3, 4]
-"""
-    ledger = swept(tmp_path / "out", f"{plan}\nbudgets = [5, 10]", f'{plan}\nbudgets = [10]\ninfeasible = "penalise"')
-    done = run("suite", "table", ledger, "--iohprofiler", tmp_path / "ioh", "--json")
-    assert done.exit_code == 0, done.stderr
-    scores = {(one["budget"], one["infeasible"]): one for one in json.loads(done.stdout)}
-    assert set(scores) == {(45, "repair"), (90, "repair"), (90, "penalise")}
-    for (budget, infeasible), score in scores.items():
-        mine = [
-            run_on(posefit.suite(function=1, instance=n, infeasible=infeasible), "random", evaluations=budget)
-            for n in (3, 4)
+def test_runs_with_another_budget_or_way_with_infeasible_proposals_are_not_taken_together() -> None:
+    ways: list[tuple[int, Any]] = [(45, "repair"), (90, "repair"), (90, "penalise")]
+    runs = {
+        (budget, way): [
+            run_on(posefit.suite(function=1, instance=n, infeasible=way), "random", evaluations=budget) for n in (3, 4)
         ]
-        assert (score["method"], score["runs"]) == ("random", 2)
-        assert score["above"] == np.median([one.cost - one.truth_cost for one in mine])
-    table = run("suite", "table", ledger).stdout
-    assert set(re.findall(r"random, \S+ x d, \w+", table)) == {
-        "random, 5 x d, repair", "random, 10 x d, repair", "random, 10 x d, penalise"
-    }  # fmt: skip
-    infos = [json.loads(path.read_text("utf-8"))["algorithm"] for path in (tmp_path / "ioh").rglob("*.json")]
-    assert {json.dumps(json.loads(one["info"]), sort_keys=True) for one in infos} == {
-        json.dumps({"evaluations for each dimension": each, "infeasible proposals": way}, sort_keys=True)
-        for each, way in ((5.0, "repair"), (10.0, "repair"), (10.0, "penalise"))
+        for budget, way in ways
     }
-    assert len({one["name"] for one in infos}) == 3
+    scores = {
+        (score.budget, score.infeasible): score
+        for score in suite_scores(run for several in runs.values() for run in several)
+    }
+    assert set(scores) == set(ways)
+    for way, score in scores.items():
+        assert (score.method, score.runs) == ("random", 2)
+        assert score.above == np.median([one.cost - one.truth_cost for one in runs[way]])
 
 
 def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not() -> None:
@@ -154,10 +135,9 @@ def test_a_plan_becomes_cells_and_passes_over_dimensions_that_a_function_has_not
     assert {cell.evaluations for cell in cells if cell.dimension == 24} == {240}
 
 
-def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_path: Path) -> None:
+def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path) -> None:
     runs = {
-        (run.method, run.function, run.dimension, run.instance): run
-        for run in search_runs(Ledger(results).rows(), results)
+        (run.method, run.function, run.dimension, run.instance): run for run in map(search_run, Ledger(results).rows())
     }
     assert len(runs) == 12
     problem = posefit.suite("posefit-2026.3", 1, 3, 9)
@@ -166,25 +146,15 @@ def test_the_ledger_of_a_plan_has_the_runs_that_run_on_has(results: Path, tmp_pa
     assert np.array_equal(mine.evaluations, expected.evaluations)
     assert np.array_equal(mine.costs, expected.costs)
     assert np.array_equal(mine.targets, expected.targets)
-    done = run("suite", "table", results, "--iohprofiler", tmp_path / "ioh", "--json")
-    assert done.exit_code == 0, done.stderr
-    scores = json.loads(done.stdout)
-    assert [(one["dimension"], one["function"]) for one in scores] == [
+    scores = suite_scores(runs.values())
+    assert [(score.dimension, score.function) for score in scores] == [
         *2 * [(9, 1)], *2 * [(24, 0)], *2 * [(24, 1)], *2 * [(24, 7)]
     ]  # fmt: skip
-    assert all(one["running_times"] == {} for one in scores if one["function"] == 0)  # the hardest would decide them
-    together, *others = [
-        next(one for one in scores if (one["method"], one["function"], one["dimension"]) == ("random", function, 24))
-        for function in (0, 1, 7)
-    ]
-    assert together["runs"] == 4
-    assert together["reached"] == pytest.approx(np.mean([one["reached"] for one in others]))
-    assert sorted(path.name.rpartition("_")[2] for path in (tmp_path / "ioh").rglob("*.dat")) == sorted(
-        2 * ["DIM9.dat", "DIM24.dat", "DIM24.dat"]
-    )
-    table = run("suite", "table", results).stdout
-    assert "7 high-dimensional" in table
-    assert "x d," not in table  # one budget and one way with infeasible proposals are not in the name
+    assert all(score.running_times == {} for score in scores if score.function == 0)  # the hardest would decide them
+    of_random = {(score.function, score.dimension): score for score in scores if score.method == "random"}
+    together, *others = [of_random[function, 24] for function in (0, 1, 7)]
+    assert together.runs == 4
+    assert together.reached == pytest.approx(np.mean([score.reached for score in others]))
 
 
 def test_the_ledger_is_a_table_and_a_report(results: Path, tmp_path: Path) -> None:
@@ -207,8 +177,6 @@ def test_the_ledger_is_a_table_and_a_report(results: Path, tmp_path: Path) -> No
         (["run", "sapso", "--budget", 0], "budget must be at least 1, got 0"),
         (["run", "sapso", "--budget", 4], "evaluations must hold one population of 40, got 36"),
         (["run", "sapso", "--set", "foo=1"], "a setting of sapso must be one of .*, got 'foo'"),
-        (["run", "sapso", "--out", "."], "expected a new name to write to, got one that exists"),
-        (["table", "nowhere"], "nowhere: expected a ledger"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_line_and_status_2(

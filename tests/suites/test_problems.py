@@ -141,19 +141,6 @@ def test_a_proposal_has_a_float_and_several_have_an_array_with_the_same_bits() -
     assert posed.evaluations == 22
 
 
-def test_a_trace_has_what_was_measured_and_nothing_else() -> None:
-    posed = problem()
-    assert [len(part) for part in posed.trace] == [0, 0]
-    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 9))
-    costs = np.concatenate([posed(drawn[:30]), [posed(proposal) for proposal in drawn[30:]]])
-    falls = [k for k in range(50) if costs[k] < costs[:k].min(initial=np.inf)]
-    used, best = posed.trace
-    assert used.tolist() == [*(k + 1 for k in falls), *([50] if falls[-1] < 49 else [])]
-    assert best[: len(falls)].tolist() == costs[falls].tolist()
-    assert posed.best_observed_fvalue1 == best[-1] == costs.min()
-    assert np.array_equal(posed.best, posed.repaired(drawn[costs.argmin()])[0])
-
-
 def test_what_is_not_feasible_costs_what_its_repair_costs() -> None:
     for posed in (problem(1, 17, 9), problem(1, 10_017, 24), problem(6, 3, 40)):
         bad = infeasible(posed)
@@ -305,18 +292,6 @@ def one_by_one(function, optimiser, budget):
     for _ in range(budget // 20):
         proposals = optimiser.ask()
         optimiser.tell(proposals, np.array([function(proposal) for proposal in proposals]))
-
-
-def test_a_loop_like_cocos_has_the_same_trace(traces) -> None:
-    for (function, instance, dimension), expected in zip(ADDRESSES, traces, strict=True):
-        suite = posefit.Suite("posefit-2026.3", functions=[function], dimensions=[dimension], instances=[instance])
-        for problem in suite:  # as in COCO's example experiment
-            assert problem.evaluations == 0
-            assert len(problem.lower_bounds) == len(problem.upper_bounds) == problem.number_of_variables == dimension
-            one_by_one(problem, swarm(problem.space), BUDGET)
-            assert problem.evaluations == BUDGET
-            assert not problem.final_target_hit
-            assert np.array_equal(problem.trace, expected)
 
 
 def test_iohexperimenter_logs_the_same_trace_of_each_run(traces, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posefit.report.repeat import repeat_command
 from posefit.sweep.cell import TrackCell, cell_scene
 from posefit.sweep.check import cell_of
 from posefit.sweep.plan import Plan
@@ -77,7 +76,3 @@ def test_the_yaw_is_off_by_the_same_for_every_method_and_seed_and_by_another_for
 def test_a_value_that_makes_no_sense_is_named(field: str, value: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         cell(**{field: value})
-
-
-def test_the_command_that_repeats_a_row_says_it() -> None:
-    assert "yaw_off_degrees = 25.0\n" in repeat_command(cell(yaw_off_degrees=25.0).spec)

@@ -39,25 +39,6 @@ def planned(**tables: Any) -> Plan:
     return Plan.of({"product": PRODUCT, **tables})
 
 
-def test_a_product_holds_every_combination_and_cells_come_beside_it() -> None:
-    product = {
-        "methods": ["sapso", "cma@full"],
-        "motions": ["walk", {"motion": "run", "frames": 9}],
-        "views": [45, [0, 90]],
-        "corruptions": [{}, {"holes": 0.5}],
-        "instances": [1, 2],
-        "seeds": 3,
-    }
-    cells = [{"method": "random@pca", "motion": "jump"}]
-    plan = Plan.of({"defaults": {"frames": 7, "evaluations": 100}, "product": product, "cells": cells})
-    assert len(plan) == len({cell.key for cell in plan}) == 2 * 2 * 2 * 2 * 2 * 3 + 1
-    assert {cell.method for cell in plan} == {"sapso@pca", "cma@full", "random@pca"}
-    assert {(cell.motion, cell.frames) for cell in plan} == {("walk", 7), ("run", 9), ("jump", 7)}
-    assert {cell.view_degrees for cell in plan} == {(45.0,), (0.0, 90.0)}
-    assert {cell.seed for cell in plan} == {0, 1, 2}
-    assert list(plan)[-1].train == built_in.other_styles("jump")
-
-
 def test_methods_change_soonest_so_that_a_sweep_under_way_compares_them() -> None:
     plan = planned(product={"methods": ["random@pca", "pso@pca"], "motions": ["walk", "run"], "seeds": 2})
     assert [(cell.method, cell.motion, cell.seed) for cell in plan] == [

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,7 +21,17 @@ from posefit_filters.annealed import Annealed
 from posefit_priors.pca import PCA
 
 
-class Sound:
+class Planted:
+    """A plugin, and what is wrong with it: which checks it breaks, or how it ends a process of its own."""
+
+    breaks: ClassVar[tuple[str, ...]]
+    ends: ClassVar[str]
+
+    def __init_subclass__(cls, breaks: str = "", ends: str = "") -> None:
+        cls.breaks, cls.ends = tuple(breaks.split()), ends
+
+
+class Sound(Planted):
     """Shrinks a cloud around the best point; nothing is wrong with it, and the others each spoil one thing."""
 
     def __init__(
@@ -45,34 +55,34 @@ class Sound:
         self.population = sample_normal(self.space, self.rng, np.tile(self.best, (len(self.population), 1)), spread)
 
 
-class SwallowsSettings(Sound):
+class SwallowsSettings(Sound, breaks="construction unknown_setting"):
     def __init__(self, space: SearchSpace, rng: np.random.Generator, **settings: Any) -> None:
         super().__init__(space, rng)
 
 
-class AsksOneRow(Sound):
+class AsksOneRow(Sound, breaks="shape"):
     def ask(self) -> Array:
         return super().ask()[0]
 
 
-class AsksFloat32(Sound):
+class AsksFloat32(Sound, breaks="dtype"):
     def ask(self) -> Any:
         return super().ask().astype(np.float32)
 
 
-class LeavesTheBox(Sound):
+class LeavesTheBox(Sound, breaks="box"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
         self.population = self.best + 0.6 * self.rng.standard_normal(self.population.shape)
 
 
-class ForgetsFeasible(Sound):
+class ForgetsFeasible(Sound, breaks="feasible"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
         self.population = np.clip(self.best + 0.3 * self.rng.standard_normal(self.population.shape), -1.0, 1.0)
 
 
-class WaitsForFeasible(Sound):
+class WaitsForFeasible(Sound, breaks="hardly_feasible"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
         while True:
@@ -81,14 +91,14 @@ class WaitsForFeasible(Sound):
                 return
 
 
-class DividesByTheRange(Sound):
+class DividesByTheRange(Sound, breaks="costs"):
     def tell(self, proposals: Array, costs: Array) -> None:
         rank = (costs - costs.min()) / (costs.max() - costs.min())
         assert not np.isnan(rank).any(), "costs are all equal"
         super().tell(proposals, costs)
 
 
-class AsksForMore(Sound):
+class AsksForMore(Sound, breaks="budget"):
     """Has a second population so large that most of a budget is left over."""
 
     def tell(self, proposals: Array, costs: Array) -> None:
@@ -96,13 +106,13 @@ class AsksForMore(Sound):
         self.population = np.tile(self.population[:1], (1000, 1))
 
 
-class DoublesItsPopulation(Sound):
+class DoublesItsPopulation(Sound, breaks="box order"):
     def ask(self) -> Array:
         self.population = np.tile(self.population, (2, 1))
         return super().ask()
 
 
-class DrawsInSecret(Sound):
+class DrawsInSecret(Sound, breaks="evaluations"):
     """Draws poses of its own in every tell, which no budget counts."""
 
     def tell(self, proposals: Array, costs: Array) -> None:
@@ -112,12 +122,12 @@ class DrawsInSecret(Sound):
             project(Body.of(built_in.average_skeleton()), Camera.around(places[0], 0.0, 3.0), poses[0], places[0])
 
 
-class HasUntypedSettings(Sound):
+class HasUntypedSettings(Sound, breaks="construction"):
     def __init__(self, space: SearchSpace, rng: np.random.Generator, *, shrink=0.9) -> None:  # type: ignore[no-untyped-def]
         super().__init__(space, rng, shrink=shrink)
 
 
-class MixesRows(Sound):
+class MixesRows(Sound, breaks="order"):
     """Hands the rows out in another order than it keeps them in."""
 
     def ask(self) -> Array:
@@ -127,7 +137,7 @@ class MixesRows(Sound):
         super().tell(self.population, costs)
 
 
-class Maximises(Sound):
+class Maximises(Sound, breaks="sphere_problem real_problem"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, -costs)
 
@@ -153,7 +163,7 @@ class LeavesAThread(Sound):
         threading.Thread(target=time.sleep, args=(120.0,), name="planted").start()
 
 
-class Talks(Sound):
+class Talks(Sound, breaks="silence"):
     """Prints whatever it does, by Python and past it."""
 
     def ask(self) -> Array:
@@ -162,27 +172,27 @@ class Talks(Sound):
         return super().ask()
 
 
-class WrongSignature(Sound):
+class WrongSignature(Sound, breaks="construction shape"):
     def __init__(self, space: SearchSpace) -> None:
         super().__init__(space, np.random.default_rng(0))
 
 
-class ExitsInTell(Sound):
+class ExitsInTell(Sound, breaks="dtype box"):
     def tell(self, proposals: Array, costs: Array) -> None:
         sys.exit(0)
 
 
-class EndsTheProcess(Sound):
+class EndsTheProcess(Sound, ends="it must not end the program, got exit status 0"):
     def tell(self, proposals: Array, costs: Array) -> None:
         os._exit(0)
 
 
-class Crashes(Sound):
+class Crashes(Sound, ends="it must not end the program, got SIGSEGV"):
     def tell(self, proposals: Array, costs: Array) -> None:
         ctypes.string_at(0)
 
 
-class NeverReturns(Sound):
+class NeverReturns(Sound, ends="it must end within 1 s, and did not"):
     """Swallows whatever would end it."""
 
     def tell(self, proposals: Array, costs: Array) -> None:
@@ -193,34 +203,34 @@ class NeverReturns(Sound):
                 continue
 
 
-class FillsTheMemory(Sound):
+class FillsTheMemory(Sound, ends="it must not fail, got MemoryError: Unable to allocate"):
     def tell(self, proposals: Array, costs: Array) -> None:
         self.hoard = np.ones((10**11,))
 
 
-class FewDimensionsOnly(Sound):
+class FewDimensionsOnly(Sound, breaks="dimensions"):
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
         super().__init__(space, rng)
         self.corners = np.zeros((9, 9))[: space.dimensions, : space.dimensions] + np.eye(space.dimensions)
 
 
-class UsesGlobalNumpy(Sound):
+class UsesGlobalNumpy(Sound, breaks="global_randomness"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
         np.random.rand()  # noqa: NPY002
 
 
-class UsesTheClock(Sound):
+class UsesTheClock(Sound, breaks="seeds"):
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
         super().__init__(space, np.random.default_rng(time.perf_counter_ns()))
 
 
-class IgnoresTheSeed(Sound):
+class IgnoresTheSeed(Sound, breaks="seeds"):
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
         super().__init__(space, np.random.default_rng(0))
 
 
-class HashesNames(Sound):
+class HashesNames(Sound, breaks="new_process"):
     """Depends on the order of a set of words, which every process shuffles again."""
 
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
@@ -230,13 +240,13 @@ class HashesNames(Sound):
         )
 
 
-class SortsInPlace(Sound):
+class SortsInPlace(Sound, breaks="inputs"):
     def tell(self, proposals: Array, costs: Array) -> None:
         super().tell(proposals, costs)
         costs.sort()
 
 
-class HoldsALock(Sound):
+class HoldsALock(Sound, breaks="copies"):
     """Cannot be copied."""
 
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
@@ -244,7 +254,7 @@ class HoldsALock(Sound):
         self.lock = threading.Lock()
 
 
-class SharesItsGenerator(Sound):
+class SharesItsGenerator(Sound, breaks="copies"):
     """Keeps its generator outside itself, so that copies draw from one."""
 
     generators: dict[int, np.random.Generator] = {}  # noqa: RUF012
@@ -259,7 +269,7 @@ class SharesItsGenerator(Sound):
         super().tell(proposals, costs)
 
 
-class IgnoresTheStart(Sound):
+class IgnoresTheStart(Sound, breaks="start"):
     def __init__(self, space: SearchSpace, rng: np.random.Generator) -> None:
         super().__init__(space, rng)
         drawn = rng.uniform(-1.0, 1.0, (2000, space.dimensions))
@@ -267,13 +277,13 @@ class IgnoresTheStart(Sound):
         self.population = allowed if len(allowed) == 40 else self.population
 
 
-class Slow(Sound):
+class Slow(Sound, breaks="speed"):
     def ask(self) -> Array:
         time.sleep(0.06 * len(self.population))
         return super().ask()
 
 
-class HangsOnNonsense(Sound):
+class HangsOnNonsense(Sound, breaks="nonsense_settings"):
     def __init__(
         self, space: SearchSpace, rng: np.random.Generator, *, population_size: int = 40, tries: int = 5
     ) -> None:
@@ -292,33 +302,37 @@ class ForgetsParticles(Annealed):
         self._particles = draw_population(space, self._rng, len(self._particles))
 
 
-class ShiftsWithTheCompany(PCA):
+class Learned(Planted, PCA):
+    """A prior with which nothing is wrong; each below spoils one thing."""
+
+
+class ShiftsWithTheCompany(Learned, breaks="same_bits"):
     """Centres what it gets by its mean, so that a row depends on the others."""
 
     def inverse_transform(self, latents: Array) -> Array:
         return super().inverse_transform(latents) + 1e-9 * np.mean(latents)
 
 
-class NarrowRange(PCA):
+class NarrowRange(Learned, breaks="training_in_range"):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         super().fit(angles)
         self.low, self.high = 0.5 * self.low, 0.5 * self.high
         return self
 
 
-class RefusesAll(PCA):
+class RefusesAll(Learned, breaks="training_feasible"):
     def feasible(self, latents: Array) -> Any:
         return np.zeros(len(latents), dtype=bool)
 
 
-class Reversed(PCA):
+class Reversed(Learned, breaks="ranges"):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         super().fit(angles)
         self.low, self.high = self.high, self.low
         return self
 
 
-class Unhurried(PCA):
+class Unhurried(Learned):
     """Counts how often it learns, as that may take minutes; nothing is wrong with it."""
 
     fits = 0
@@ -328,17 +342,17 @@ class Unhurried(PCA):
         return super().fit(angles, skeleton)
 
 
-class ReturnsNone(PCA):
+class ReturnsNone(Learned, breaks="fit"):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         super().fit(angles)
 
 
-class TakesNan(PCA):
+class TakesNan(Learned, breaks="bad_input"):
     def fit(self, angles: Array, skeleton: Any = None) -> Any:
         return super().fit(np.nan_to_num(np.asarray(angles)))
 
 
-class Holds:
+class Holds(Planted):
     """A tracker that gives the first training pose in every frame; each below spoils one thing."""
 
     def __init__(self, task: Task) -> None:
@@ -365,7 +379,7 @@ class Holds:
             yield self.frame(observation)
 
 
-class LosesThePerson(Holds):
+class LosesThePerson(Holds, breaks="follows"):
     """Is some 300 mm off."""
 
     def frame(self, observation: Any) -> Frame:
@@ -374,17 +388,17 @@ class LosesThePerson(Holds):
         return super().frame(observation)
 
 
-class ReadsAhead(Holds):
+class ReadsAhead(Holds, breaks="as_they_come"):
     def track(self, observations: Any, rng: Any) -> Any:
         yield from super().track(list(observations), rng)
 
 
-class DropsFrames(Holds):
+class DropsFrames(Holds, breaks="one_frame_each"):
     def track(self, observations: Any, rng: Any) -> Any:
         yield from list(super().track(observations, rng))[::2]
 
 
-class SpendsAndSaysSo(Holds):
+class SpendsAndSaysSo(Holds, breaks="audit"):
     """Spends 20,000 evaluations of any budget."""
 
     def frame(self, observation: Any) -> Frame:
@@ -392,7 +406,7 @@ class SpendsAndSaysSo(Holds):
         return replace(super().frame(observation), evaluations=20_000)
 
 
-class SpendsInSecret(Holds):
+class SpendsInSecret(Holds, breaks="audit"):
     """Says 100 evaluations and spends 20,000."""
 
     def frame(self, observation: Any) -> Frame:
@@ -400,7 +414,7 @@ class SpendsInSecret(Holds):
         return replace(super().frame(observation), evaluations=100)
 
 
-class ChangesTheMask(Holds):
+class ChangesTheMask(Holds, breaks="one_frame_each"):
     """Makes the mask what it has drawn."""
 
     def frame(self, observation: Any) -> Frame:
@@ -408,19 +422,19 @@ class ChangesTheMask(Holds):
         return super().frame(observation)
 
 
-class GivesFramesTwice(Holds):
+class GivesFramesTwice(Holds, breaks="one_frame_each"):
     def track(self, observations: Any, rng: Any) -> Any:
         for frame in super().track(observations, rng):
             yield frame
             yield frame
 
 
-class ExitsInTrack(Holds):
+class ExitsInTrack(Holds, breaks="one_frame_each"):
     def frame(self, observation: Any) -> Frame:
         sys.exit(0)
 
 
-class Remembers(Holds):
+class Remembers(Holds, breaks="used_twice"):
     count = 0
 
     def track(self, observations: Any, rng: Any) -> Any:
@@ -429,60 +443,8 @@ class Remembers(Holds):
         yield from super().track(observations, rng)
 
 
-# what each breaks: the checks of which at least the first must fail
-OPTIMISERS: dict[type, tuple[str, ...]] = {
-    SwallowsSettings: ("construction", "unknown_setting"),
-    AsksOneRow: ("shape",),
-    AsksFloat32: ("dtype",),
-    LeavesTheBox: ("box",),
-    ForgetsFeasible: ("feasible",),
-    WaitsForFeasible: ("hardly_feasible",),
-    DividesByTheRange: ("costs",),
-    AsksForMore: ("budget",),
-    DoublesItsPopulation: ("box", "order"),
-    DrawsInSecret: ("evaluations",),
-    HasUntypedSettings: ("construction",),
-    Talks: ("silence",),
-    MixesRows: ("order",),
-    Maximises: ("sphere_problem", "real_problem"),
-    FewDimensionsOnly: ("dimensions",),
-    UsesGlobalNumpy: ("global_randomness",),
-    UsesTheClock: ("seeds",),
-    IgnoresTheSeed: ("seeds",),
-    HashesNames: ("new_process",),
-    SortsInPlace: ("inputs",),
-    HoldsALock: ("copies",),
-    SharesItsGenerator: ("copies",),
-    IgnoresTheStart: ("start",),
-    Slow: ("speed",),
-    HangsOnNonsense: ("nonsense_settings",),
-    WrongSignature: ("construction", "shape"),
-    ExitsInTell: ("dtype", "box"),
-}
-# what only a process of its own can find, and what is said of it
-APART: dict[type, tuple[str, str]] = {
-    EndsTheProcess: ("dtype", "it must not end the program, got exit status 0"),
-    Crashes: ("dtype", "it must not end the program, got SIGSEGV"),
-    NeverReturns: ("dtype", "it must end within 1 s, and did not"),
-    FillsTheMemory: ("dtype", "it must not fail, got MemoryError: Unable to allocate"),
-}
 RIGHT: tuple[type, ...] = (Sound, KnowsItsRows)
-PRIORS: dict[type, tuple[str, ...]] = {
-    ShiftsWithTheCompany: ("same_bits",),
-    NarrowRange: ("training_in_range",),
-    RefusesAll: ("training_feasible",),
-    ReturnsNone: ("fit",),
-    TakesNan: ("bad_input",),
-    Reversed: ("ranges",),
-}
-TRACKERS: dict[type, tuple[str, ...]] = {
-    LosesThePerson: ("follows",),
-    ReadsAhead: ("as_they_come",),
-    DropsFrames: ("one_frame_each",),
-    Remembers: ("used_twice",),
-    SpendsAndSaysSo: ("audit",),
-    SpendsInSecret: ("audit",),
-    ChangesTheMask: ("one_frame_each",),
-    GivesFramesTwice: ("one_frame_each",),
-    ExitsInTrack: ("one_frame_each",),
-}
+OPTIMISERS, PRIORS, TRACKERS = (
+    [kind for kind in base.__subclasses__() if kind.breaks] for base in (Sound, Learned, Holds)
+)
+APART = [kind for kind in Sound.__subclasses__() if kind.ends]  # what only a process of its own survives

@@ -122,7 +122,7 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
     assert summary["unknown_sides"] == [2, 3, 4]
     assert summary["lost_frames"] == [4]
     assert summary["lost_flagged_rate"] == pytest.approx(1 / 6)
-    assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.summary)
+    assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.content)
 
 
 def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(scene: Scene) -> None:
@@ -134,8 +134,8 @@ def test_frames_and_tracks_have_modes_and_the_probability_that_none_is_right(sce
     assert track.summary["modes"] == pytest.approx([0.75, 0.25])
     assert track.modes[0].poses.shape == (FRAMES, 66)
     # a body that faces the other way has its left where its right was
-    assert "left and right: unknown in 6 of 6 frames" in table(track.summary)
-    assert "frames lost" not in table(track.summary)
+    assert "left and right: unknown in 6 of 6 frames" in table(track.content)
+    assert "frames lost" not in table(track.content)
     apart = tracked(scene, uncertain_frames(scene, CERTAIN, turned=0.25))  # whose posteriors are no trajectories
     assert len(apart.frames[0].modes) == 2
     assert (apart.modes, apart.summary["modes"]) == ([], None)

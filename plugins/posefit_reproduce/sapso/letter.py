@@ -40,13 +40,9 @@ class LetterSAPSO(SAPSO):
         stop_temperature: float = 0.0,
         inertia: float = 0.9,
     ) -> None:
+        size, stop = population_size, stop_temperature
         super().__init__(
-            space,
-            rng,
-            population_size=population_size,
-            iterations=iterations,
-            stop_temperature=stop_temperature,
-            inertia=inertia,
+            space, rng, population_size=size, iterations=iterations, stop_temperature=stop, inertia=inertia
         )
         self.low, self.high = velocity_limits(space)
         self.v = np.clip(self.v, self.low, self.high)

@@ -11,7 +11,7 @@ from posefit.fitting import metrics
 from posefit.geometry.skeleton import JOINTS
 from posefit_reproduce.experiment import Arrays, Claim, Results, Table, bounded, claims_table, interval
 from posefit_reproduce.vsmm.activities import ACTIVITIES, Film, film_of
-from posefit_reproduce.vsmm.experiment import ALTERNATIVES, BEST, GROUPS, LABELS, METHODS, MODELS
+from posefit_reproduce.vsmm.experiment import ALTERNATIVES, BEST, GROUPS, LABELS, METHODS, MODELS, TUNED
 from posefit_vsmm.motion import library
 from posefit_vsmm.state import AT
 
@@ -41,6 +41,7 @@ FIGURES: dict[str, tuple[str, int]] = {
     "frame": ("frame, CPU ms", 2),
 }
 BOTH = ("default", "patent")
+Films = Mapping[str, Array]  # by the names of `FIGURES`, those of all films (1, n)
 # what is shown film by film
 CHIEF = ("elbow_detected", "hand_detected", "mpjpe", "model", "group", "delay", "delay_change")
 # what a filter over all models has none of
@@ -84,14 +85,10 @@ def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:
 def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
     """Return how the models' probabilities and the groups in force fare; frames that try all models have no group."""
     activity, probabilities = np.array(labels), arrays["probabilities"]
-    likely, sets = (
-        probabilities.argmax(axis=1),
-        [set(), *({MODELS.index(name) for name in names} for _, names in GROUPS)],
-    )
-    force = [
-        sets[group + 1] | sets[other + 1]
-        for group, other in zip(arrays["group"], arrays["candidate_group"], strict=True)
-    ]
+    likely = probabilities.argmax(axis=1)
+    sets = [set(), *({MODELS.index(name) for name in names} for _, names in GROUPS)]
+    pairs_in_force = zip(arrays["group"], arrays["candidate_group"], strict=True)
+    force = [sets[group + 1] | sets[other + 1] for group, other in pairs_in_force]
     right = [set(RIGHT[label]) for label in labels]
     right_group = np.array([bool(models & wanted) for models, wanted in zip(force, right, strict=True)])
     starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1])]
@@ -118,31 +115,29 @@ def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
 
 def patent_tables(results: Results) -> Iterator[Table]:
     """Yield all tables: claims, methods, film by film, labels, settings, predictions."""
-    rows: dict[str, dict[int, dict[str, float]]] = {}
+    rows: dict[str, list[dict[str, float]]] = {}
     for run in sorted(results.runs, key=lambda run: run.seed):
-        rows.setdefault(f"{run.kind} {run.method}", {})[run.seed] = film_figures(run.seed, results.runs[run])
-    methods = {name: rows[f"reported {name}"] for name in METHODS}
+        rows.setdefault(f"{run.kind} {run.method}", []).append(film_figures(run.seed, results.runs[run]))
+    films: dict[str, Films] = {
+        name: {figure: np.array([[row[figure] for row in each]]) for figure in each[0]} for name, each in rows.items()
+    }
+    methods = {name: films[f"reported {name}"] for name in METHODS}
     yield claims_table("claims", list(claims(methods)))
     yield compared("compared", methods)
     yield by_film("films", {name: methods[name] for name in BOTH})
     for name in BOTH:
         yield labels_table(f"labels-{name}", results, name)
-    yield alternatives(rows)
+    yield alternatives(films)
     yield predictions()
 
 
-def column(films: Mapping[int, Mapping[str, float]], name: str) -> Array:
-    """Return a figure of each film (1, films)."""
-    return np.array([[film[name] for film in films.values()]])
-
-
-def compared(name: str, methods: Mapping[str, Mapping[int, Mapping[str, float]]]) -> Table:
+def compared(name: str, methods: Mapping[str, Films]) -> Table:
     """Return the mean over films of each figure, with the interval that other films would give."""
     rows = [
         [
             label,
             *(
-                "" if "six" in method and figure in SWITCHING else bounded(interval(column(films, figure)), digits)
+                "" if "six" in method and figure in SWITCHING else bounded(interval(films[figure]), digits)
                 for method, films in methods.items()
             ),
         ]
@@ -151,24 +146,25 @@ def compared(name: str, methods: Mapping[str, Mapping[int, Mapping[str, float]]]
     return Table(name, ["mean of the films", *methods], rows)
 
 
-def by_film(name: str, methods: Mapping[str, Mapping[int, Mapping[str, float]]]) -> Table:
+def by_film(name: str, methods: Mapping[str, Films]) -> Table:
     """Return the chief figures of each film, and their deviation over the films."""
     rows = []
     for figure in CHIEF:
         label, digits = FIGURES[figure]
         for method, films in methods.items():
-            values = column(films, figure)[0]
+            values = films[figure][0]
             deviation = values.std(ddof=1) if len(values) > 1 else 0.0
             cells = [f"{value:.{digits}f}" for value in (*values, deviation)]
             rows.append([label, method, *cells])
-    return Table(name, ["film", "", *map(str, next(iter(methods.values()))), "deviation"], rows, 2)
+    numbers = [str(TUNED + k) for k in range(len(rows[0]) - 3)]
+    return Table(name, ["film", "", *numbers, "deviation"], rows, 2)
 
 
-def claims(methods: Mapping[str, Mapping[int, Mapping[str, float]]]) -> Iterator[Claim]:
+def claims(methods: Mapping[str, Films]) -> Iterator[Claim]:
     """Yield what the patent says of its experiment, of our default and of its letter."""
     for name, other in (("default", "all six models"), ("patent", "patent, all six")):
-        figures = {figure: column(methods[name], figure) for figure in FIGURES}
-        less = {figure: figures[figure] - column(methods[other], figure) for figure in ("frame", "mpjpe")}
+        figures = methods[name]
+        less = {figure: figures[figure] - methods[other][figure] for figure in ("frame", "mpjpe")}
         for text, source, values, unit, bound, above in (
             ("the elbow is near the detected one", "figure 11", figures["elbow_detected"], "cm", PATENT_CM[1], False),
             ("the hand is near the detected one", "figure 11", figures["hand_detected"], "cm", PATENT_CM[1], False),
@@ -197,17 +193,17 @@ def labels_table(name: str, results: Results, method: str) -> Table:
     return Table(name, [f"% (by chance {chance:.0f})", *LABELS, "none"], rows)
 
 
-def alternatives(rows: Mapping[str, Mapping[int, Mapping[str, float]]]) -> Table:
+def alternatives(methods: Mapping[str, Films]) -> Table:
     """Return by how many mm of MPJPE another setting is worse than the default, on the films that it was chosen on.
 
     The last row is of the films that are reported.
     """
     figures, cells = ("mpjpe", "elbow", "hand", "model", "label", "delay", "frame"), []
     for kind, name in (*(("tuned", name) for name in ("default", *ALTERNATIVES)), ("reported", BEST)):
-        films = rows[f"{kind} {name}"]
-        worse = column(films, "mpjpe") - column(rows[f"{kind} default"], "mpjpe")
-        means = [f"{column(films, figure).mean():.{FIGURES[figure][1]}f}" for figure in figures]
-        label = f"{name}, films {min(films)} to {max(films)}"
+        films, first = methods[f"{kind} {name}"], 0 if kind == "tuned" else TUNED
+        worse = films["mpjpe"] - methods[f"{kind} default"]["mpjpe"]
+        means = [f"{films[figure].mean():.{FIGURES[figure][1]}f}" for figure in figures]
+        label = f"{name}, films {first} to {first + worse.size - 1}"
         cells.append([label, bounded(interval(worse), 1), f"{(worse > 0).sum()} of {worse.size}", *means])
     heads = ["worse by mm", "on films", "MPJPE, mm", "elbow, cm", "hand, cm", "model, %", "label, %", "longest delay"]
     return Table("settings", ["", *heads, "CPU ms"], cells)
@@ -217,8 +213,5 @@ def predictions() -> Table:
     """Return the models' errors in degrees, one and ten frames ahead, on clips that they were not fitted to."""
     keys = ("still_1", "identity_1", "zero_1", "still_10", "identity_10", "zero_10")
     heads = ["degrees ahead", *(f"{name}, {count}" for count in (1, 10) for name in ("still", "default", "patent"))]
-    return Table(
-        "predictions",
-        heads,
-        [[name, *(f"{report[key]:.2f}" for key in keys)] for name, report in library().report.items()],
-    )
+    rows = [[name, *(f"{report[key]:.2f}" for key in keys)] for name, report in library().report.items()]
+    return Table("predictions", heads, rows)

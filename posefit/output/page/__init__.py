@@ -5,7 +5,10 @@
 | the document and its colours | this file |
 | the data of the page | content.py |
 | small pictures of footage and masks, as many as there is room for | stills.py |
+| cameras, joints and angles as the scripts read them | bodies.py |
 | the places of everything, empty; how it looks | track.html, track.css |
+| bodies of tapered cones on a canvas, seen by any camera; a view that can be turned | body.js |
+| a clock that plays frames; mouse, touch and keys that turn a view | play.js |
 | a camera's picture with the body on it; the body in 3D | panels.js |
 | curves with intervals, and rows of marks | curves.js |
 | the player, the keys, and the words above and below | main.js |
@@ -18,12 +21,13 @@ from typing import Any
 from posefit.output.drawing import BOTH, LEFT, MIDDLE, MISSED, OTHER, RIGHT, SPILLED, hexadecimal
 from posefit.page.document import assembled, colour_style, one_script, part
 
-# The limbs of a body, and the truth, on any page; on dark screens as in pictures.
-BODY_LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
+LIGHT = {"left": "#b84500", "right": "#0063a6", "truth": "#5d6975"}
 BODY_DARK = {"left": hexadecimal(LEFT), "right": hexadecimal(RIGHT), "truth": "#98a5b3"}
 
 LIGHT = {
-    **BODY_LIGHT,
+    "left": "#b84500",
+    "right": "#0063a6",
+    "truth": "#5d6975",
     "middle": "#8d97a3",
     "both": "#8fc3a3",
     "missed": "#c8372d",
@@ -33,7 +37,9 @@ LIGHT = {
     "held": "#7a8794",
 }
 DARK = {
-    **BODY_DARK,
+    "left": hexadecimal(LEFT),
+    "right": hexadecimal(RIGHT),
+    "truth": "#98a5b3",
     "middle": hexadecimal(MIDDLE),
     "both": hexadecimal(BOTH),
     "missed": hexadecimal(MISSED),
@@ -43,7 +49,7 @@ DARK = {
     "held": "#98a5b3",
 }
 
-SCRIPTS = ("panels", "curves", "main")  # in this order
+SCRIPTS = ("body", "play", "panels", "curves", "main")  # in this order
 _MARK = "<!doctype html>\n<!-- a track of posefit -->\n"
 
 

@@ -18,10 +18,10 @@ from posefit.measuring.centres import PLACES
 from posefit.measuring.gait import stride_curves
 from posefit.motion.motion import Motion
 from posefit.output.content import Content
+from posefit.output.page.bodies import camera_from_origin, in_16_bits
 from posefit.output.page.stills import Stills
 from posefit.output.picture import MIN_OTHER_WEIGHT
 from posefit.output.text import brief, gait_line, gait_rows, held_frames, undetermined
-from posefit.page.bodies import camera_from_origin, in_16_bits
 from posefit.uncertainty.modes import other_mode
 from posefit.version import __version__
 
@@ -46,22 +46,22 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
     Joints are millimetres from the first position of the root and angles tenths of a degree, in 16 bits each. A long
     track has every `step`-th frame; a frame is marked if one of those that it stands for is.
     """
-    scene, frames, table, summary = content.scene, content.frames, content.table, content.summary
+    scene, frames, table, setup = content.scene, content.frames, content.table, content.setup
     step, estimate, intervals = stills.step, content.motion, content.intervals
     joints = estimate.joints[::step]
     origin = np.round(joints[0, 0], 3)
     truth, free = scene.truth, estimate.skeleton.free
     true = None if truth is None else truth.joints[::step]
     angles = unwrapped(estimate.poses)[::step]
-    worth = "" if truth is None else f": {brief(summary)[0]}"
+    worth = "" if truth is None else f": {brief(content)[0]}"
     curves = [name for name in CURVES if name in table]
     return {
         "version": __version__,
-        "title": str(summary["motion"]),
-        "made": f"Tracked by {summary['method']}, written on {time.strftime('%d %B %Y')}{worth}.",
-        "verdict": _verdict(summary),
-        "notes": [*filter(None, [held_frames(summary)]), *map(str, summary["warnings"])],
-        "facts": _facts(summary),
+        "title": setup.motion,
+        "made": f"Tracked by {setup.method}, written on {time.strftime('%d %B %Y')}{worth}.",
+        "verdict": _verdict(content),
+        "notes": [*filter(None, [held_frames(content)]), *content.log.warnings],
+        "facts": _facts(content),
         "joints": JOINTS,
         "places": [place.replace("_", " ") for place in PLACES],
         "parents": PARENTS,
@@ -81,7 +81,7 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
         "rows": {name: table[name][::step].tolist() for name in curves},
         "marks": {name: np.unique(np.flatnonzero(marked(table)) // step).tolist() for name, marked in MARKS.items()},
         "angles": {
-            "names": [name for name, there in zip(ANGLE_NAMES, free, strict=True) if there],
+            "names": [name for name, is_free in zip(ANGLE_NAMES, free, strict=True) if is_free],
             "values": in_16_bits(angles[:, free], UNIT),
             "truth": None
             if truth is None
@@ -102,27 +102,31 @@ def track_data(content: Content, stills: Stills) -> dict[str, Any]:
     }
 
 
-def _verdict(summary: dict[str, Any]) -> str:
+def _verdict(content: Content) -> str:
     """Return whether the track can be trusted, if the truth is unknown, and what was not determined."""
-    trust = "" if summary["trust"] is None else f"{summary['trust']['sentence']} "
-    if not_determined := undetermined(summary):
+    trust = "" if content.trust is None else f"{content.trust.sentence} "
+    if not_determined := undetermined(content):
         return f"{trust}Not determined: {not_determined}."
-    certainties = (("unknown_sides", "which side is left"), ("lost_frames", "which frames are lost"))
-    unreported = " or ".join(words for name, words in certainties if summary[name] is None)
+    certainties = (
+        (content.log.unknown_sides, "which side is left"),
+        (content.log.lost_frames, "which frames are lost"),
+    )
+    unreported = " or ".join(words for reported, words in certainties if reported is None)
     if unreported:
         return f"{trust}The method does not report {unreported}: frames without a mark may be wrong too."
     return f"{trust}The method reports no frame as lost, and left and right as known in every frame."
 
 
-def _facts(summary: dict[str, Any]) -> list[list[str]]:
+def _facts(content: Content) -> list[list[str]]:
+    setup, measures = content.setup, content.measures
     return [
-        *([] if summary["mpjpe_mm"] is None else [["MPJPE", f"{summary['mpjpe_mm']:.0f} mm"]]),
-        ["method", str(summary["method"])],
-        ["seed", str(summary["seed"])],
-        ["cameras", f"{summary['views']}, {summary['camera']}"],
-        ["translation", str(summary["translation"])],
-        ["IoU", f"{summary['iou']:.3f}"],
-        ["posefit", str(summary["version"])],
+        *([] if measures.mpjpe_mm is None else [["MPJPE", f"{measures.mpjpe_mm:.0f} mm"]]),
+        ["method", setup.method],
+        ["seed", str(setup.seed)],
+        ["cameras", f"{setup.views}, {setup.camera}"],
+        ["translation", setup.translation],
+        ["IoU", f"{measures.iou:.3f}"],
+        ["posefit", setup.version],
     ]
 
 
@@ -141,7 +145,7 @@ def _others(scene: Scene, frames: Sequence[Frame], origin: Array) -> dict[str, A
 
 def _gait(content: Content) -> dict[str, Any]:
     """Return the gait in words and by side, and how the knees bend over a stride, the mean and a standard deviation."""
-    gait, knees = content.summary["gait"], {}
+    gait, knees = content.gait.as_dict(), {}
     if gait["walk"]:
         for side, curves in stride_curves(content.motion, content.gait, "knee_flexion").items():
             mean, spread = (curves.mean(axis=0), curves.std(axis=0)) if len(curves) else (np.empty(0), 0.0)

@@ -5,34 +5,29 @@
 | the sections, empty, and how they look | report.html, report.css |
 | colours and marks of methods, the legend whose buttons show and hide them | methods.js |
 | charts: lines with bands, errors of joints | charts.js |
-| the first screen: all methods, three tracks of the leader, trouble | first.js |
+| the first screen: all methods, trouble | first.js |
 | the tables: leaderboard, all runs, running times, failures; the command that runs a cell again | tables.js |
 | paired tests: one method against all others | compare.js |
-| small pictures of tracks, and the window that plays one | viewer.js |
 | the order in which everything is drawn | main.js |
 
 The constant `D` is the data that `posefit.report.content` returns.
 
-No method has orange or blue, the colours of left and right limbs. All colours are darker on white and lighter on black,
-so that each has a contrast of at least 4.5 to 1 with its background. Marks distinguish methods too.
+All colours are darker on white and lighter on black, so that each has a contrast of at least 4.5 to 1 with its
+background. Marks distinguish methods too.
 """
 
 from typing import Any
 
-from posefit.output.drawing import OTHER, hexadecimal
-from posefit.output.page import BODY_DARK, BODY_LIGHT
 from posefit.page.document import assembled, colour_style, one_script, part
 
 MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report begins
-SCRIPTS = ("methods", "charts", "first", "tables", "compare", "viewer", "main")  # in this order
+SCRIPTS = ("methods", "charts", "first", "tables", "compare", "main")  # in this order
 _LIGHT = ("#00775a", "#a63d80", "#7a5c00", "#6b4cc0", "#111111", "#b0123b", "#3d6b7d")
 _DARK = ("#2cc79a", "#e39cc6", "#d9cf6a", "#b9a3ff", "#f2f2f2", "#ff8095", "#8fb8c9")
 COLOURS = len(_LIGHT)
 
-LIGHT = {f"c{k}": colour for k, colour in enumerate(_LIGHT)} | BODY_LIGHT
-LIGHT |= {"middle": "var(--ink)", "estimate": "#b84500", "swapped": "#a63d80"}
-DARK = {f"c{k}": colour for k, colour in enumerate(_DARK)} | BODY_DARK
-DARK |= {"middle": "var(--ink)", "estimate": "#f08a3c", "swapped": hexadecimal(OTHER)}
+LIGHT = {f"c{k}": colour for k, colour in enumerate(_LIGHT)}
+DARK = {f"c{k}": colour for k, colour in enumerate(_DARK)}
 
 
 def document(data: dict[str, Any]) -> str:

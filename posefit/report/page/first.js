@@ -1,4 +1,4 @@
-// The first screen: all methods with their intervals, three tracks of the leader, failures.
+// The first screen: all methods with their intervals, and failures.
 const MAX_METHODS = 12; // of the figure
 
 // The lines of a text, each at most so many pixels wide where it can be broken.
@@ -25,7 +25,6 @@ function firstScreen() {
   $("standing-note").textContent = notes.join(" ");
   const lines = bases.map((row) => ({ ...row, name: D.baseline_names[row.baseline] }));
   drawn($("standing"), (width) => forest(width, rows.slice(0, MAX_METHODS), lines));
-  examples();
 }
 
 // How far a method is behind the leader, how certain that is, and in how many tracks it loses frames.
@@ -81,31 +80,6 @@ function forest(width, rows, bases) {
     svg.append(mark(row.method, at(row[of]), y, 5.5, titles[place]));
   });
   return svg;
-}
-
-// Three tracks of the leader, which move.
-function examples() {
-  const rows = (D.examples ?? []).filter(([, row]) => D.animations.tracks[row]);
-  if (!rows.length) return $("examples").remove();
-  const stills = rows.map(([name, row]) => {
-    const title = make("strong", {}, `${name} track: ${number(D.rows.error[row], 2)}°`);
-    const about = make("small", {}, `${INSTANCES[D.rows.instance[row]]}, seed ${D.seeds[D.rows.seed[row]]}`);
-    return addStill($("three"), row, title, about);
-  });
-  $("examples-of").textContent = `Three tracks of ${METHODS[D.leaderboard[0].method]}: `;
-  let frame = 0;
-  const repaint = () => stills.forEach((paintAt) => paintAt(frame));
-  const run = clock(
-    $("moving"),
-    () => pace(sceneOf(rows[0][1])),
-    (over) => {
-      frame += over;
-      repaint();
-    },
-  );
-  new ResizeObserver(repaint).observe($("three"));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
-  run(!matchMedia("(prefers-reduced-motion: reduce)").matches);
 }
 
 // What failed and what is left out, with the reasons.

@@ -19,7 +19,6 @@ $("because").append(...because.map((sentence) => make("p", {}, sentence)));
 $("summary").textContent = D.header.summary;
 details(D.header);
 trouble();
-viewer();
 if (D.leaderboard) firstScreen();
 else $("overview").remove();
 for (const [id, fill] of Object.entries(SECTIONS))

@@ -106,9 +106,6 @@ function leaderboard() {
   ];
   const columns = [
     ...first.filter(({ value }) => D.leaderboard.some((row) => given(value(row)))),
-    further(
-      textColumn("group", "letters", String, { about: "Methods that share a letter do not differ significantly" }),
-    ),
     ...Object.keys(D.columns).flatMap((one) => (one === score ? [] : [further(figure(one))])),
     further(column("runs", "runs", whole, { down: true })),
   ];
@@ -116,15 +113,13 @@ function leaderboard() {
   table($("leaders"), columns, [...D.leaderboard, ...bases], { name: "Leaderboard", by: 1, down, kind });
 }
 
-// Buttons to watch a run, if it has an animation, and for the command that runs it again.
-function runButtons(k) {
+// The button for the command that runs a row again.
+function repeatButton(k) {
   const R = D.rows;
   const seed = D.seeds[R.seed[k]];
   const name = `${METHODS[R.method[k]]} on ${INSTANCES[R.instance[k]]}, seed ${seed}`;
   const text = `${D.heads[R.head[k]]}instance = ${D.instances[R.instance[k]].number}\nseed = ${seed}\nEND`;
-  const repeat = button("command", () => showCommand(name, text), { title: "The command that runs it again" });
-  if (!D.animations.tracks[k]) return [repeat];
-  return [button("watch", () => openTrack(k), { title: "Watch this track" }), repeat];
+  return button("command", () => showCommand(name, text), { title: "The command that runs it again" });
 }
 
 function warningSign(k) {
@@ -146,7 +141,7 @@ function allRows() {
   const R = D.rows;
   const of = (name) => (k) => R[name][k];
   const columns = [
-    buttonColumn("watch, or run again", runButtons),
+    buttonColumn("run again", repeatButton),
     textColumn("method", of("method"), (m, k) => [METHODS[m], D.warned[k] ? warningSign(k) : null]),
     further(textColumn("settings", (k) => D.methods[R.method[k]].settings || "default")),
     textColumn("instance", of("instance"), (instance) => INSTANCES[instance]),
@@ -154,11 +149,6 @@ function allRows() {
     ...Object.keys(D.columns).map((name) => ({ ...figure(name, of(name)), more: !FEW.includes(name) })),
     further(textColumn("key", of("key"))),
   ];
-  const some = Object.keys(D.animations.tracks).length;
-  if (some < R.key.length)
-    $("rows-note").textContent =
-      `${whole(some)} of ${whole(R.key.length)} runs can be watched, so that this file stays small: ` +
-      "a report of the ledger that a row's command makes shows that row.";
   const selects = [
     ["of-method", numbered(METHODS), of("method")],
     ["of-instance", numbered(INSTANCES), of("instance")],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefit.geometry.camera import Camera
-from posefit.page.bodies import camera_from_origin, in_16_bits
+from posefit.output.page.bodies import camera_from_origin, in_16_bits
 from posefit.page.document import assembled
 
 
