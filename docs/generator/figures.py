@@ -47,7 +47,7 @@ SPENT = ("evaluations_used", "seconds", "joint_errors_mm.JOINT")
 RESULT = {
     "hypotheses": (
         "",
-        "of each [hypothesis](../howto/hypotheses.md): `guess`, `cost`, `motion` term, and the number of `frames` kept",
+        "of each [hypothesis](../howto/hypotheses.md): `beginning`, `cost`, `motion` term, and `kept`",
     ),
     "build": ("m", "what was fitted: `stature_m`, `factors` on the average and their `spread`; or null"),
     "trace": ("", "of a single frame: evaluations so far and best cost, after each population"),

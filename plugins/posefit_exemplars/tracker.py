@@ -81,7 +81,7 @@ class ExemplarTracker:
         *,
         spread: float = 0.03,
         temperature: float = 2.0,
-        lag: int = 60,
+        lag: int = 20,
         mirrored: bool = True,
         fitted: bool = True,
         smoothing: float = 1.0,

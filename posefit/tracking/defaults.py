@@ -11,7 +11,6 @@ from posefit.tracking.restarts import RESTARTS
 DEFAULT_FOOTAGE_PRIOR = "loose"
 DEFAULT_TRACKER = "exemplars"  # where it is installed
 DEFAULT_TRACKER_EVALUATIONS = 9760  # of a frame
-FOOTAGE_HYPOTHESES = 2  # of a tracker that looks ahead: where they differ, the cheaper is seldom the same by chance
 BODY_FRAMES = 12  # to which a build is fitted
 
 
@@ -33,8 +32,7 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
         method = str(method_names(method or optimiser, DEFAULT_FOOTAGE_PRIOR if footage else DEFAULT_PRIOR))
     by_default, styles = method == DEFAULT_TRACKER, built_in.other_styles(name or "walk")
     body_frames = BODY_FRAMES if footage and options.asf is None else 0
-    looks_ahead = offers_of(method)[0].looks_ahead
-    restarts = RESTARTS if footage and not looks_ahead else 0
+    restarts = RESTARTS if footage and not offers_of(method)[0].looks_ahead else 0
     options = options.changed(
         method=method,
         train=options.train or ([recorded.LIBRARY] if by_default else styles),
@@ -42,7 +40,6 @@ def completed(options: TrackOptions, motion: Source | None) -> TrackOptions:
         translation=options.translation or ("aligned" if footage else "known"),
         restarts=restarts if options.restarts is None else options.restarts,
         body_frames=body_frames if options.body_frames is None else options.body_frames,
-        hypotheses=options.hypotheses or (FOOTAGE_HYPOTHESES if footage and looks_ahead else 1),
         smooth=footage if options.smooth is None else options.smooth,
     )
     if options.smooth and options.translation == "known":

@@ -28,7 +28,6 @@ from posefit.tracking.restarts import (
 )
 
 MIN_BODY_FRAMES = 5
-SPREAD = 3  # times as many frames are followed as a build is fitted to, which then show the person from more sides
 WARM_UP_POPULATIONS = 8
 NEAR_SECONDS = 0.5  # ours: within which a walker hardly turns farther than a search reaches, 45 degrees
 
@@ -91,15 +90,14 @@ def fitted_build(
     beta: float = BETA,
     restarts: int = 0,
 ) -> Shape:
-    """Return the person's build, from some of the first usable frames: every ninth, where there are so many.
+    """Return the person's build, from the first usable frames: every third, where there are so many.
 
-    The tracker follows those between, too, every third of all. It begins with the first frame that shows most: a person
-    who comes in is cut, and visible to few cameras. By then they may have turned from the pose that the task begins
-    with. Where that is longer ago than `NEAR_SECONDS`, the pose is searched again, with so many `restarts`, or by the
-    tracker itself.
+    It begins with the first frame that shows most: a person who comes in is cut, and visible to few cameras. By then
+    they may have turned from the pose that the task begins with. Where that is longer ago than `NEAR_SECONDS`, the pose
+    is searched again, with so many `restarts`, or by the tracker itself.
     """
     stride, whole = TRIAL_STRIDE, first_shown_whole(observations)
-    chosen = usable_observations(observations, SPREAD * frames, stride, whole)
+    chosen = usable_observations(observations, frames, stride, whole)
     if len(chosen) < frames:
         chosen, stride = usable_observations(observations, frames), 1
     elif whole - _first_usable(observations) > NEAR_SECONDS * task.fps:
@@ -109,15 +107,12 @@ def fitted_build(
             ahead = [observations[k] for k in range(whole, reach)]
             task, _ = best_restart(task, ahead, follow, restarts, seed)
     task = replace(task, fps=task.fps / stride)
-    fitted = np.linspace(0, len(chosen) - 1, min(frames, len(chosen))).round().astype(int).tolist()
 
     def frames_of(body: Body) -> list[Frame]:
-        followed = list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
-        return [followed[k] for k in fitted]
+        return list(follow(replace(task, body=body), chosen, np.random.default_rng(seed)))
 
     aligned, rng = task.translation == "aligned", np.random.default_rng(seed)
-    spread = [chosen[k] for k in fitted]
-    return fit_shape(task.body, task.cameras, spread, frames_of, rng, height=height, aligned=aligned, beta=beta)
+    return fit_shape(task.body, task.cameras, chosen, frames_of, rng, height=height, aligned=aligned, beta=beta)
 
 
 def _first_usable(observations: Sequence[Observation]) -> int:

@@ -286,12 +286,8 @@ class TrackOptions:
     body_frames: int | None = _int(
         None, "Frames a build is fitted to; by default 12 for footage, 0 for none.", 0, live=False
     )
-    hypotheses: int | None = _int(
-        None,
-        "Tracks from different initial guesses, each at the full budget: one is kept, of footage the cheapest path; by "
-        "default 2 for footage and a tracker that looks ahead, else 1.",
-        1,
-        live=False,
+    hypotheses: int = _int(
+        1, "Tracks from different initial guesses, each at the full budget; one is kept.", 1, live=False
     )
     smooth: bool | None = option(
         None,

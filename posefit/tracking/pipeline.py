@@ -4,7 +4,7 @@
 |---|---|---|
 | `initialise` | the first pose and the person's build | initialise.py |
 | `track_hypotheses`, `track_hypothesis` | the frames of each, and of one, by the method's tracker | this one |
-| `cheapest`, `retrack_spins` | the cheapest path, tracked again where the body spins | trajectory.py, restarts.py |
+| `cheapest`, `retrack_spins` | those of the cheapest, tracked again where the body spins | trajectory.py, restarts.py |
 | `smooth` | of footage: a smooth path, planted feet, poses fitted to the contours | smoothing/ |
 | `evaluate` | errors against the truth, or signs of trust | evaluate.py |
 """
@@ -98,7 +98,6 @@ def track_hypotheses(
     scene: Scene, first: Task, method: Method, options: TrackOptions, recorder: Recorder, progress: Progress
 ) -> list[Hypothesis]:
     """Return each hypothesis with all its frames. Each is recorded as it comes; recorded ones are not tracked again."""
-    assert options.hypotheses is not None
     recorded, state = recorder.earlier()
     gap = method.relocalise_gap if scene.truth is None else 0
     count, total, pivot = scene.count, options.hypotheses, _pivot(scene, first, method)

@@ -4,7 +4,7 @@
 |---|---|---|
 | before the first frame | `best_restart`: searches around what it may show, followed for a second | the cheapest |
 | after a gap, or while costs are high | `relocalised`: such restarts beside the track as it is | the cheapest |
-| with several hypotheses | `initial_guess`: poses of the same silhouette, each tracked to the end | the cheapest path |
+| with several hypotheses | `initial_guess`: poses with the same silhouette, each tracked to the end | the cheapest |
 | where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
 """
 
@@ -313,7 +313,7 @@ def retrack_spins(
     new = [*behind[::-1], *frames[first : last + 1], *ahead]
     cheap = mean_cost(new, usable) < SPIN_TOLERANCE * mean_cost(frames, usable)
     better = cheap and spins(new) < before
-    new = with_total_effort([frames, new], np.full(len(frames), int(better)))
+    new = with_total_effort([frames, new], int(better))
     new[first : last + 1] = frames[first : last + 1]
     return tracked._replace(frames=new, stay=stay if better else None)
 

@@ -1,4 +1,4 @@
-"""What a whole trajectory costs, the cheapest path through several, and their effort together.
+"""What a whole trajectory costs, which of two is kept, and the effort of several together.
 
 A frame does not distinguish a stride from its mirror image, but a clip does: a wrong initial guess fits a little worse
 in most frames, or has to jump. So a trajectory that is judged as a whole is right more often than each of its frames.
@@ -13,11 +13,8 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.driving import with_evaluations
-from posefit.fitting.landmarks import landmark_costs, landmark_likelihoods
-from posefit.fitting.tracker import Frame, Observation, Task
+from posefit.fitting.tracker import Frame, Task
 from posefit.footage.scene import Scene
-from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import Skeleton, root_centred
 from posefit.motion.motion import Motion
 
@@ -25,11 +22,6 @@ VELOCITY_RATE = 30.0  # how often velocities are compared, so that the jitter of
 WALKING_SPEED = 1.0  # metres a second, of the joints about the root: the typical speed where nothing is learned from
 MIN_TYPICAL_SPEED = 0.25  # metres a second
 TURN_AROUND_SPEED = 2.0  # typical speeds, which a joint's velocity changes by when it turns around on the spot
-LANDMARK_COST = (
-    2.0  # in silhouette costs, of a landmark likelihood's negative logarithm: what a tracker divides these by
-)
-SAME_DISTANCE = 0.03  # metres: joints of two tracks differ by so much where they are in the same pose; rms
-MAX_CHANGE_COST = 30.0  # of a change from one track to another, in costs of a frame, thirty of which are a second
 JUMP_SPEED = 5.0  # typical speeds: where the velocities of all joints change by more, the body is somewhere else
 
 
@@ -47,7 +39,7 @@ class Tracked(NamedTuple):
     """The track that is kept of several, with the effort of all."""
 
     frames: list[Frame]
-    hypotheses: list[dict[str, Any]]  # of each of several: its initial guess, cost, motion term, and frames on the path
+    hypotheses: list[dict[str, Any]]  # of each of several: its initial guess, cost and motion term, and whether kept
     # the first and last frame that stayed where the others were tracked again because the body spun
     stay: tuple[int, int] | None = None
 
@@ -81,72 +73,24 @@ def with_effort_of(frame: Frame, together: Sequence[Frame]) -> Frame:
     return replace(frame, seconds=seconds, cpu_seconds=cpu_seconds)
 
 
-def with_total_effort(tracks: Sequence[Sequence[Frame]], path: Sequence[int] | NDArray[np.int64]) -> list[Frame]:
-    """Return the frames of the tracks on a path (T,), with the evaluations and the time of all tracks.
-
-    The posterior's trajectories are those of another track after a change.
-    """
-    frames = [
-        with_effort_of(together[k], together) for k, together in zip(path, zip(*tracks, strict=True), strict=True)
-    ]
-    if len(set(path)) == 1:
-        return frames
-    posteriors = [frame.posterior and replace(frame.posterior, coherent=False) for frame in frames]
-    return [replace(frame, posterior=posterior) for frame, posterior in zip(frames, posteriors, strict=True)]
+def with_total_effort(tracks: Sequence[Sequence[Frame]], best: int) -> list[Frame]:
+    """Return the frames of the track that is kept, with the evaluations and the time of all tracks."""
+    return [with_effort_of(together[best], together) for together in zip(*tracks, strict=True)]
 
 
 def cheapest(scene: Scene, hypotheses: Sequence[Hypothesis], training: Sequence[Motion]) -> Tracked:
-    """Return the hypothesis whose trajectory costs least; of footage the cheapest path through all of them.
-
-    No track of footage is the best in all its frames.
-    """
+    """Return the hypothesis whose trajectory costs least."""
     if len(hypotheses) == 1:
         return Tracked(list(hypotheses[0].frames), [])
     usable, speed = [observation.usable for observation in scene.observations], typical_speed(training)
     tracks = [hypothesis.frames for hypothesis in hypotheses]
     costs = [trajectory_cost(frames, usable, scene.body.skeleton, scene.fps, speed) for frames in tracks]
-    if scene.truth is None:
-        path = cheapest_path(scene, tracks)
-    else:
-        path = np.full(scene.count, min(range(len(costs)), key=lambda k: costs[k].total))
-    counts = np.bincount(path, minlength=len(tracks))
+    best = min(range(len(costs)), key=lambda k: costs[k].total)
     table = [
-        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "frames": int(count)}
-        for hypothesis, cost, count in zip(hypotheses, costs, counts, strict=True)
+        {"guess": hypothesis.guess, "cost": cost.cost, "motion": cost.motion, "kept": k == best}
+        for k, (hypothesis, cost) in enumerate(zip(hypotheses, costs, strict=True))
     ]
-    return Tracked(with_total_effort(tracks, path), table)
-
-
-def cheapest_path(scene: Scene, tracks: Sequence[Sequence[Frame]]) -> NDArray[np.int64]:
-    """Return from which of several tracks each frame (T,) of the cheapest path through them is.
-
-    A frame costs its silhouettes and landmarks, and a change to another track how far apart the two are there.
-    """
-    body, cameras, frames = scene.body, scene.cameras, list(zip(*tracks, strict=True))
-    pairs = zip(frames, scene.observations, strict=True)
-    costs = np.array([frame_costs(body, cameras, each, observation) for each, observation in pairs]) * 30.0 / scene.fps
-    joints = np.array([root_centred(scene.motion(track).joints) for track in tracks])  # (K, T, 27, 3)
-    squares = ((joints[:, None] - joints) ** 2).sum(axis=-1).mean(axis=-1)  # (K, K, T)
-    changes = np.minimum(0.5 * squares / SAME_DISTANCE**2, MAX_CHANGE_COST)
-    totals, parents = costs[0], np.zeros(costs.shape, dtype=np.int64)
-    for k in range(1, len(costs)):  # Viterbi
-        paths = totals[:, None] + changes[..., k]
-        parents[k] = paths.argmin(axis=0)
-        totals = paths.min(axis=0) + costs[k]
-    path = [int(totals.argmin())]
-    for row in parents[:0:-1]:
-        path.append(int(row[path[-1]]))
-    return np.array(path[::-1])
-
-
-def frame_costs(body: Body, cameras: Sequence[Camera], frames: Sequence[Frame], observation: Observation) -> Array:
-    """Return what several frames' poses cost in one observation, with its landmarks; 0 where it shows too little."""
-    costs = np.array([frame.cost if observation.usable else 0.0 for frame in frames])
-    if observation.landmarks is None:
-        return costs
-    poses, places = np.array([frame.pose for frame in frames]), np.array([frame.translation for frame in frames])
-    likelihoods = landmark_likelihoods(body.skeleton, cameras, observation.landmarks, poses, places)
-    return np.asarray(costs + LANDMARK_COST * landmark_costs(likelihoods))
+    return Tracked(with_total_effort(tracks, best), table)
 
 
 def typical_speed(training: Sequence[Motion]) -> float:

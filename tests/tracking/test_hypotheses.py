@@ -21,7 +21,6 @@ from posefit.tracking.trajectory import (
     MIN_TYPICAL_SPEED,
     WALKING_SPEED,
     TrajectoryCost,
-    cheapest_path,
     trajectory_cost,
     typical_speed,
 )
@@ -83,32 +82,6 @@ def test_a_jump_costs_the_same_however_far() -> None:
 
     assert jump(0.1) < jump(2.0) == jump(3.0)
     assert jump(2.0) == pytest.approx(3 * 0.5 * (5.0 / 2.0) ** 2 / 7)  # of three changes among seven
-
-
-def test_a_path_changes_to_another_track_where_that_costs_less() -> None:
-    scene = replace(walk(30, [90.0], (120, 90)), fps=30.0)
-    mirrored = mirrored_poses(SKELETON, WALK.poses)
-
-    def path(poses: Array, costs: tuple[float, float], start: int, stop: int) -> list[int]:
-        """Return the path through the walk and other poses, whose costs are 2, but for some frames of either."""
-        both = np.full((2, 30), 2.0)
-        both[:, start:stop] = np.array(costs)[:, None]
-        return cheapest_path(
-            scene, [frames_of(WALK.poses, both[0].tolist()), frames_of(poses, both[1].tolist())]
-        ).tolist()
-
-    assert path(mirrored, (2.0, 3.0), 0, 30) == [0] * 30
-    assert path(mirrored, (3.0, 2.0), 0, 30) == [1] * 30
-    assert set(path(WALK.poses, (3.0, 2.0), 10, 12)[10:12]) == {1}  # both in one pose: a change costs nothing
-    assert path(mirrored, (9.0, 2.0), 10, 12) == [1] * 30  # seven cheaper, twice: no two changes are worth that
-    away = path(mirrored, (99.0, 2.0), 29, 30)
-    assert (away[0], away[-1]) == (1, 1)
-    both_ways = np.array([[2.0] * 15 + [9.0] * 15, [9.0] * 15 + [2.0] * 15])
-    tracks = [frames_of(poses, costs.tolist()) for poses, costs in zip((WALK.poses, mirrored), both_ways, strict=True)]
-    path_through = cheapest_path(scene, tracks)
-    assert path_through[0] == 0
-    assert path_through[-1] == 1
-    assert np.count_nonzero(np.diff(path_through)) == 1
 
 
 def test_held_frames_count_for_nothing() -> None:
@@ -182,7 +155,7 @@ def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -
     assert summary["evaluations"] > 2 * single.summary["evaluations"]
     assert summary["evaluations_per_frame"] == 400
     totals = [hypothesis["cost"] + hypothesis["motion"] for hypothesis in hypotheses]
-    assert [hypothesis["frames"] for hypothesis in hypotheses] == [3 * int(k == np.argmin(totals)) for k in range(3)]
+    assert [hypothesis["kept"] for hypothesis in hypotheses] == [k == np.argmin(totals) for k in range(3)]
     assert hypotheses[int(np.argmin(totals))]["cost"] == pytest.approx(summary["cost"])
     assert hypotheses[0]["cost"] == pytest.approx(single.summary["cost"])  # the first is the track without others
     assert single.summary["hypotheses"] == []

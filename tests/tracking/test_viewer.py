@@ -139,7 +139,7 @@ def test_the_body_is_where_the_camera_sees_it(chromium: Any, doubtful: Path) -> 
     assert scene.truth is not None
     with opened(chromium, doubtful) as browser:
         page = browser.page
-        page.locator("#camera").select_option(index=camera)
+        page.locator("#cameras button").nth(camera).click()
         for box in ("close-up", "with-mask"):
             page.locator(f"#{box}").uncheck()
         page.locator("#frame").fill("8")
@@ -193,7 +193,7 @@ def test_names_are_text_and_unreported_figures_are_hidden(chromium: Any, filmed:
         verdict = page.locator("#verdict").inner_text()
         assert verdict.startswith("Trust: ")
         assert "The method does not report which side is left or which frames are lost: frames without" in verdict
-        for hidden in ("#sure", "#doubtful", "#truth-label", "#camera-label"):
+        for hidden in ("#sure", "#doubtful", "#truth-label", "#cameras"):
             assert not page.locator(hidden).is_visible()
         assert "MPJPE" not in page.locator("body").inner_text()
         assert browser.complaints == []
