@@ -25,6 +25,7 @@ from posefit.fitting.optimiser import Optimiser as Optimiser
 from posefit.fitting.optimiser import check_tell as check_tell
 from posefit.fitting.optimiser import finite_costs as finite_costs
 from posefit.fitting.prior import Prior as Prior
+from posefit.fitting.problem import align as align
 from posefit.fitting.tracker import Frame as Frame
 from posefit.fitting.tracker import Initialiser as Initialiser
 from posefit.fitting.tracker import Observation as Observation
@@ -47,5 +48,6 @@ from posefit.silhouette.foreground import Segmenter as Segmenter
 from posefit.testing import check_optimiser as check_optimiser
 from posefit.testing import check_prior as check_prior
 from posefit.testing import check_segmenter as check_segmenter
+from posefit.testing import check_start as check_start
 from posefit.testing import check_tracker as check_tracker
 from posefit.uncertainty.modes import Posterior as Posterior

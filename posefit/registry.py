@@ -36,7 +36,6 @@ BLOCK = "POSEFIT_BLOCK_PLUGINS"
 
 Kind = Literal["optimiser", "prior", "tracker", "start", "segmenter"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-AUTHORED = tuple(kind for kind in KINDS if kind != "start")  # those with a template and a kit of checks
 OWN = "this process"  # instead of the distribution of an optimiser that no plugin registered
 COMMAND: Literal["command"] = "command"  # what a plugin may register besides
 Registrable: TypeAlias = Kind | Literal["command"]

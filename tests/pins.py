@@ -1,19 +1,17 @@
 """Digests of what posefit computes, to compare before and after a change: `python -m tests.pins write|compare FILE`.
 
-Twelve tracks (each built-in method, two cameras, masks, a live pipe, and the demonstration video where its folder is
+Eleven tracks (each built-in method, two cameras, masks, and the demonstration video where its folder is
 there), every file that one track exports, ten rollouts of environments, ten searches of the suite and the rows of the
 default sweep; without times and versions. `compare` names each item that differs and exits with status 1 then;
 `--only tracks` and the like restrict it. Digits depend on the processor, so a file holds for the machine that wrote it.
 Takes about three minutes.
 """
 
-import csv
 import hashlib
 import json
 import subprocess
 import sys
 import tempfile
-import time
 import warnings
 from argparse import ArgumentParser
 from collections.abc import Iterator
@@ -21,6 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from posefit.geometry.body import Body
+from posefit.geometry.camera import Camera
+from posefit.motion import built_in
+from posefit.silhouette.cost import project
+from tests.files import csv_rows
 
 VIDEO = Path(__file__).parents[2] / "shared/data/video/sports2d_walk"
 POSEFIT = (sys.executable, "-m", "posefit")
@@ -35,8 +39,6 @@ ENVIRONMENTS = (
     ("Track", {"frames": 4, "evaluations_per_frame": 5}),
     ("Race", {}),
 )
-BUFFERED = 30  # frames of a stream that are read before its first pose is searched
-START_SECONDS, FRAME_SECONDS = 3.0, 0.1
 PLAN = """
 suite = "posefit-2026.3"
 methods = ["sapso", "cma"]
@@ -65,44 +67,6 @@ def poses(folder: Path) -> str:
         return digest(arrays["poses"], arrays["translations"])
 
 
-def masks_of_a_walk() -> np.ndarray:
-    """Return masks (32, 120, 160) of a built-in walk."""
-    from posefit.geometry.body import Body
-    from posefit.geometry.camera import Camera
-    from posefit.motion import built_in
-    from posefit.silhouette.cost import project
-
-    motion = built_in.motion("walk", frames=32)
-    body, place = Body.of(motion.skeleton), motion.translations[0]
-    camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(160, 120))
-    return np.array([project(body, camera, pose, place) for pose in motion.poses])
-
-
-def live(masks: np.ndarray, folder: Path) -> str:
-    """Return the digest of a live track's poses: frames at a steady rate, then each once the last one's pose is there.
-
-    Raises RuntimeError where the machine was so busy that frames were skipped.
-    """
-    command = [*POSEFIT, "track", "--live", "-", "--height", "1.75", "--out", str(folder)]
-    lines = folder / "frames.jsonl"
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
-        assert run.stdin is not None
-        while run.poll() is None and not lines.exists():
-            time.sleep(0.01)
-        time.sleep(START_SECONDS)
-        for number, mask in enumerate(masks):
-            run.stdin.write(b"P5 160 120 255\n" + (255 * mask.astype(np.uint8)).tobytes())
-            run.stdin.flush()
-            time.sleep(FRAME_SECONDS)
-            while number + 1 >= BUFFERED and run.poll() is None and lines.read_text().count("\n") <= number:
-                time.sleep(0.01)
-        run.stdin.close()
-    with np.load(folder / "poses.npz") as arrays:
-        if len(arrays["poses"]) != len(masks):
-            raise RuntimeError(f"expected {len(masks)} live frames, got {len(arrays['poses'])}: others keep it busy")
-    return poses(folder)
-
-
 def tracks(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the name and digest of each track."""
     for method in METHODS:
@@ -112,11 +76,12 @@ def tracks(folder: Path) -> Iterator[tuple[str, str]]:
     posefit("track", "walk", "--frames", FRAMES, "--method", "exemplars", "--view-degrees", 0, "--view-degrees", 90,
             "--out", folder / "cameras")  # fmt: skip
     yield "two cameras", poses(folder / "cameras")
-    masks = masks_of_a_walk()
-    np.savez(folder / "masks.npz", masks=masks[:12])
+    motion = built_in.motion("walk", frames=32)
+    body, place = Body.of(motion.skeleton), motion.translations[0]
+    camera = Camera.around(place, azimuth=0.8, distance=3.5, size=(160, 120))
+    np.savez(folder / "masks.npz", masks=[project(body, camera, pose, place) for pose in motion.poses[:12]])
     posefit("track", folder / "masks.npz", "--fps", 30, "--height", 1.75, "--out", folder / "masked")
     yield "masks", poses(folder / "masked")
-    yield "live", live(masks, folder / "live")
     if VIDEO.is_dir():
         posefit("track", VIDEO / "demo.mp4", "--roi", "0,420,1520,532", "--frames", "55:95", "--out", folder / "film")
         yield "video", poses(folder / "film")
@@ -127,12 +92,10 @@ def exports(folder: Path) -> Iterator[tuple[str, str]]:
     posefit("track", "walk", "--frames", FRAMES, "--out", folder / "exports")
     for pattern in EXPORTS:
         for path in sorted((folder / "exports").glob(pattern)):
-            yield (
-                path.name,
-                digest(b"\n".join(line for line in path.read_bytes().split(b"\n") if b"posefit" not in line)),
-            )
-    with (folder / "exports/frames.csv").open() as file:
-        yield "frames.csv", digest(json.dumps([without_times(row) for row in csv.DictReader(file)]).encode())
+            lines = path.read_bytes().split(b"\n")
+            yield path.name, digest(b"\n".join(line for line in lines if b"posefit" not in line))
+    rows = [without_times(row) for row in csv_rows(folder / "exports/frames.csv")]
+    yield "frames.csv", digest(json.dumps(rows).encode())
 
 
 def without_times(row: dict[str, str]) -> dict[str, str]:
@@ -165,13 +128,9 @@ def rows(folder: Path, plan: str | Path) -> Iterator[tuple[str, str]]:
     out = folder / f"results-{Path(plan).stem}"
     posefit("sweep", plan, "--out", out)
     posefit("report", out, "--csv", out.with_suffix(".csv"))
-    with out.with_suffix(".csv").open() as file:
-        for row in csv.DictReader(file):
-            names = ("method", "function", "motion", "instance", "seed")
-            yield (
-                " ".join(row[name] for name in names if row.get(name)),
-                digest(json.dumps(without_times(row)).encode()),
-            )
+    for row in csv_rows(out.with_suffix(".csv")):
+        names = [row[name] for name in ("method", "function", "motion", "instance", "seed") if row.get(name)]
+        yield " ".join(names), digest(json.dumps(without_times(row)).encode())
 
 
 def searches(folder: Path) -> Iterator[tuple[str, str]]:

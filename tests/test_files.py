@@ -91,9 +91,11 @@ def test_a_name_and_its_place_are_checked_before_anything_is_computed(tmp_path):
 @NEW
 @pytest.mark.parametrize("links", [True, False])
 def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypatch, opened, links):
-    if not links:
-        without_links(monkeypatch)
+    def refuse(*_):  # as a file system without hard links
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
 
+    if not links:
+        monkeypatch.setattr(os, "link", refuse)
     taken = pytest.raises(ValueError, match="out: expected a new name to write to, got one that exists")
     with taken, opened(tmp_path / "out") as late:
         write(late, "late")
@@ -103,15 +105,6 @@ def test_of_two_writers_at_once_the_first_to_end_has_the_name(tmp_path, monkeypa
     target = tmp_path / "out"
     assert (target / "a" if target.is_dir() else target).read_text() == "early"
     assert list(tmp_path.iterdir()) == [target]
-
-
-def without_links(monkeypatch):
-    """Behave as a file system without hard links."""
-
-    def refuse(*_):
-        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
-
-    monkeypatch.setattr(os, "link", refuse)
 
 
 def test_only_a_file_that_carries_the_mark_is_replaced(tmp_path):

@@ -61,7 +61,6 @@ CHANGES: dict[str, Mapping[str, Any]] = {
 }
 # the same without one of the tracker's steps
 STEPS: dict[str, Mapping[str, Any]] = {
-    "the path alone": {"settings": {"exemplars.fitted": False}},
     "not smoothed": {"settings": {"exemplars.smoothing": 0.0}},
 }
 METHODS = ("sapso@pca", "annealed@pca", "sapso@loose", "annealed@loose", "vsmm")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import numpy as np
+from scipy.stats import multivariate_normal
 
 from posefit.arrays import Array
 from posefit.fitting.shape import COVARIANCE, LENGTHS
@@ -69,12 +70,6 @@ def library_factors() -> Array:
     return np.array(people) - shares(Body.of(built_in.average_skeleton()))
 
 
-def likelihood(factors: Array, covariance: Array) -> float:
-    """Return the mean logarithm of the density of people's factors (n, k) under a normal one about the average."""
-    distances = np.einsum("ni,ij,nj->n", factors, np.linalg.inv(covariance), factors)
-    return float(-0.5 * (distances.mean() + np.linalg.slogdet(2.0 * np.pi * covariance)[1]))
-
-
 def proportions_lines(men: Path, women: Path) -> Iterator[str]:
     """Yield the spreads, the correlations, and how well some priors describe the library's people."""
     spread, correlation = moments(proportions(men), proportions(women))
@@ -87,9 +82,13 @@ def proportions_lines(men: Path, women: Path) -> Iterator[str]:
     lengths = slice(1, 1 + len(LENGTHS))
     priors |= {"these spreads": np.diag(np.diag(COVARIANCE[lengths, lengths]))}
     priors |= {"and correlations": COVARIANCE[lengths, lengths]}
+
+    def density(factors: Array, covariance: Array) -> float:
+        return float(multivariate_normal(cov=covariance).logpdf(factors).mean())
+
     measured = [k for k, name in enumerate(LENGTHS) if name not in UNMEASURED]
     table = [
-        [name, *(f"{likelihood(factors[:, of], prior[np.ix_(of, of)]):.1f}" for of in (measured, range(len(LENGTHS))))]
+        [name, *(f"{density(factors[:, of], prior[np.ix_(of, of)]):.1f}" for of in (measured, range(len(LENGTHS))))]
         for factors in [library_factors()]
         for name, prior in priors.items()
     ]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.metrics import roc_auc_score
 
 from posefit.arrays import Array
 from posefit.errors import InputError
@@ -16,11 +17,7 @@ from posefit.uncertainty.calibration import BINS, reliability
 
 def auroc(scores: Array, positive: NDArray[np.bool_]) -> float | None:
     """Return the probability that a positive has a higher score than a negative, ties a half; None without both."""
-    wanted, others = scores[positive], np.sort(scores[~positive])
-    if not len(wanted) or not len(others):
-        return None
-    below = np.searchsorted(others, wanted, "left") + np.searchsorted(others, wanted, "right")
-    return float(0.5 * below.mean() / len(others))
+    return None if positive.all() or not positive.any() else float(roc_auc_score(positive, scores))
 
 
 def false_alarms(scores: Array, positive: NDArray[np.bool_], recall: float) -> float | None:

@@ -3,23 +3,26 @@
     python docs/studies/starts.py look
     python docs/studies/starts.py evaluations
     python docs/studies/starts.py images
+    python docs/studies/starts.py tracks --group walks --group turns
 
 Every image shows a pose of a recorded clip at any yaw; the person's clips are left out of what the look-up and the
 prior learn from. A camera stands 3.5 to 5 metres away; the person is up to 0.8 metres off its axis, and only their
 height is known. `look` counts how many modes it takes until one faces as the person does, and how far the pose of the
 best is off. `evaluations` follows the best cost of a search, blind and from the start. `images` fits single images.
+`tracks` follows the first frames of clips from all sides; a track goes wrong whose mean error is above 150 mm.
 Intervals are bootstraps of the mean over clips, 95 %.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import click
 import numpy as np
 
 import posefit
-from clips import GROUPS, WALKS, Clip
+from clips import EVALUATIONS, GROUPS, SIDES, WALKS, Clip, cell_fields, track_of
 from posefit.arrays import Array
 from posefit.fitting.space import SearchSpace
 from posefit.fitting.start import modes_apart, start_in
@@ -29,8 +32,13 @@ from posefit.motion import recorded
 from posefit.motion.built_in import average_skeleton
 from posefit.motion.clips import training_clips, training_motions
 from posefit.motion.motion import Motion
+from posefit.output.picture import ALTERNATIVES, MIN_WEIGHT
 from posefit.progress import QUIET
 from posefit.silhouette.corruption import corrupted
+from posefit.sweep.cell import ALL_AROUND, cell_scene
+from posefit.sweep.check import cell_of
+from posefit.uncertainty.calibration import MAIN_LEVEL
+from posefit.uncertainty.modes import other_modes
 from posefit_exemplars.lookup import Lookup
 
 SIZE, FOCAL = (320, 240), 260.0
@@ -51,10 +59,14 @@ class Image:
     pose: Array
     mask: Array
 
+    def errors(self, joints: Array) -> Array:
+        """Return the distances (27,) of joints (27, 3), metres, roots at one point."""
+        truth = self.body.skeleton.joints(self.pose[None])[0]
+        return np.asarray(np.linalg.norm((joints - joints[0]) - (truth - truth[0]), axis=1))
+
     def error_mm(self, joints: Array) -> float:
         """Return the mean distance of joints (27, 3), roots at one point."""
-        truth = self.body.skeleton.joints(self.pose[None])[0]
-        return float(1000.0 * np.linalg.norm((joints - joints[0]) - (truth - truth[0]), axis=1).mean())
+        return float(1000.0 * self.errors(joints).mean())
 
     def turned_degrees(self, yaw: float) -> float:
         """Return how far a yaw is off."""
@@ -179,15 +191,25 @@ def evaluations(each: int) -> None:
 @click.option("--method", "methods", multiple=True, default=METHODS)
 @click.option("--budget", type=int)
 @click.option("--blind", is_flag=True)
-def single_images(each: int, methods: tuple[str, ...], budget: int | None, blind: bool) -> None:
+@click.option("--learn", multiple=True, help="Groups of which priors learn others' clips; else the built-in walks.")
+@click.option("--group", "groups", multiple=True, default=tuple(GROUPS), type=click.Choice(tuple(GROUPS)))
+def single_images(
+    each: int,
+    methods: tuple[str, ...],
+    budget: int | None,
+    blind: bool,
+    learn: tuple[str, ...],
+    groups: tuple[str, ...],
+) -> None:
     """Print the errors of single images, by group and method."""
-    print("| group | method | images | mean mm | beyond 150 mm, % | facing wrong, % | CPU seconds |")
-    for group in GROUPS:
+    heads = "mean mm | beyond 150 mm, % | facing wrong, %"
+    print(f"| group | method | images | {heads} | with other poses: {heads} | in 80 % intervals | CPU s |")
+    for group in groups:
         for method in methods:
             rows, names = [], []
             for image in images((group,), each):
                 settings = {"tracker.start": "blind"} if blind and "@" in method else {}
-                library = {"train": [image.clip.library]} if "@" not in method else {}
+                others = [clip.name for name in learn for clip in GROUPS[name] if clip.subject != image.clip.subject]
                 fit = posefit.fit(
                     image.mask,
                     method=method,
@@ -198,14 +220,57 @@ def single_images(each: int, methods: tuple[str, ...], budget: int | None, blind
                     evaluations=budget,
                     settings=settings,
                     progress=QUIET,
-                    **library,
+                    train=others if "@" in method else [image.clip.library],
                 )
-                off, turned = image.error_mm(fit.joints), image.turned_degrees(fit.pose[0])
-                cpu = fit.summary["cpu_seconds_per_frame"]
-                rows.append((off, 100.0 * (off > LOST_MM), 100.0 * (turned > WRONG_DEGREES), cpu))
+                skeleton, (radii,) = fit.track.motion.skeleton, fit.track.content.intervals["joint_radii"]
+                shown = other_modes(skeleton, fit.frame.modes, fit.pose, MIN_WEIGHT)[:ALTERNATIVES]
+                poses = np.array([fit.pose, *(mode.pose for mode in shown)])
+                off = np.array([image.error_mm(joints) for joints in skeleton.joints(poses)])
+                turned = np.array([image.turned_degrees(pose[0]) for pose in poses])
+                rows.append(
+                    [
+                        *(off[0], 100.0 * (off[0] > LOST_MM), 100.0 * (turned[0] > WRONG_DEGREES)),
+                        *(off.min(), 100.0 * (off.min() > LOST_MM), 100.0 * (turned.min() > WRONG_DEGREES)),
+                        100.0 * (image.errors(fit.joints) <= radii[MAIN_LEVEL]).mean(),
+                        fit.summary["cpu_seconds_per_frame"],
+                    ]
+                )
                 names.append(image.clip.name)
             columns = [interval(list(column), names) for column in zip(*rows, strict=True)]
             print(f"| {group} | {method} | {len(names)} | {' | '.join(columns)} |", flush=True)
+
+
+@main.command()
+@click.option("--group", "groups", multiple=True, default=tuple(GROUPS), type=click.Choice(tuple(GROUPS)))
+@click.option("--view", "views", multiple=True, type=float, default=[view for (view,) in SIDES], help="Degrees.")
+@click.option("--method", default="exemplars")
+@click.option("--evaluations", "budget", default=EVALUATIONS, help="Of a frame.")
+@click.option("--frames", default=20, help="Of a clip, at most.")
+@click.option("--known", is_flag=True, help="The first yaw is known to 25 degrees, and the translation.")
+@click.option("--seeds", default=1)
+def tracks(
+    groups: tuple[str, ...],
+    views: tuple[float, ...],
+    method: str,
+    budget: int,
+    frames: int,
+    known: bool,
+    seeds: int,
+) -> None:
+    """Print how far the tracks of each group are off, and how many go wrong."""
+    unknown = {} if known else {"translation": "aligned", "yaw_off_degrees": ALL_AROUND}
+    print("| group | tracks | mean mm | median mm | lost frames, % | go wrong |")
+    for group in groups:
+        rows, names = [], []
+        for clip, view, seed in product(GROUPS[group], views, range(seeds)):
+            cell = cell_of(cell_fields(clip, (view,), frames, method=method, evaluations=budget, seed=seed, **unknown))
+            error = track_of(cell, cell_scene(cell)).table["mpjpe_mm"]
+            rows.append((error.mean(), 100.0 * (error > LOST_MM).mean()))
+            names.append(clip.name)
+        errors, lost = map(list, zip(*rows, strict=True))
+        wrong = sum(error > LOST_MM for error in errors)
+        columns = f"{interval(errors, names)} | {np.median(errors):.3g} | {interval(lost, names)}"
+        print(f"| {group} | {len(rows)} | {columns} | {wrong} |", flush=True)
 
 
 if __name__ == "__main__":

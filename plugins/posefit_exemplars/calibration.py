@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 
@@ -80,14 +79,13 @@ def recalibrated(posterior: Posterior, pose: Array, cost: float, frame_costs: Fr
 
 def reported(estimate: Estimate) -> Frame:
     """Return the frame of an estimate: its cost, its posterior, and what shows whether it is lost or exchanged."""
+    assert estimate.paths is not None
     pose, place, frame_costs = estimate.pose, estimate.place, estimate.frame_costs
     cost, areas = frame_costs.cost_and_areas(pose, place)
-    posterior, evaluations = None, int(np.ceil(estimate.evaluations)) + 1
-    details: dict[str, Any] = {"usable": frame_costs.usable}
-    if estimate.paths is not None:
-        details["sides"] = frame_costs.side_odds(pose, place)
-        details["mirror_costs"] = frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
-        evaluations += len(details["mirror_costs"])
-        posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, frame_costs)
+    mirror_costs = frame_costs.mirror_costs(pose, place) if frame_costs.usable else np.empty(0)
+    sides = frame_costs.side_odds(pose, place)
+    details = {"usable": frame_costs.usable, "sides": sides, "mirror_costs": mirror_costs}
+    posterior = recalibrated(estimate.paths.about(pose, place), pose, cost, frame_costs)
+    evaluations = int(np.ceil(estimate.evaluations)) + 1 + len(mirror_costs)
     trace = np.array([[evaluations, cost]])
     return Frame(pose, place, cost, areas, evaluations, trace, posterior, details=details)

@@ -219,10 +219,13 @@ class Exemplars:
 _latest: tuple[bytes, Exemplars] | None = None
 
 
-def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) -> Exemplars:
-    """Return the states of motions, by the joints of a person of average lengths; the latest are cached."""
+def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton) -> Exemplars:
+    """Return the states of motions and their mirror images, by the joints of a person of average lengths.
+
+    The latest are cached.
+    """
     global _latest
-    digest = hashlib.blake2b(repr((mirrored, [(motion.name, motion.fps, len(motion)) for motion in motions])).encode())
+    digest = hashlib.blake2b(repr([(motion.name, motion.fps, len(motion)) for motion in motions]).encode())
     digest.update(skeleton.axes.tobytes())
     for motion in motions:
         for array in (motion.skeleton.axes, motion.poses, motion.translations):
@@ -231,14 +234,14 @@ def exemplars_of(motions: Sequence[Motion], skeleton: Skeleton, mirrored: bool) 
     latest = _latest  # read once: another thread may replace it at any time
     if latest is None or latest[0] != key:
         average = replace(skeleton, offsets=average_skeleton().offsets)
-        latest = _latest = key, Exemplars.of(motions, average, mirrored=mirrored)
+        latest = _latest = key, Exemplars.of(motions, average, mirrored=True)
     return latest[1]
 
 
-def exemplars_for(task: Task, mirrored: bool) -> Exemplars:
+def exemplars_for(task: Task) -> Exemplars:
     """Return the states that a task may learn from; one set of them serves both directions."""
     training = [motion.reversed() for motion in task.training] if task.backwards else task.training
-    return exemplars_of(training, task.body.skeleton, mirrored)
+    return exemplars_of(training, task.body.skeleton)
 
 
 def mirror_image(motion: Motion) -> Motion:

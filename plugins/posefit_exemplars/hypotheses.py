@@ -26,7 +26,7 @@ from posefit.fitting.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit.fitting.landmarks import exchanged_given, exchanged_next, landmark_costs, usually_exchanged
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import JOINTS, LIMBS, root_centred
+from posefit.geometry.skeleton import ANGLES, JOINTS, LIMBS, root_centred
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
 from posefit_exemplars.exemplars import Exemplars, Rows
@@ -73,15 +73,20 @@ class Hypotheses(NamedTuple):
     rates: Array  # (n, 27, 3) metres
 
     @classmethod
-    def of(cls, task: Task, poses: Array, places: Array, parents: Rows, before: "Hypotheses | None") -> Self:
+    def none(cls) -> Self:
+        """Return the hypotheses of no frame."""
+        poses, places, joints = np.empty((0, ANGLES)), np.empty((0, 3)), np.empty((0, len(JOINTS), 3))
+        return cls(poses, places, joints, poses, places, joints)
+
+    @classmethod
+    def of(cls, task: Task, poses: Array, places: Array, parents: Rows, before: "Hypotheses") -> Self:
         """Return hypotheses with their motion since the frame `before`, in which their `parents` (n,) are, or -1."""
         joints = root_centred(task.body.skeleton.joints(poses))
         turns, shifts, rates = np.zeros_like(poses), np.zeros_like(places), np.zeros_like(joints)
-        if before is not None:
-            continued, rows = parents >= 0, parents[parents >= 0]
-            turns[continued] = wrapped(poses[continued] - before.poses[rows])
-            shifts[continued] = places[continued] - before.places[rows]
-            rates[continued] = joints[continued] - before.joints[rows]
+        continued, rows = parents >= 0, parents[parents >= 0]
+        turns[continued] = wrapped(poses[continued] - before.poses[rows])
+        shifts[continued] = places[continued] - before.places[rows]
+        rates[continued] = joints[continued] - before.joints[rows]
         return cls(poses, places, joints, turns, shifts, rates)
 
     def continued(self, rows: Rows) -> tuple[Array, Array]:
@@ -156,52 +161,52 @@ class HypothesisFilter:
 
     def follow(self, estimates: Iterable[Estimate], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield each estimate with the pose of the likeliest sequence, up to `delay` frames later."""
-        rows = paths = None
+        rows = None
+        self._costs.clear()  # of an earlier track
         for window in markov.windows(self._frames(estimates), self.delay):
             states = [frame.states for frame in window]
             estimate, hypotheses, *_ = window[0]
             row, weights, poses = markov.viterbi_state(states), markov.state_weights(states), hypotheses.poses
             squares = ((hypotheses.joints - hypotheses.joints[row]) ** 2).sum(axis=2).mean(axis=1) / SAME_DISTANCE**2
             pose, place = markov.mean_near(row, weights, squares, poses, hypotheses.places)
-            if self._sampling.paths:
-                rows = markov.sample_states(states, rows, self._sampling, rng)
-                skeleton = self._task.body.skeleton
-                paths = markov.SampledPaths.of(skeleton, poses[rows], hypotheses.places[rows], pose)
+            rows = markov.sample_states(states, rows, self._sampling, rng)
+            paths = markov.SampledPaths.of(self._task.body.skeleton, poses[rows], hypotheses.places[rows], pose)
             yield replace(estimate, pose=pose, place=place, paths=paths)
 
     def _frames(self, estimates: Iterable[Estimate]) -> Iterator[_FittedFrame]:
         """Yield each estimate with the evaluations of its hypotheses, and these."""
-        latest: _FittedFrame | None = None
+        before: _FittedFrame | None = None
+        latest, rows = Hypotheses.none(), np.empty(0, dtype=np.int64)
         for estimate in estimates:
-            hypotheses, noise, evaluations = self._fitted(estimate, latest)
-            joined = self._joined(estimate.frame_costs, hypotheses, latest, noise)
+            if before is not None:
+                latest, rows = before.hypotheses, self._continuing(before, estimate.frame_costs.camera_count)
+            hypotheses, noise, evaluations = self._fitted(estimate, latest, rows)
+            joined = self._joined(estimate.frame_costs, hypotheses, before, noise)
             estimate = replace(estimate, evaluations=estimate.evaluations + evaluations)
-            latest = _FittedFrame(estimate, hypotheses, *joined)
-            yield latest
+            before = _FittedFrame(estimate, hypotheses, *joined)
+            yield before
 
-    def _fitted(self, estimate: Estimate, before: _FittedFrame | None) -> tuple[Hypotheses, float, float]:
-        """Return the hypotheses of a frame, how imprecise its masks are, and the evaluations of the fits."""
-        frame_costs, task, usable = estimate.frame_costs, self._task, estimate.frame_costs.usable
-        latest, rows = None, np.empty(0, dtype=np.int64)
-        if before is not None:
-            latest, rows = before.hypotheses, self._continuing(before, frame_costs.camera_count)
-        fresh = self._fresh(estimate, latest, rows)
+    def _fitted(self, estimate: Estimate, latest: Hypotheses, rows: Rows) -> tuple[Hypotheses, float, float]:
+        """Return the hypotheses of a frame: fresh ones, and those that continue some `rows` of the `latest`.
+
+        With them come how imprecise its masks are, and the evaluations of the fits.
+        """
+        frame_costs, evaluations = estimate.frame_costs, 0.0
+        fresh, continued = self._fresh(estimate, latest, rows), (latest.poses[rows], latest.places[rows])
         noise = self._noise(frame_costs, *fresh)
-        continued = (fresh[0][:0], fresh[1][:0]) if latest is None else (latest.poses[rows], latest.places[rows])
-        if usable:
+        if frame_costs.usable:
+            evaluations = len(fresh[0]) * FRESH_EVALUATIONS + len(rows) * CONTINUED_EVALUATIONS
             contours = frame_costs.contours(estimate.place)
             weights = precisions(START_TURN / noise, ALIGNED_SHIFT if frame_costs.root is None else KNOWN_SHIFT)
-            fresh = fitted(task.body, contours, fresh, fresh[0], weights, FRESH_REACHES)
-            if latest is not None:
+            fresh = fitted(self._task.body, contours, fresh, fresh[0], weights, FRESH_REACHES)
+            if len(rows):
                 moved, shifted = latest.continued(rows)
                 shifted = _cheaper_places(frame_costs, moved, shifted)
                 means, pulls = self._pulled(moved, weights, noise)
-                continued = fitted(task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
+                continued = fitted(self._task.body, contours, (moved, shifted), means, pulls, CONTINUED_REACHES)
         poses, places = (np.concatenate(arrays) for arrays in zip(fresh, continued, strict=True))
         parents = np.concatenate([np.full(len(fresh[0]), -1), rows])
-        hypotheses = Hypotheses.of(task, poses, frame_costs.at_root(places), parents, latest)
-        evaluations = len(fresh[0]) * FRESH_EVALUATIONS + len(rows) * CONTINUED_EVALUATIONS
-        return hypotheses, noise, evaluations if usable else 0.0
+        return Hypotheses.of(self._task, poses, frame_costs.at_root(places), parents, latest), noise, evaluations
 
     def _joined(
         self, frame_costs: FrameCosts, hypotheses: Hypotheses, before: _FittedFrame | None, noise: float
@@ -221,16 +226,14 @@ class HypothesisFilter:
             costs += silhouette_costs / (noise * self._temperature)
             costs += self._library_cost * np.log1p(0.5 * squares / LIBRARY_DISTANCE**2)
         if before is None:
-            states = markov.frame_states(costs)
-        else:
-            latest = before.hypotheses
-            steps = step_costs(self._spread, latest, hypotheses) + landmarks - landmarks.min(axis=0)
-            if frame_costs.root is None:
-                expected = latest.places + latest.shifts
-                steps += root_deviation_costs(places, expected[:, None], frame_costs.camera_position)
-            states = markov.frame_states(costs, before.states, steps)
-            exchanged = exchanged[states.parents]
-        return states, exchanged_given(likelihoods, exchanged)
+            return markov.frame_states(costs), exchanged_given(likelihoods, exchanged)
+        latest = before.hypotheses
+        steps = step_costs(self._spread, latest, hypotheses) + landmarks - landmarks.min(axis=0)
+        if frame_costs.root is None:
+            expected = latest.places + latest.shifts
+            steps += root_deviation_costs(places, expected[:, None], frame_costs.camera_position)
+        states = markov.frame_states(costs, before.states, steps)
+        return states, exchanged_given(likelihoods, exchanged[states.parents])
 
     def _noise(self, frame_costs: FrameCosts, poses: Array, places: Array) -> float:
         """Return how many times less precise one camera's masks are than clean ones, by the best frames so far."""
@@ -240,17 +243,15 @@ class HypothesisFilter:
             self._costs.append(FITTED_COST_SHARE * float(frame_costs.full(poses, places).min()))
         return max(float(np.quantile(self._costs or [0.0], BEST_SHARE)) / CLEAN_COST, 1.0)
 
-    def _fresh(self, estimate: Estimate, latest: Hypotheses | None, rows: Rows) -> tuple[Array, Array]:
+    def _fresh(self, estimate: Estimate, latest: Hypotheses, rows: Rows) -> tuple[Array, Array]:
         """Return poses (n, 66) and places (n, 3): of the path, of diverse states, and reflections of the likeliest."""
-        poses, places = estimate.pose[None], estimate.place[None]
-        if estimate.alternatives is not None:
-            other_poses, other_places = estimate.alternatives
-            poses, places = np.concatenate([poses, other_poses]), np.concatenate([places, other_places])
-        frame_costs = estimate.frame_costs
+        frame_costs, (other_poses, other_places) = estimate.frame_costs, estimate.alternatives
+        poses = np.concatenate([estimate.pose[None], other_poses])
+        places = np.concatenate([estimate.place[None], other_places])
         count = self.counts(frame_costs.camera_count).fresh - len(poses)  # of reflections
         if not frame_costs.usable or count <= 0:
             return poses, places
-        likeliest = (poses, places) if latest is None else latest.continued(rows)
+        likeliest = latest.continued(rows) if len(rows) else (poses, places)
         reflectable, place = (array[: -(-count // frame_costs.camera_count)] for array in likeliest)
         reflected = frame_costs.reflected(reflectable, estimate.place)[:count]
         return np.concatenate([poses, reflected]), np.concatenate([places, np.resize(place, (len(reflected), 3))])

@@ -21,6 +21,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
 from posefit.silhouette.cost import masks_of
+from posefit.silhouette.drawn import uncounted
 from posefit.silhouette.mask import Mask, Silhouette, box_of, without_small_pieces
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.exemplars import Exemplars, Rows, exemplars_for
@@ -129,16 +130,10 @@ def straightened(camera: Camera, silhouette: Silhouette) -> tuple[Mask, float, f
 
 
 class Lookup:
-    """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones.
+    """Poses of the motions learned from, and their mirror images, whose silhouettes are like the observed ones."""
 
-    `exemplars` are those of the task, where a tracker has them already.
-
-    Settings:
-        mirrored: whether the mirror images of all clips are learned from as well.
-    """
-
-    def __init__(self, task: Task, exemplars: Exemplars | None = None, *, mirrored: bool = True) -> None:
-        self.task, self.exemplars = task, exemplars_for(task, mirrored) if exemplars is None else exemplars
+    def __init__(self, task: Task) -> None:
+        self.task, self.exemplars = task, exemplars_for(task)
 
     def nearest(
         self, observation: Observation, count: int, yaw: float | None = None
@@ -152,7 +147,8 @@ class Lookup:
         for camera, silhouette in zip(self.task.cameras, observation.silhouettes, strict=True):
             if np.isfinite(silhouette.extent).all():
                 picture, azimuth, elevation = straightened(camera, silhouette)
-                table = _table(self.exemplars, float(np.round(elevation / ELEVATION) * ELEVATION))
+                with uncounted():  # a table is learned, once a process
+                    table = _table(self.exemplars, float(np.round(elevation / ELEVATION) * ELEVATION))
                 views.append((table, azimuth))  # whose yaws count from the camera
                 turn = round((azimuth - views[0][1]) / YAW_STEP)
                 total = total + np.roll(table.distances(picture), turn, axis=1)

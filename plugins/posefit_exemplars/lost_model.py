@@ -141,13 +141,11 @@ def stored_classifier() -> FailureClassifier:
 
 
 def with_failure_probabilities(frames: Iterable[Frame], task: Task, classifier: FailureClassifier) -> Iterator[Frame]:
-    """Yield frames that have sampled tracks with the probabilities that they are lost, or have sides exchanged."""
+    """Yield frames with the probabilities that they are lost, or have sides exchanged."""
     means, side_sums, decay = EvidenceMeans(task.fps), np.zeros(3), math.exp(-1.0 / (LANDMARK_SECONDS * task.fps))
     places: deque[Array] = deque(maxlen=max(round(MOTION_SECONDS * task.fps), 1) + 1)
     for frame in frames:
-        if frame.posterior is None:
-            yield frame
-            continue
+        assert frame.posterior is not None
         places.append(frame.translation)
         evidence = evidence_of(task.body.skeleton, frame, task.cameras)
         evidence |= root_motion(places, float(frame.pose[0]), task.fps, backwards=task.backwards)

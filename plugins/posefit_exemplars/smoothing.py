@@ -22,8 +22,8 @@ class Estimate:
     place: Array  # (3,)
     frame_costs: FrameCosts = field(repr=False)
     evaluations: float
+    alternatives: tuple[Array, Array] = field(repr=False)  # poses (n, 66) and places of diverse other states
     paths: SampledPaths | None = None
-    alternatives: tuple[Array, Array] | None = field(default=None, repr=False)  # poses (n, 66) and places: other states
 
 
 def smoothed(estimates: Iterable[Estimate], spread: float, ahead: int) -> Iterator[Estimate]:

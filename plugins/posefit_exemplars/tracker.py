@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,16 +17,17 @@ from posefit_exemplars import beam as beams
 from posefit_exemplars import hypotheses, markov
 from posefit_exemplars.beam import JUMP_COST, Beam
 from posefit_exemplars.calibration import reported
-from posefit_exemplars.exemplars import Codes, Rows, exemplars_for
+from posefit_exemplars.exemplars import Codes, Rows
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.lookup import YAW_STEP, Lookup
 from posefit_exemplars.lost_model import stored_classifier, with_failure_probabilities
 from posefit_exemplars.smoothing import FILTER_REACH, Estimate, smoothed
 
-MIN_EVALUATIONS = 300  # of a frame, so that each stage has some
 BEAM_STATES = 400
 FULL_SHARE = 0.6  # of the beam's evaluations: for full-size costs of states
 FIT_SHARE = 0.8  # of the budget: for fitting hypotheses
+MIN_EVALUATIONS = math.ceil(hypotheses.MIN_EVALUATIONS / FIT_SHARE)  # of a frame
+MIN_BEAM_EVALUATIONS = 60.0  # of a frame, where several cameras leave less open
 CONTINUED_SHARE = 0.25  # of the small pictures: for where clips continue; the rest is for a search everywhere
 SEARCHES_PER_SECOND = 10.0  # everywhere
 SEARCHED_GROUPS = 200  # those that fit best anywhere, whose poses are evaluated
@@ -47,21 +48,6 @@ class _BeamFrame(NamedTuple):
     evaluations: float
 
 
-class _Delays(NamedTuple):
-    """How many later frames each stage uses; together they are the lag."""
-
-    path: int
-    fits: int
-    smoothing: int
-
-    @classmethod
-    def of(cls, lag: int, smoothing: float, fitted: bool) -> Self:
-        """Return the delays of a smoothing over so many frames; what it leaves of the lag is halved with the fits."""
-        ahead = min(math.ceil(FILTER_REACH * smoothing), lag)
-        fits = (lag - ahead) // 2 if fitted else 0
-        return cls(lag - ahead - fits, fits, ahead)
-
-
 class ExemplarTracker:
     """The likeliest path through recorded clips (Toyama and Blake, 2001).
 
@@ -69,10 +55,8 @@ class ExemplarTracker:
         spread: distance of joints from where a clip continues in a thirtieth of a second, metres, rms; above 0.
         temperature: divides silhouette costs; above 0. Errors of successive frames are correlated, so more than 1.
         lag: later frames that are used before a pose is reported, 0 or more.
-        mirrored: whether the mirror images of all clips are learned from as well.
-        fitted: whether several hypotheses of each frame are fitted to its contours; else the path alone is followed.
         smoothing: standard deviation of the smoothing of angles over time, in thirtieths of a second, 0 or more.
-        samples: tracks drawn from the posterior, 0 or more; with 0 frames have no probability of being lost.
+        samples: tracks drawn from the posterior, 1 or more.
     """
 
     def __init__(
@@ -82,8 +66,6 @@ class ExemplarTracker:
         spread: float = 0.03,
         temperature: float = 2.0,
         lag: int = 20,
-        mirrored: bool = True,
-        fitted: bool = True,
         smoothing: float = 1.0,
         samples: int = 24,
     ) -> None:
@@ -91,44 +73,34 @@ class ExemplarTracker:
         positive("temperature", temperature)
         at_least("smoothing", smoothing, 0)
         at_least("lag", lag, 0)
-        at_least("samples", samples, 0)
+        at_least("samples", samples, 1)
         if task.evaluations < MIN_EVALUATIONS:
             raise InputError(f"evaluations must be at least {MIN_EVALUATIONS} for exemplars, got {task.evaluations}")
-        self.task, self.exemplars = task, exemplars_for(task, mirrored)
-        self.step, self.lookup = beams.Step.of(task, spread), Lookup(task, self.exemplars)
+        self.task, self.step, self.lookup = task, beams.Step.of(task, spread), Lookup(task)
+        self.exemplars = self.lookup.exemplars
         self.temperature = temperature / (30.0 / task.fps)
         self.smoothing = smoothing * task.fps / 30.0  # frames
-        self.sampling = markov.Sampling(samples, temperature / POSTERIOR_TEMPERATURE)
-        self.hypotheses: hypotheses.HypothesisFilter | None = None
-        fit_evaluations = FIT_SHARE * task.evaluations if fitted else 0.0
-        if fit_evaluations < hypotheses.MIN_EVALUATIONS:
-            fit_evaluations = 0.0
+        fit_evaluations = FIT_SHARE * task.evaluations
         self.evaluations = task.evaluations - fit_evaluations  # of the beam
-        self.delays = _Delays.of(lag, self.smoothing, fit_evaluations > 0.0)
-        if fit_evaluations:
-            known = task, self.exemplars, self.step, self.temperature
-            self.hypotheses = hypotheses.HypothesisFilter(*known, fit_evaluations, self.delays.fits, self.sampling)
+        # later frames that the smoothing uses; the hypotheses get half of the others, and the path the rest
+        self.ahead = min(math.ceil(FILTER_REACH * self.smoothing), lag)
+        fits_ahead = (lag - self.ahead) // 2
+        self.path_ahead = lag - self.ahead - fits_ahead
+        sampling = markov.Sampling(samples, temperature / POSTERIOR_TEMPERATURE)
+        known = task, self.exemplars, self.step, self.temperature
+        self.hypotheses = hypotheses.HypothesisFilter(*known, fit_evaluations, fits_ahead, sampling)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
         """Yield a `Frame` for each observation, `lag` observations later."""
-        estimates = self._path(observations, rng)
-        if self.hypotheses is not None:
-            estimates = self.hypotheses.follow(estimates, rng.spawn(1)[0])
-        frames = map(reported, smoothed(estimates, self.smoothing, self.delays.smoothing))
+        estimates = self.hypotheses.follow(self._path(observations, rng), rng.spawn(1)[0])
+        frames = map(reported, smoothed(estimates, self.smoothing, self.ahead))
         yield from with_failure_probabilities(frames, self.task, stored_classifier())
 
     def _path(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Estimate]:
         """Yield the estimate of each frame on the likeliest path of the beam."""
-        rows, sampler = None, rng.spawn(1)[0] if self.hypotheses is None else None
-        for window in markov.windows(self._beams(observations, rng), self.delays.path):
-            frame, states = window[0], [frame.states for frame in window]
-            estimate = self._estimated(frame, markov.viterbi_state(states), markov.state_weights(states))
-            if sampler is not None and self.sampling.paths:
-                rows = markov.sample_states(states, rows, self.sampling, sampler)
-                poses, places = self._poses(frame.beam)[rows], frame.beam.places[rows]
-                paths = markov.SampledPaths.of(self.task.body.skeleton, poses, places, estimate.pose)
-                estimate = replace(estimate, paths=paths)
-            yield estimate
+        for window in markov.windows(self._beams(observations, rng), self.path_ahead):
+            states = [frame.states for frame in window]
+            yield self._estimated(window[0], markov.viterbi_state(states), markov.state_weights(states))
 
     def _beams(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[_BeamFrame]:
         interval = max(round(self.task.fps / SEARCHES_PER_SECOND), 1)
@@ -171,8 +143,8 @@ class ExemplarTracker:
         # the reported pose, its mirror images, and the fraction of a small picture's share
         reserve = 3 + frame_costs.camera_count
         evaluations = self.evaluations
-        if not is_first and self.hypotheses is not None:  # several cameras leave less open
-            evaluations = max(evaluations / frame_costs.camera_count, (1.0 - FIT_SHARE) * MIN_EVALUATIONS)
+        if not is_first:  # several cameras leave less open
+            evaluations = max(evaluations / frame_costs.camera_count, MIN_BEAM_EVALUATIONS)
         # no more states than have a cost in a small picture
         full = int(min(FULL_SHARE * evaluations, (evaluations - reserve) / (1.0 + frame_costs.small_share)))
         return full, int((evaluations - full - reserve) / frame_costs.small_share)
@@ -248,17 +220,16 @@ class ExemplarTracker:
 
     def _estimated(self, frame: _BeamFrame, row: int, weights: Array) -> Estimate:
         """Return the estimate of a frame: the weighted mean of the states like that of the path."""
-        beam, frame_costs, alternatives = frame.beam, frame.frame_costs, None
-        if self.hypotheses is not None:
-            count = self.hypotheses.counts(frame_costs.camera_count).diverse
-            diverse = beam.rows(beams.diverse_best(self.exemplars, beam, beam.totals, count))
-            alternatives = self._poses(diverse), diverse.places
+        beam, frame_costs = frame.beam, frame.frame_costs
+        count = self.hypotheses.counts(frame_costs.camera_count).diverse
+        diverse = beam.rows(beams.diverse_best(self.exemplars, beam, beam.totals, count))
         codes = self.exemplars.codes[beam.states]
         squares = state_distances(codes, codes[row], beam.yaws - beam.yaws[row])
         pose, place = markov.mean_near(row, weights, squares, self._poses(beam), beam.places)
         if frame_costs.usable:
             place = frame_costs.aligned(pose[None], place[None])[0]
-        return Estimate(pose, place, frame_costs, frame.evaluations, alternatives=alternatives)
+        alternatives = self._poses(diverse), diverse.places
+        return Estimate(pose, place, frame_costs, frame.evaluations, alternatives)
 
 
 def state_distances(codes: Codes, code: Codes, turns: Array) -> Array:

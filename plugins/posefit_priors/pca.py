@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from posefit.arrays import Array, jit, writeable
 from posefit.errors import InputError
 from posefit.fitting.check import at_least
-from posefit.fitting.kernels import add_components
+from posefit.fitting.prior import Components
 from posefit.geometry.skeleton import Skeleton
 
 COMPONENTS = 6  # m, section 2.1
@@ -21,7 +21,7 @@ CLUSTERING_ROUNDS = 100  # of Lloyd's algorithm
 DECIMALS = 7  # of what is learned, in radians and shares
 
 
-class PCA:
+class PCA(Components):
     """Principal components of joint angles with constraint 1, a range, and constraint 2, nearness to a cluster.
 
     Settings:
@@ -30,10 +30,6 @@ class PCA:
         quantile: chi is this quantile of the training distances, above 0 and at most 1. Interpretation S5.
     """
 
-    mean: Array  # (63,)
-    components: Array  # (m, 63)
-    low: Array  # (m,)
-    high: Array  # (m,)
     centres: Array  # (K, m) of clusters
     reach: Array  # () of a cluster: chi
     explained: Array  # (m,) share of the variance along each component
@@ -56,16 +52,6 @@ class PCA:
         self.low, self.high = latents.min(axis=0) - unit, latents.max(axis=0) + unit  # SAPSO 2.2 constraint 1
         self.centres, self.reach = clusters_of(latents, self._clusters, self._quantile)
         return self
-
-    def transform(self, angles: Array) -> Array:
-        """Return the latents (n, m) of joint angles (n, 63): Projection. SAPSO 2.1."""
-        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)  # SAPSO 2.1.3 projection
-
-    def inverse_transform(self, latents: Array) -> Array:
-        """Return the joint angles (n, 63) of latents (n, m): Recovery. SAPSO 2.1."""
-        angles = np.repeat(self.mean[None], len(latents), axis=0)
-        add_components(writeable(latents), self.components, angles)  # SAPSO 2.1.3 recovery
-        return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:
         """Return which latents (n, m) are nearer than chi to a cluster's centre (n,). SAPSO 2.2 constraint 2."""

@@ -57,7 +57,9 @@ def doctor(context: click.Context, verbose: bool) -> None:
 
 @plugins.command()
 @click.argument("name")
-@click.option("--kind", default="optimiser", show_default=True, help="optimiser, prior, tracker, segmenter or command.")
+@click.option(
+    "--kind", default="optimiser", show_default=True, help="optimiser, prior, tracker, start, segmenter or command."
+)
 @click.option("--out", metavar="DIR", help="The new folder; by default posefit-NAME.")
 @click.pass_context
 def new(context: click.Context, /, name: str, kind: Any, out: str | None) -> None:
@@ -80,14 +82,14 @@ def check(
 ) -> None:
     """Check that an installed plugin keeps the rules of its kind; exit status 1 where it breaks one.
 
-    KIND is optimiser, prior, tracker or segmenter.
+    KIND is optimiser, prior, tracker, start or segmenter.
     The rules are checked in a process of their own; what the plugin prints goes to stderr. Once two rules fail for the
     same cause, the others are not checked.
     """
     from posefit.fitting.check import one_of
-    from posefit.registry import AUTHORED
+    from posefit.registry import KINDS
 
-    one_of("kind", kind, AUTHORED)
+    one_of("kind", kind, KINDS)
     with results_alone():
         from posefit.testing.process import check_in_process
 

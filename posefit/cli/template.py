@@ -13,7 +13,7 @@ from posefit.files import new_folder
 from posefit.fitting.check import one_of
 from posefit.hooks import PROJECT
 from posefit.reading import quoted
-from posefit.registry import AUTHORED, COMMAND, Registrable, plugins_of, registry
+from posefit.registry import COMMAND, KINDS, Registrable, plugins_of, registry
 
 TAKEN = {"Frame"}  # names that a template's module has already
 
@@ -24,7 +24,7 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
     `own` are the names of posefit's own commands, which a new one cannot have. Raises ValueError where the name cannot
     be a plugin's, or the folder is there already.
     """
-    one_of("kind", kind, (*AUTHORED, COMMAND))
+    one_of("kind", kind, (*KINDS, COMMAND))
     if not re.fullmatch(r"[a-z][a-z0-9]*([-_][a-z0-9]+)*", name):
         raise InputError(f"name must be small letters, digits, - and _, and begin with a letter, got {quoted(name)}")
     if name in (known := _taken(kind, commands)):
@@ -38,9 +38,11 @@ def write_plugin(name: str, kind: Registrable, folder: str | Path | None = None,
     class_name = "".join(part.capitalize() for part in module.split("_"))
     if class_name in TAKEN or iskeyword(class_name):
         class_name += kind.capitalize()
-    used = {COMMAND: name, "segmenter": f"extract VIDEO --out masks --extraction {name}"}.get(
-        kind, f"track walk --method {'@' if kind == 'prior' else ''}{name}"
-    )
+    used = {
+        COMMAND: name,
+        "segmenter": f"extract VIDEO --out masks --extraction {name}",
+        "start": f"fit MASK.png --height 1.75 --set tracker.start={name}",
+    }.get(kind, f"track walk --method {'@' if kind == 'prior' else ''}{name}")
     words = {
         "name": name,
         "kind": kind,

@@ -72,8 +72,12 @@ def evaluated(
     training pose of least cost in each frame. `prior_floor` is the truth's own projection into the prior, which is no
     floor where a prior is not linear. `clock` (2,) is how many seconds and CPU seconds the track took.
     """
-    held = np.array([not observation.usable for observation in scene.observations])
-    cost, iou = np.array([frame.cost for frame in frames]), _iou(scene, frames)
+    cost, held = np.array([frame.cost for frame in frames]), np.zeros(len(frames), dtype=bool)
+    iou = np.empty(len(frames))  # the mean over the cameras that saw something
+    for k, observation in enumerate(scene.observations):  # once: those of a known motion are rendered
+        known = [silhouette.known for silhouette in observation.silhouettes]
+        iou[k] = metrics.iou(frames[k].areas)[known if any(known) else slice(None)].mean()
+        held[k] = not observation.usable
     usable = np.ones(len(frames), dtype=bool) if held.all() else ~held
     errors, error_measures = _errors(scene, frames, prior, training, beta)
     certainty, certainty_measures = _certainty(scene, frames, errors.get("swapped"))
@@ -103,15 +107,6 @@ def evaluated(
         evaluations_per_second=float(evaluations.sum()) / seconds,
     )
     return table, measures
-
-
-def _iou(scene: Scene, frames: Sequence[Frame]) -> Array:
-    """Return the overlaps (T,) of body and mask: the means over the cameras that saw something."""
-    overlaps = []
-    for frame, observation in zip(frames, scene.observations, strict=True):
-        known = [silhouette.known for silhouette in observation.silhouettes]
-        overlaps.append(float(metrics.iou(frame.areas)[known if any(known) else slice(None)].mean()))
-    return np.array(overlaps)
 
 
 def _errors(

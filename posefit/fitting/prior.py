@@ -5,7 +5,7 @@ pose.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, Self
 
 import numpy as np
@@ -55,24 +55,24 @@ class Prior(Latents, Protocol):
         ...
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Components:
     """Latents along given directions: joint angles are a mean plus a sum of components."""
 
     mean: Array  # (63,)
-    components: Array = field(repr=False)  # (m, 63), orthonormal
+    components: Array  # (m, 63), orthonormal
     low: Array  # (m,)
     high: Array  # (m,)
 
     def transform(self, angles: Array) -> Array:
         """Return the latents (n, m) of joint angles (n, 63)."""
-        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)
+        return np.asarray((np.asarray(angles) - self.mean) @ self.components.T)  # SAPSO 2.1.3 projection
 
     def inverse_transform(self, latents: Array) -> Array:
         """Return the joint angles (n, 63) of latents (n, m)."""
         angles = np.tile(self.mean, (len(latents), 1))
         # a matrix product's last bits depend on rows and machine
-        add_components(writeable(latents), writeable(self.components), angles)
+        add_components(writeable(latents), writeable(self.components), angles)  # SAPSO 2.1.3 recovery
         return angles
 
     def feasible(self, latents: Array) -> NDArray[np.bool_]:

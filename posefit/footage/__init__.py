@@ -20,7 +20,7 @@ What happens to a mask, an arrow a file:
 | masks and calibrations of one camera or several | the `Scene`, straightened, in metres, +y up | cameras.py |
 | a known motion | the `Scene` of its rendered masks, on a GPU, or corrupted on purpose | scene.py |
 
-Every image and video frame is decoded once. What a source does not state is guessed in one of these places, and is in
-`Scene.guesses`. From a mask to its cost it goes on through `silhouette/mask.py`, `fitting/tracker.py`,
-`fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
+What is decoded becomes bits at once, and later stages unpack these. What a source does not state is guessed in one of
+these places, and is in `Scene.guesses`. From a mask to its cost it goes on through `silhouette/mask.py`,
+`fitting/tracker.py`, `fitting/problem.py`, `silhouette/cost.py` and `silhouette/kernels.py`.
 """

@@ -38,16 +38,27 @@ def extract(
     with suppress(OSError):  # reported where the folder is made
         target.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(target) as building:
-        masks = segmentation.masks(progress)
-        with VideoWriter(building / "preview.mp4", video.fps, segmentation.size) as preview:
-            for k, image in enumerate(video.frames(segmentation.start, segmentation.stop, segmentation.size)):
+        masks, rows, _, warnings, *_ = segmentation.read(progress)
+        with VideoWriter(building / "preview.mp4", video.fps, masks.size) as preview:
+            for k, image in enumerate(video.frames(segmentation.start, segmentation.stop, masks.size)):
                 preview.write(_painted(image, masks.silhouette(k), bool(masks.usable[k])))
         _write_npz(building / "masks.npz", masks)
         with (building / "quality.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(segmentation.rows[0]))
+            writer = csv.DictWriter(file, list(rows[0]))
             writer.writeheader()
-            writer.writerows(segmentation.rows)
-    return {"video": str(source), "method": how.name, **segmentation.summary, "guesses": [*video.guesses]}
+            writer.writerows(rows)
+    return {
+        "video": str(source),
+        "method": how.name,
+        "frames": len(rows),
+        "usable": int(masks.usable.sum()),
+        "size": list(masks.size),
+        "fps": video.fps,
+        "touching_border": sum(bool(row["touches_border"]) for row in rows),
+        "in_pieces": sum(row["pieces"] > 1 for row in rows),
+        "warnings": warnings,
+        "guesses": [*video.guesses],
+    }
 
 
 def _write_npz(path: Path, masks: PackedMasks) -> None:

@@ -23,7 +23,7 @@ Planes = NDArray[np.uint8]  # (T, bytes): of each frame the bits of its pixels, 
 
 @dataclass(frozen=True, eq=False)
 class PackedMasks:
-    """The masks of one camera. Images and video are decoded once, to make it; later stages unpack its bits."""
+    """The masks of one camera: images and video are decoded to make it, and later stages unpack its bits."""
 
     names: Sequence[str] = field(repr=False)  # (T,) of the frames, for messages
     size: tuple[int, int]  # width and height

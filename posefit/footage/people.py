@@ -192,7 +192,8 @@ class People:
     ) -> tuple[list[Tracklet], str]:
         """Return the parts of the person who is followed, and what there is to say where there are several.
 
-        `name` names a frame, and `scale` is that of a pixel in words. Raises InputError where nobody has the number.
+        `name` names a frame; places in `choice` and in words are `scale` times as large as in masks. Raises InputError
+        where nobody has the number.
         """
         persons = self.persons()
         if not persons:
@@ -200,7 +201,7 @@ class People:
         where = [min(part.first for part in person) for person in persons]
         number = 1 if choice is None else choice
         if not isinstance(number, int):
-            away = [np.hypot(across - number[0], down - number[1]) for _, across, down in where]
+            away = [np.hypot(scale * across - number[0], scale * down - number[1]) for _, across, down in where]
             number = 1 + int(np.argmin(away))
         if not 1 <= number <= len(persons):
             raise InputError(f"person must be 1 to {len(persons)}, as many people as there are, got {number}")

@@ -4,23 +4,20 @@
 |---|---|
 | files to frames | `numbered`: a frame a page; numbers that are missing are frames in which nothing is known |
 | frames to values | `images.read_marks`, `archive.archived` |
-| values to bits | `ValueCounts.classifier`, `_above` |
+| values to bits | `ValueCounts.classifier`, `_pack` |
 
 Values may be 0 and 1, 0 and 255, degrees, an alpha channel or labels. One file does not show which, so the values of
-all files are counted before any pixel is decided. An image is decoded once: its values wait, compressed, in a temporary
-file, which is on the disk where they are many.
+all files are counted before any pixel is decided: an image is decoded once to count, and once to decide.
 """
 
 import re
-import tempfile
-import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import cv2
 import numpy as np
@@ -28,7 +25,7 @@ from numpy.typing import NDArray
 
 from posefit.archive import Stored, archived, mapped
 from posefit.errors import InputError
-from posefit.footage.images import FORMATS, IMAGES, PIXELS, page_count, read_marks
+from posefit.footage.images import FORMATS, IMAGES, PIXELS, Marks, page_count, read_marks
 from posefit.footage.masks import PackedMasks, Planes, Range, empty_planes, span
 from posefit.geometry.skeleton import JOINTS
 from posefit.limits import check_decoded
@@ -36,7 +33,6 @@ from posefit.reading import existing, quoted
 from posefit.silhouette.mask import Mask
 
 NUMBER_DIGITS = 1_000  # of a number in a name that files are sorted by
-SPOOLED = 64_000_000  # bytes of compressed values that are kept in memory; more are on the disk
 PACKED = 2_000_000_000  # bytes of an .npz file
 MAX_FPS = 1000.0
 _KINDS = {".jpeg": ".jpg", ".tiff": ".tif"}
@@ -140,66 +136,39 @@ def read_images(images: Sequence[Path], name: str, frames: Range, label: int | N
     files, guesses = numbered(images, name)
     every = [(file, page) for file in files for page in range(1 if file is None else page_count(existing(file)))]
     chosen = every[slice(*span(frames, len(every)))]
-    known = [file is not None for file, _ in chosen]
-    with tempfile.SpooledTemporaryFile(SPOOLED) as temporary:
-        masks, size, kind = _image_masks(chosen, name, label, _Spool(temporary))
-    valid = None
-    if not all(known):
-        valid = empty_planes(len(chosen), size)
+    known = np.array([file is not None for file, _ in chosen])
+    size, is_person, kind = _decided(_marks(chosen, name, label), label, name)
+    masks, valid = _pack(_marks(chosen, name, label), int(known.sum()), size, is_person), None
+    if not known.all():
+        shown, masks, valid = masks, *(empty_planes(len(chosen), size) for _ in range(2))
+        masks[~known], masks[known] = 0, shown
         valid[:] = np.where(known, 255, 0)[:, None]
     paged = {file for file, page in chosen if page}
     names = [f"{file}{f', page {page}' * (file in paged)}" if file else f"{name}, missing" for file, page in chosen]
-    return PackedMasks(names, size, masks, valid, np.array(known), guesses=[*guesses, *kind])
+    return PackedMasks(names, size, masks, valid, known, guesses=[*guesses, *kind])
 
 
-def _image_masks(
-    images: Sequence[tuple[Path | None, int]], name: str, label: int | None, spool: "_Spool"
-) -> tuple[Planes, tuple[int, int], list[str]]:
-    """Return the masks of images, files and pages, none of it for None; their size, and what was guessed of values."""
-    counts, known = ValueCounts(), sum(file is not None for file, _ in images)
-    for file, group in groupby(((file, page) for file, page in images if file is not None), key=itemgetter(0)):
-        wanted = len(spool) + len(pages := [page for _, page in group])
+def _marks(images: Sequence[tuple[Path | None, int]], name: str, label: int | None) -> Iterator[Marks]:
+    """Yield how each of the images, files and pages but None, marks a person. Raises InputError where one does not."""
+    known = [(file, page) for file, page in images if file is not None]
+    first: Marks | None = None
+    for file, group in groupby(known, key=itemgetter(0)):
+        pages = [page for _, page in group]
+        remaining = len(pages)
         for marks in read_marks(file, pages, label is not None):
+            remaining -= 1
             if marks.photo:
-                raise _many_colours(str(file) if len(spool) else name)
-            if not len(spool):
-                check_decoded(name, marks.values.nbytes * known)
+                raise _many_colours(str(file) if first else name)
+            if first is None:
+                check_decoded(name, marks.values.nbytes * len(known))
             if marks.values.dtype.kind == "f" and not np.isfinite(marks.values).all():
                 raise InputError(f"{file}: masks must be finite, got nan or infinity")
-            if len(spool) and marks.values.shape != spool.shape:
-                raise InputError(f"{file}: mask must have shape {spool.shape}, got {marks.values.shape}")
-            counts.add(marks.values, marks.soft)
-            spool.add(marks.values)
-        if len(spool) < wanted:
+            first = first or marks
+            if marks.values.shape != first.values.shape:
+                raise InputError(f"{file}: mask must have shape {first.values.shape}, got {marks.values.shape}")
+            yield marks
+        if remaining:
             raise InputError(f"{file}: expected an image ({FORMATS}), got a file that is none")
-    is_person, kind = counts.classifier(label, name)
-    size, values = (spool.shape[1], spool.shape[0]), iter(spool)
-    masks = empty_planes(len(images), size)
-    for k, (file, _) in enumerate(images):
-        masks[k] = 0 if file is None else np.packbits(is_person(next(values)))
-    return masks, size, kind
-
-
-class _Spool:
-    """The values of images of one shape, compressed, in a file."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self.shape: tuple[int, ...] = (0, 0)
-        self._file = file
-        self._stored: list[tuple[int, np.dtype[Any]]] = []
-
-    def __len__(self) -> int:
-        return len(self._stored)
-
-    def add(self, values: Values) -> None:
-        """Store the values of the next image."""
-        self.shape = values.shape
-        self._stored.append((self._file.write(zlib.compress(values.tobytes(), 1)), values.dtype))
-
-    def __iter__(self) -> Iterator[Values]:
-        self._file.seek(0)
-        for length, dtype in self._stored:
-            yield np.frombuffer(zlib.decompress(self._file.read(length)), dtype).reshape(self.shape)
 
 
 def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Range, label: int | None) -> PackedMasks:
@@ -213,14 +182,18 @@ def _packed(name: str, arrays: Mapping[str, Stored | NDArray[Any]], frames: Rang
     start, stop = span(frames, count)
     if not usable[start:stop].any():
         raise InputError(f"{name}: expected a frame that is usable, got none from {start} to {stop}")
-    is_person, guesses = _stack_classifier(name, stack, start, stop, label)
-    masks = _pack(stack, start, stop, is_person)
-    valid = _pack(arrays["valid"], start, stop, _above(0.0)) if "valid" in arrays else None
+    size, is_person, guesses = (width, height), _above(0.0), list[str]()
+    if stack.dtype.kind != "b" or label is not None:  # booleans need no count
+        _, is_person, guesses = _decided(_chosen(name, stack, start, stop), label, name)
+    masks = _pack(_chosen(name, stack, start, stop), stop - start, size, is_person)
+    valid = None
+    if "valid" in arrays:
+        valid = _pack(_chosen(name, arrays["valid"], start, stop), stop - start, size, _above(0.0))
     names = [f"{name}[{k}]" for k in range(start, stop)]
     landmarks = np.array(arrays["landmarks"], dtype=np.float64)[start:stop] if "landmarks" in arrays else None
     if landmarks is not None and not (np.isfinite(landmarks).all() and landmarks[..., 2].min() >= 0.0):
         raise InputError(f"{name}: landmarks must be finite numbers with confidences of 0 or more, got others")
-    return PackedMasks(names, (width, height), masks, valid, usable[start:stop], fps, landmarks, start, guesses)
+    return PackedMasks(names, size, masks, valid, usable[start:stop], fps, landmarks, start, guesses)
 
 
 NARROW = 4  # times that a picture may be as high as wide: a person stands, but what is narrower is no picture
@@ -259,27 +232,29 @@ def _described(stored: Stored | NDArray[Any]) -> str:
     return f"{quoted(tuple(stored.shape))} {stored.dtype}"
 
 
-def _stack_classifier(
-    name: str, stored: Stored | NDArray[Any], start: int, stop: int, label: int | None
-) -> tuple[Classifier, list[str]]:
-    """Return how frames start to stop become masks, and what was guessed; booleans need no count."""
-    if stored.dtype.kind == "b" and label is None:
-        return _above(0.0), []
-    counts = ValueCounts()
+def _chosen(name: str, stored: Stored | NDArray[Any], start: int, stop: int) -> Iterator[Marks]:
+    """Yield frames start to stop; the others are read to the end, for the checksum."""
     for k, frame in enumerate(stored):
         if frame.dtype.kind == "f" and not np.isfinite(frame).all():
             raise InputError(f"{name}: masks must be finite, got nan or infinity in frame {k}")
         if start <= k < stop:
-            counts.add(frame, soft=False)
-    return counts.classifier(label, name)
+            yield Marks(frame)
 
 
-def _pack(stored: Stored | NDArray[Any], start: int, stop: int, is_person: Classifier) -> Planes:
-    """Return the bits of frames start to stop; the others are read to the end, for the checksum."""
-    planes = empty_planes(stop - start, (stored.shape[2], stored.shape[1]))
-    for k, frame in enumerate(stored):
-        if start <= k < stop:
-            planes[k - start] = np.packbits(is_person(frame))
+def _decided(frames: Iterable[Marks], label: int | None, name: str) -> tuple[tuple[int, int], Classifier, list[str]]:
+    """Return the size of frames, how their values become masks, and what was guessed of them."""
+    counts, size = ValueCounts(), (0, 0)
+    for marks in frames:
+        counts.add(marks.values, marks.soft)
+        size = marks.values.shape[1], marks.values.shape[0]
+    return size, *counts.classifier(label, name)
+
+
+def _pack(frames: Iterable[Marks], count: int, size: tuple[int, int], is_person: Classifier) -> Planes:
+    """Return the bits of so many frames."""
+    planes = empty_planes(count, size)
+    for k, marks in enumerate(frames):
+        planes[k] = np.packbits(is_person(marks.values))
     return planes
 
 

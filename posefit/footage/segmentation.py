@@ -6,7 +6,6 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import Parameter
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -19,8 +18,8 @@ from posefit.errors import InputError
 from posefit.fitting.validation import BrokenRuleError, plugin_errors
 from posefit.footage.images import read_image
 from posefit.footage.masks import PackedMasks, Range, empty_planes, span, unpacked
-from posefit.footage.people import LARGE, Choice, People, Tracklet, part_at, planes_of
-from posefit.footage.quality import MIN_FRAMES, PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
+from posefit.footage.people import Choice, People, Tracklet, part_at, planes_of
+from posefit.footage.quality import PEOPLE_SEGMENTER, FrameQuality, Verdict, advice, verdict
 from posefit.footage.video import Video, scaled
 from posefit.geometry.skeleton import JOINTS
 from posefit.reading import quoted
@@ -170,17 +169,21 @@ class PersonSegmenter:
         """Check that the extraction fits the video. Raises InputError where it does not."""
         scale = min(1.0, how.width / video.size[0])
         self.size = max(1, round(video.size[0] * scale)), max(1, round(video.size[1] * scale))
-        self.scale = scale
-        self.method, self.learned = how.name, "background" not in how.settings
+        self.scale, self.learned = scale, "background" not in how.settings
         self._roi, self._ignored = _scaled_roi(how.roi, video, scale), _ignored(how.ignore, self.size)
         self._film, self._how = VideoFootage(video, self.size, self._roi or (0, 0, *self.size)), how
-        self._segmenter = None if self.learned else how.segmenter(self._film)  # a background is checked now
+        if not self.learned:  # a background is checked now
+            _ = self._segmenter
+
+    @cached_property
+    def _segmenter(self) -> Segmenter:
+        """The segmenter, trained on the video."""
+        return self._how.segmenter(self._film)
 
     def frame(self, image: Image) -> SegmentedFrame:
         """Return who is in the next frame, which is of the working size."""
-        segmenter = self._segmenter = self._segmenter or self._how.segmenter(self._film)
-        result = people(*self._segmented(segmenter, image), self._roi, self._ignored)
-        return SegmentedFrame(result, float(getattr(segmenter, "facing", math.nan)), self._landmarks(segmenter))
+        result = people(*self._segmented(image), self._roi, self._ignored)
+        return SegmentedFrame(result, float(getattr(self._segmenter, "facing", math.nan)), self._landmarks())
 
     def quality(self) -> FrameQuality:
         """Return what compares the masks of a person with the pictures, from the first frame on."""
@@ -192,199 +195,136 @@ class PersonSegmenter:
         part = replace(person, mask=self._film.cut(person.mask), valid=self._film.cut(person.valid))
         return quality.row(self._film.cut(image), part, number)
 
-    def _segmented(self, segmenter: Segmenter, image: Image) -> tuple[Mask, Mask]:
-        """Return a segmenter's two masks of the part that it gets, at its place in the whole frame."""
+    def _segmented(self, image: Image) -> tuple[Mask, Mask]:
+        """Return the segmenter's two masks of the part that it gets, at its place in the whole frame."""
         x, y, wide, tall = self._film.part
-        with plugin_errors(f"segmenter {self.method!r}", "segment"):
-            planes = [np.asarray(plane) for plane in segmenter.segment(self._film.cut(image))]
+        with plugin_errors(f"segmenter {self._how.name!r}", "segment"):
+            planes = [np.asarray(plane) for plane in self._segmenter.segment(self._film.cut(image))]
         if len(planes) != 2 or any(plane.shape != (tall, wide) or plane.dtype != np.bool_ for plane in planes):
             came = ", ".join(f"{plane.shape} {plane.dtype}" for plane in planes)
             raise BrokenRuleError(
-                f"segmenter {self.method!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
+                f"segmenter {self._how.name!r}: segment must return two boolean masks of shape {tall, wide}, got {came}"
             )
         whole = np.zeros((2, *image.shape[:2]), dtype=bool)
         whole[:, y : y + tall, x : x + wide] = planes
         return whole[0], whole[1]
 
-    def _landmarks(self, segmenter: Segmenter) -> Array:
-        landmarks = getattr(segmenter, "landmarks", None)
+    def _landmarks(self) -> Array:
+        landmarks = getattr(self._segmenter, "landmarks", None)
         given = np.array(np.zeros((len(JOINTS), 3)) if landmarks is None else landmarks, dtype=np.float64)
         if given.shape != (len(JOINTS), 3) or not np.isfinite(given).all() or given[:, 2].min() < 0.0:
             raise BrokenRuleError(
-                f"segmenter {self.method!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
+                f"segmenter {self._how.name!r}: landmarks must be finite numbers of shape {len(JOINTS), 3}, their "
                 f"confidence 0 or more, got shape {given.shape}"
             )
         given[:, :2] += self._film.part[:2]
         return given
 
 
+class Segmented(NamedTuple):
+    """What a pass through a video shows of the person who is followed."""
+
+    masks: PackedMasks
+    rows: list[dict[str, Any]]  # of quality.csv
+    verdict: Verdict | None  # what is wrong with the masks, if anything
+    warnings: list[str]  # what a user should check before they trust the masks
+    facings: Array  # (T,) as `Segmenter.facing`; NaN where unknown or going along
+    camera_moves: bool  # whether the camera seems to
+
+
 class Segmentation:
-    """One pass through a video; its rows, verdict and warnings are complete when it has ended."""
+    """A pass through a video. Raises InputError where the extraction or the frames do not fit it."""
 
     def __init__(self, video: Video, how: Extraction, frames: Range) -> None:
-        """Check that the extraction fits the video. Raises InputError where it does not."""
-        count = video.count()
-        self.start, self.stop = span(frames, count)
-        self.video, self._segmenter = video, PersonSegmenter(video, how)
-        self.method, self.size = self._segmenter.method, self._segmenter.size
-        self._people, self._choice = People(video.fps), how.person
-        if isinstance(self._choice, tuple):
-            self._choice = self._choice[0] * self._segmenter.scale, self._choice[1] * self._segmenter.scale
-        # rows of empty masks, and of the largest blobs, which are the person where there is one only
-        self._blanks, self._largest = list[dict[str, Any]](), list[dict[str, Any]]()
-        self._qualities: tuple[FrameQuality, FrameQuality] | None = None  # of both
-        self._missing = max(0, video.claimed - count)
-        self._masks, self._valid = (empty_planes(len(self), self.size) for _ in range(2))
-        self._images: Iterator[Image] | None = None  # while frames are read
-        self._motion, self._shifts = CameraMotion(self.size), list[float]()
-        self._signs: list[tuple[float, Array]] = []  # of each frame: facing and landmarks
+        self.start, self.stop = span(frames, video.count())
+        self.video, self.how, self._segmenter = video, how, PersonSegmenter(video, how)
+        self.size = self._segmenter.size
 
-    def __len__(self) -> int:
-        return self.stop - self.start
-
-    def masks(self, progress: Progress | None = None) -> PackedMasks:
+    def read(self, progress: Progress | None = None) -> Segmented:
         """Return the masks of the video, which is decoded once, after the background was learned.
 
         Raises InputError where no frame shows a person.
         """
-        self.read(len(self) - len(self._blanks), progress)
-        self._images = None
-        if not any(row["area"] for row in self.rows):
-            damage = f"; {self._damage}" if self._missing else ""
-            none = "expected a person who moves before a still background, got none in any frame"
-            raise InputError(
-                f"{self.video.path}: {none}{damage or advice(self.method, learned=self._segmenter.learned)}"
-            )
-        return self.packed()
-
-    def read(self, count: int, progress: Progress | None = None) -> None:
-        """Take the people out of so many more frames."""
-        vars(self).pop("_parts", None)  # who is followed
-        self._images = self._images or self.video.frames(self.start, self.stop, self.size)
-        chosen = islice(self._images, count)
-        for image in progress(chosen, count) if progress else chosen:
-            k = len(self._blanks)
-            if k % PERIOD == 0:
-                self._shifts.append(self._motion.shift(image))
-            found, facing, landmarks = self._segmenter.frame(image)
-            self._signs.append((facing, landmarks))
-            known = found[0].valid
-            self._masks[k], self._valid[k] = np.packbits(found[0].mask), np.packbits(known)
-            present = self._people.add([person.mask for person in found if person.area], image)
-            self._qualities = self._qualities or (self._segmenter.quality(), self._segmenter.quality())
-            blank, largest = self._qualities
+        video, segmenter, room = self.video, self._segmenter, self.stop - self.start
+        people, camera, facings, landmarks = People(video.fps), CameraMotion(self.size), list[float](), list[Array]()
+        # rows of empty masks, and of the largest blobs, which are the person where there is one only
+        quality, largest_quality = segmenter.quality(), segmenter.quality()
+        blanks, largest = list[dict[str, Any]](), list[dict[str, Any]]()
+        masks, valid = (empty_planes(room, self.size) for _ in range(2))
+        images = video.frames(self.start, self.stop, self.size)
+        for k, image in enumerate(progress(images, room) if progress else images):
+            camera.add(k, image)
+            blobs, facing, points = segmenter.frame(image)
+            facings.append(facing)
+            landmarks.append(points)
+            known = blobs[0].valid
+            masks[k], valid[k] = np.packbits(blobs[0].mask), np.packbits(known)
+            present = people.add([blob.mask for blob in blobs if blob.area], image)
             empty = Person(np.zeros_like(known), known, 0, 0, 0.0, False)
-            for tracklet in self._people.active:
-                tracklet.quality = tracklet.quality or deepcopy(blank)
-                person = empty
-                if tracklet in present:
-                    others = [other for other in present if other is not tracklet and other.confirmed()]
-                    mask, valid = planes_of([tracklet], others, k, known)
-                    whole = next((person for person in found if person.mask is tracklet.latest.mask), found[0])
-                    person = replace(whole, mask=mask, valid=valid, area=int(mask.sum()))
-                    pieces = max(min(1, person.pieces), person.pieces - len(others))
-                    person = replace(person, pieces=pieces, touches_border=touches_border(mask))
+            for tracklet in people.active:
+                tracklet.quality = tracklet.quality or deepcopy(quality)
+                person = _alone(tracklet, present, blobs, k) if tracklet in present else empty
                 tracklet.add_row(k, self._row(tracklet.quality, image, person, k))
-            self._blanks.append(self._row(blank, image, empty, k))
-            self._largest.append(self._row(largest, image, found[0], k))
+            blanks.append(self._row(quality, image, empty, k))
+            largest.append(self._row(largest_quality, image, blobs[0], k))
+        count, rows = len(blanks), largest
+        masks, valid = masks[:count], valid[:count]
+        parts, several = people.chosen(self.how.person, lambda k: f"frame {self.start + k}", 1.0 / segmenter.scale)
+        if several:
+            rows = [blank if (part := part_at(parts, k)) is None else part.rows[k] for k, blank in enumerate(blanks)]
+            others = [part for person in people.persons() for part in person if part not in parts]
+            for k in range(count):
+                planes = planes_of(parts, others, k, unpacked(valid[k], self.size))
+                masks[k], valid[k] = (np.packbits(plane) for plane in planes)
+        missing, damage = max(0, video.claimed - video.count()), ""
+        if missing:
+            damage = f"the file says that it has {missing} frames more than can be read: it seems to be damaged"
+        if not any(row["area"] for row in rows):
+            none = "expected a person who moves before a still background, got none in any frame"
+            reason = f"; {damage}" if damage else advice(self.how.name, learned=segmenter.learned)
+            raise InputError(f"{video.path}: {none}{reason}")
+        doubt = verdict(rows, self.how.name, learned=segmenter.learned)
+        warnings = [
+            doubt and doubt.text,
+            damage if missing > MISSING * count else "",
+            several,
+            camera.moves and "the camera seems to move, and silhouettes need a still one; expect poor masks",
+        ]
+        points, usable = np.array(landmarks), np.array([row["usable"] for row in rows], dtype=bool)
+        packed = PackedMasks(
+            [f"{video.path}, frame {self.start + k}" for k in range(count)],
+            self.size,
+            masks,
+            valid,
+            usable,
+            video.fps,
+            points if points[..., 2].any() else None,
+            self.start,
+            video.guesses,
+        )
+        columns = [np.flatnonzero(packed.silhouette(k).mask) % self.size[0] for k in range(count)]
+        middles = [float(each.mean()) if len(each) else math.nan for each in columns]
+        return Segmented(
+            packed,
+            rows,
+            doubt and replace(doubt, text=f"{video.path}: {doubt.text}"),
+            [*video.warnings, *(f"{video.path}: {text}" for text in warnings if text)],
+            facings_on_the_spot(facings, middles, [row["longer_side"] for row in rows], video.fps),
+            camera.moves,
+        )
 
     def _row(self, quality: FrameQuality, image: Image, person: Person, k: int) -> dict[str, Any]:
         row = self._segmenter.row(quality, image, person, self.start + k)
         return row | {"usable": int(row["usable"] and self.video.is_filmed(self.start + k))}
 
-    @cached_property
-    def _parts(self) -> tuple[list[Tracklet], list[Tracklet], str]:
-        """The parts of the person who is followed so far, those of the others, and what there is to say of it."""
-        parts, words = self._people.chosen(
-            self._choice, lambda frame: f"frame {self.start + frame}", 1.0 / self._segmenter.scale
-        )
-        return parts, [part for person in self._people.persons() for part in person if part not in parts], words
 
-    @property
-    def rows(self) -> list[dict[str, Any]]:
-        """The rows of quality.csv so far, for the person who is followed."""
-        if not self._parts[2]:
-            return self._largest
-        return [
-            blank if (part := part_at(self._parts[0], k)) is None else part.rows[k]
-            for k, blank in enumerate(self._blanks)
-        ]
-
-    @property
-    def usable(self) -> NDArray[np.bool_]:
-        """Which frames so far are usable (T,)."""
-        return np.array([row["usable"] for row in self.rows], dtype=bool)
-
-    @property
-    def refused_so_far(self) -> bool:
-        """Whether the frames so far show something as large as a person whose masks are refused."""
-        whole = [row for row in self.rows if not row["touches_border"] and row["longer_side"] > LARGE * self.size[1]]
-        return len(whole) >= MIN_FRAMES and bool((verdict := self.verdict) and verdict.refused)
-
-    def packed(self) -> PackedMasks:
-        """Return the masks of the frames so far."""
-        count, usable, (parts, others, several) = len(self._blanks), self.usable, self._parts
-        names = [f"{self.video.path}, frame {self.start + k}" for k in range(count)]
-        landmarks = np.array([landmarks for _, landmarks in self._signs])
-        known = landmarks if landmarks[..., 2].any() else None
-        masks, valid = self._masks[:count], self._valid[:count]
-        if several:
-            masks, valid = (empty_planes(count, self.size) for _ in range(2))
-        for k in range(count) if several else ():
-            shown = unpacked(self._valid[k], self.size)
-            masks[k], valid[k] = (np.packbits(plane) for plane in planes_of(parts, others, k, shown))
-        guesses = self.video.guesses
-        return PackedMasks(names, self.size, masks, valid, usable, self.video.fps, known, self.start, guesses)
-
-    @property
-    def facings(self) -> Array:
-        """Which way the person faces in each frame, as `Segmenter.facing`; NaN where unknown or going along."""
-        facings, rows, masks = [facing for facing, _ in self._signs], self.rows, self.packed()
-        columns = [np.flatnonzero(masks.silhouette(k).mask) % self.size[0] for k in range(len(rows))]
-        middles = [float(each.mean()) if len(each) else math.nan for each in columns]
-        return facings_on_the_spot(facings, middles, [row["longer_side"] for row in rows], self.video.fps)
-
-    @property
-    def verdict(self) -> Verdict | None:
-        """What is wrong with the masks, if anything; known when the pass has ended."""
-        result = verdict(self.rows, self.method, learned=self._segmenter.learned)
-        return result and replace(result, text=f"{self.video.path}: {result.text}")
-
-    @property
-    def camera_moves(self) -> bool:
-        """Whether the camera seems to move."""
-        return sum(shift > MOVED * SMALL for shift in self._shifts) > OFTEN * len(self._shifts)
-
-    @property
-    def _damage(self) -> str:
-        return f"the file says that it has {self._missing} frames more than can be read: it seems to be damaged"
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a user should check before they trust the masks."""
-        texts, name = [*self.video.warnings], self.video.path
-        if self.verdict:
-            texts.append(self.verdict.text)
-        if self._missing > MISSING * len(self._blanks):
-            texts.append(f"{name}: {self._damage}")
-        if self._parts[2]:
-            texts.append(f"{name}: {self._parts[2]}")
-        if self.camera_moves:
-            texts.append(f"{name}: the camera seems to move, and silhouettes need a still one; expect poor masks")
-        return texts
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """How many frames there are, and how good they are."""
-        return {
-            "frames": len(self.rows),
-            "usable": sum(bool(row["usable"]) for row in self.rows),
-            "size": list(self.size),
-            "fps": self.video.fps,
-            "touching_border": sum(bool(row["touches_border"]) for row in self.rows),
-            "in_pieces": sum(row["pieces"] > 1 for row in self.rows),
-            "warnings": self.warnings,
-        }
+def _alone(tracklet: Tracklet, present: Sequence[Tracklet], blobs: Sequence[Person], k: int) -> Person:
+    """Return what frame k shows of a tracklet, without the others that are present."""
+    known, others = blobs[0].valid, [other for other in present if other is not tracklet and other.confirmed()]
+    mask, valid = planes_of([tracklet], others, k, known)
+    whole = next((blob for blob in blobs if blob.mask is tracklet.latest.mask), blobs[0])
+    pieces = max(min(1, whole.pieces), whole.pieces - len(others))
+    return Person(mask, valid, int(mask.sum()), pieces, whole.rival, touches_border(mask))
 
 
 def facings_on_the_spot(
@@ -406,13 +346,24 @@ def facings_on_the_spot(
 
 
 class CameraMotion:
-    """Compares pictures with the first one, to estimate how far the camera moved."""
+    """Compares every `PERIOD`th picture with the first one, to estimate whether the camera moved."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._size = SMALL, max(16 * TILES, round(SMALL * size[1] / size[0]))
         self._first: list[Any] | None = None  # the tiles of the first picture; None for one without texture
+        self._shifts = list[float]()
 
-    def shift(self, image: Image) -> float:
+    @property
+    def moves(self) -> bool:
+        """Whether the camera seems to move."""
+        return sum(shift > MOVED * SMALL for shift in self._shifts) > OFTEN * len(self._shifts)
+
+    def add(self, k: int, image: Image) -> None:
+        """Take picture k."""
+        if k % PERIOD == 0:
+            self._shifts.append(self._shift(image))
+
+    def _shift(self, image: Image) -> float:
         """Return by how many pixels of a picture `SMALL` wide an image is shifted against the first.
 
         Tiles that a person covers match anywhere, but a camera that moves takes along every tile: what all but a

@@ -16,7 +16,7 @@ from posefit.footage.cleaning import cleaned
 from posefit.footage.images import IMAGES, is_photo, page_count
 from posefit.footage.masks import Range
 from posefit.footage.people import Choice
-from posefit.footage.quality import MIN_FRAMES, Verdict
+from posefit.footage.quality import Verdict
 from posefit.footage.readers import Masks, images_in, name_of, read_masks
 from posefit.footage.scene import Scene, synthetic
 from posefit.footage.segmentation import Extraction, Segmentation
@@ -33,7 +33,6 @@ from posefit.progress import QUIET, Progress
 from posefit.reading import quoted
 
 NO_VIDEO = (*IMAGES, *MOTIONS, ".npz", ".npy", ".asf", ".json", ".csv", ".txt")
-FIRST_SECONDS = 2.0  # of several videos, by which they are refused before the rest is read
 SIZE = (320, 240)  # pixels of a rendered picture
 Kind = Literal["motion", "masks", "video", "pictures"]
 _KINDS: dict[Kind, str] = {"motion": "a motion", "masks": "masks", "video": "a video", "pictures": "pictures"}
@@ -50,7 +49,7 @@ _USED_FOR: dict[str, tuple[str, Sequence[Kind]]] = {
 
 
 def check_used(kind: Kind, view: Mapping[str, Any]) -> None:
-    """Return nothing. Raises InputError where an option is given that sources of this kind have no use for."""
+    """Raise InputError where an option is given that sources of this kind have no use for."""
     for name, (where, kinds) in _USED_FOR.items():
         if kind not in kinds and view.get(name) is not None:
             raise useless_for(kind, name, view[name], where)
@@ -86,7 +85,8 @@ def scene_of(
 ) -> Scene:
     """Return the scene of a source, or of what several cameras saw at the same times.
 
-    The options are those of `posefit.track`, see `posefit.tracking.options`. Raises InputError where one does not fit.
+    The options are those of `posefit.track`, see `posefit.tracking.options`; `check_used` refuses those that
+    sources have no use for. Raises InputError where one does not fit.
     """
     for source in sources:  # names are in every file that is written
         if isinstance(source, str | Path | tuple):
@@ -95,8 +95,6 @@ def scene_of(
     if len(kinds) > 1:
         raise InputError(f"sources must be of one kind, got {' and '.join(sorted(kinds))}")
     kind = next(iter(kinds))
-    options = {"extraction": extraction, "fps": fps, "label": label, "holes": holes, "height": height, "size": size}
-    check_used(kind, {**options, "camera": camera, "up": up, "unit": unit, "asf": asf, "person": person})
     if person is not None and len(sources) > 1:
         raise InputError(f"person must be given for one camera only, got {len(sources)}")
     if kind == "motion":
@@ -125,13 +123,12 @@ def scene_of(
         if len(rates) > 1:
             raise InputError(f"videos must have one frame rate, got {', '.join(map(str, sorted(rates)))}")
         known = calibrated(camera, [video.size for video in videos])
-        views = _filmed(videos, replace(extraction or Extraction(), person=person), frames, progress, scene)
+        result = _filmed(videos, replace(extraction or Extraction(), person=person), frames, progress, scene)
     else:
         known = calibrated(camera, [None] * len(sources))
         places = [source if isinstance(source, np.ndarray | tuple) else Path(str(source)) for source in sources]
         masks = [cleaned(read_masks(place, frames, label), name_of(place), holes, person) for place in places]
-        views = [CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)]
-    result = scene(views)
+        result = scene([CameraView(*clean, name=name_of(place)) for clean, place in zip(masks, places, strict=True)])
     result = replace(result, warnings=[*notes, *result.warnings], guesses=[*result.guesses, *of_height])
     return logged(result, progress)
 
@@ -167,25 +164,26 @@ def _filmed(
     how: Extraction,
     frames: Range,
     progress: Progress,
-    scene: Callable[[Sequence[CameraView]], object],
-) -> list[CameraView]:
-    """Return what videos show. Raises InputError where their masks cannot be those of a person, or `scene` does.
+    scene: Callable[[Sequence[CameraView]], Scene],
+) -> Scene:
+    """Return the scene of what videos show. Raises InputError where their masks cannot be those of a person.
 
     Of several ways to take the person out, the first is used whose masks are not doubted, or else are doubted least.
     """
-    tried = []
+    tried = list[tuple[str, Scene | None, Verdict | None]]()
     for way in how.ways(len(videos)):
         tried.append((way.name, *_taken_out(videos, way, frames, progress, scene)))
         if tried[-1][2] is None:
             break
-    name, views, doubt = min(tried, key=lambda way: 0 if way[2] is None else 1 + way[2].refused)
-    if doubt and doubt.refused:
+    name, result, doubt = min(tried, key=lambda way: 0 if way[2] is None else 1 + way[2].refused)
+    if result is None:
+        assert doubt is not None
         raise InputError(doubt.text)
     first, _, before = tried[0]
     if name != first and before is not None:
         warning = f"{name} took the person out, instead of {first}: {before.text.partition(';')[0]}"
-        views[0] = replace(views[0], warnings=[*views[0].warnings, warning])
-    return views
+        result = replace(result, warnings=[*result.warnings, warning])
+    return result
 
 
 def _taken_out(
@@ -193,45 +191,24 @@ def _taken_out(
     how: Extraction,
     frames: Range,
     progress: Progress,
-    scene: Callable[[Sequence[CameraView]], object],
-) -> tuple[list[CameraView], Verdict | None]:
-    """Return what videos show, and the worst that is wrong with their masks, if anything.
-
-    Of several videos the first seconds come first: where all of them are refused, or contradict each other as a
-    `scene`, the rest need not be read.
-    """
+    scene: Callable[[Sequence[CameraView]], Scene],
+) -> tuple[Scene | None, Verdict | None]:
+    """Return the scene of what videos show, and the worst that is wrong with their masks; no scene of refused ones."""
+    views, worst = list[CameraView](), None
     segmentations = [Segmentation(video, how, frames) for video in videos]  # all are checked before any is read
-
-    def view(part: Segmentation) -> CameraView:
-        pictures = partial(part.video.frames, part.start, part.stop, part.size)
-        name, filmed = str(part.video.path), part.video.size
-        return CameraView(part.packed(), part.warnings, name, filmed, pictures, part.facings, part.camera_moves)
-
-    if len(videos) > 1:
+    try:
         for part in segmentations:
-            part.read(round(FIRST_SECONDS * part.video.fps))
-        refused = [verdict for part in segmentations if (verdict := part.verdict) and verdict.refused]
-        if all(part.refused_so_far for part in segmentations):
-            return [], refused[0]
-        usable = zip(*(part.usable for part in segmentations), strict=False)
-        if sum(map(all, usable)) >= MIN_FRAMES:
-            try:
-                scene([view(part) for part in segmentations])
-            except InputError as error:
-                return [], refused[0] if refused else Verdict(str(error), True)
-    views, worst = [], None
-    for part in segmentations:
-        progress.log(f"taking the person out of {part.video.path} by {how.name}")
-        try:
-            part.masks(progress.steps)
-        except InputError as error:
-            return [], Verdict(str(error), True)
-        views.append(view(part))
-        if part.verdict is not None and (worst is None or part.verdict.refused):
-            worst = part.verdict
-        if worst is not None and worst.refused:
-            break
-    return views, worst
+            progress.log(f"taking the person out of {part.video.path} by {how.name}")
+            masks, _, doubt, warnings, facings, moves = part.read(progress.steps)
+            if doubt is not None and doubt.refused:
+                return None, doubt
+            worst = worst or doubt
+            pictures = partial(part.video.frames, part.start, part.stop, masks.size)
+            name, filmed = str(part.video.path), part.video.size
+            views.append(CameraView(masks, warnings, name, filmed, pictures, facings, moves))
+        return scene(views), worst
+    except InputError as error:
+        return None, Verdict(str(error), True)
 
 
 def kind_of(source: Footage) -> Kind:

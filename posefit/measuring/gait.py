@@ -87,9 +87,9 @@ class Gait:
 
     def as_dict(self) -> dict[str, object]:
         """Return the gait as summary.json holds it."""
-        counted, reasons = len(_values(self.steps, "step_seconds")), (self.why or None, self.why_no_lengths or None)
-        values = {**asdict(self), "steps": counted}
-        return {"walk": not self.why, **values, **dict(zip(("why", "why_no_lengths"), reasons, strict=True))}
+        counted = {"steps": len(_values(self.steps, "step_seconds"))}
+        reasons = {"why": self.why or None, "why_no_lengths": self.why_no_lengths or None}
+        return {"walk": not self.why, **asdict(self), **counted, **reasons}
 
 
 def gait_of(motion: Motion, unknown: Collection[int] = ()) -> Gait:
@@ -138,33 +138,46 @@ def _steps(events: GaitEvents, fps: float, first: int, unknown: set[int], in_pla
     least = -np.inf if in_place else MIN_SPEED
     strikes = sorted((time, side) for side in SIDES for time in _known(events.strikes[side], unknown))
     for k, (time, foot) in enumerate(strikes):
-        measures: dict[str, float] = {}
+        (other,), measures = (side for side in SIDES if side != foot), dict[str, float | None]()
         again = next((later for later, side in strikes[k + 1 :] if side == foot), np.inf)
-        offs = [off for off in _known(events.offs[foot], unknown) if time < off < again]
-        if offs:
-            measures["toe_off_seconds"] = (first + offs[0]) / fps
-        if k and strikes[k - 1][1] != foot and _walked(events, fps, strikes[k - 1][0], time, unknown, least):
-            other = next(side for side in SIDES if side != foot)
-            apart = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], strikes[k - 1][0])
-            x, z = at_frames(events.heading, time)
-            measures["step_seconds"] = (time - strikes[k - 1][0]) / fps
-            if not in_place:
-                measures["step_length"] = float(apart @ (x, z))  # WHITTLE2007 (step length)
-            # at one moment: between two, whatever is wrong with a person's depth would count
-            beside = at_frames(events.ankles[foot], time) - at_frames(events.ankles[other], time)
-            measures["step_width"] = abs(float(beside @ (z, -x)))
-        following = strikes[k + 1 : k + 3]
-        in_turn = [side for _, side in following] == [side for side in SIDES if side != foot] + [foot]
-        times = [time, *(later for later, _ in following)]
+        off = next((off for off in _known(events.offs[foot], unknown) if time < off < again), None)
+        if off is not None:
+            measures["toe_off_seconds"] = (first + off) / fps
+        before = strikes[k - 1] if k else (time, foot)
+        if before[1] == other and _walked(events, fps, before[0], time, unknown, least):
+            measures |= _step(events, fps, foot, other, before[0], time)
+        times = [time, *(later for later, _ in strikes[k + 1 : k + 3])]
+        in_turn = [side for _, side in strikes[k + 1 : k + 3]] == [other, foot]
         if in_turn and all(_walked(events, fps, *pair, unknown, least) for pair in pairwise(times)):
-            end = times[-1]
-            moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], time)
-            measures["stride_seconds"] = (end - time) / fps
-            if not in_place:
-                measures["stride_length"] = float(np.linalg.norm(moved))
-            if offs:
-                measures["stance_share"] = (offs[0] - time) / (end - time)  # WHITTLE2007 (stance)
+            measures |= _stride(events, fps, foot, time, times[-1], off)
+        if in_place:
+            measures |= {"step_length": None, "stride_length": None}
         yield Step(foot=foot, strike_seconds=(first + time) / fps, **measures)
+
+
+def _step(events: GaitEvents, fps: float, foot: str, other: str, start: float, end: float) -> dict[str, float | None]:
+    """Return the measures of a step of a foot, from the strike of the other one to its own."""
+    struck = at_frames(events.ankles[foot], end)
+    x, z = at_frames(events.heading, end)
+    # at one moment: between two, whatever is wrong with a person's depth would count
+    beside = struck - at_frames(events.ankles[other], end)
+    return {
+        "step_seconds": (end - start) / fps,
+        "step_length": float((struck - at_frames(events.ankles[other], start)) @ (x, z)),  # WHITTLE2007 (step length)
+        "step_width": abs(float(beside @ (z, -x))),
+    }
+
+
+def _stride(
+    events: GaitEvents, fps: float, foot: str, start: float, end: float, off: float | None
+) -> dict[str, float | None]:
+    """Return the measures of a stride of a foot, from one of its strikes to the next; it lifts `off` in between."""
+    moved = at_frames(events.ankles[foot], end) - at_frames(events.ankles[foot], start)
+    return {
+        "stride_seconds": (end - start) / fps,
+        "stride_length": float(np.linalg.norm(moved)),
+        "stance_share": None if off is None else (off - start) / (end - start),  # WHITTLE2007 (stance)
+    }
 
 
 def _known(times: Array, unknown: set[int]) -> list[float]:
@@ -188,10 +201,8 @@ def _why_not(motion: Motion, events: GaitEvents, steps: list[Step], speed: float
         return f"{strikes or 'no'} strike{'' if strikes == 1 else 's'} of a foot detected"
     if speed <= -MIN_SPEED:
         return f"the person moves backwards at {-speed:.2f} m/s"
-    stance, froude = (
-        _values(steps, "stance_share"),
-        speed**2 / (GRAVITY * _leg(motion)),
-    )  # ALEXANDER1989 (Froude number)
+    stance = _values(steps, "stance_share")
+    froude = speed**2 / (GRAVITY * _leg(motion))  # ALEXANDER1989 (Froude number)
     if froude > RUNNING_FROUDE or (stance and np.mean(stance) < MIN_STANCE_SHARE):
         return "the person runs" + (f", at {speed:.1f} m/s" if speed >= MIN_SPEED else " in one place")
     timed = _values(steps, "step_seconds")

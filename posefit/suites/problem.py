@@ -18,7 +18,9 @@ from posefit.errors import InputError
 from posefit.fitting.box import Space, draw_population
 from posefit.fitting.check import one_of, whole
 from posefit.fitting.exchange import exchanged
+from posefit.geometry.camera import Camera
 from posefit.reading import quoted
+from posefit.silhouette.mask import Mask
 from posefit.suites.functions import (
     DIMENSIONS,
     FUNCTIONS,
@@ -93,6 +95,7 @@ class Problem:
         # the lowest cost there is: 0 where the silhouette is of a pose of the box; None where it is unknown
         self.optimum = 0.0 if function.exact else None
         self.truth_cost = made.truth_cost  # of the true pose, which is in the box and feasible
+        self.looked = False  # whether `look` was called: then a run is one of a method that looks
         self.reset()
 
     def reset(self) -> None:
@@ -120,6 +123,17 @@ class Problem:
     def noise_free(self, proposals: object) -> Array:
         """Return the costs (n,) of proposals (n, d), without noise and uncounted: a search that calls this cheats."""
         return self._noise_free(self._checked(proposals).reshape(-1, self.dimension))[0]
+
+    def look(self) -> list[list[tuple[Camera, Mask]]]:
+        """Return each frame's cameras with what they show, for a method that does not search blind.
+
+        A run is marked from then on. Where silhouettes are noisy, it is the first of them.
+        """
+        self.looked = True
+        return [
+            [(camera, silhouette.mask) for camera, silhouette in zip(frame.cameras, frame.silhouettes, strict=True)]
+            for frame in self.made.noisy[:1] or self.made.frames
+        ]
 
     def repaired(self, proposals: Array) -> Array:
         """Return proposals (n, d), those not feasible moved: into the box, then straight towards its middle."""

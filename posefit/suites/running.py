@@ -42,6 +42,7 @@ class SuiteRun:
     targets: Array = field(repr=False)  # (t,) costs, falling
     evaluations: Array = field(repr=False)  # (k,) of the trace, the last of the run at its end
     costs: Array = field(repr=False)  # (k,)
+    looked: bool = False  # whether the method read the silhouette, see `Problem.look`
 
     @property
     def cost(self) -> float:
@@ -106,6 +107,7 @@ def run_of(
         problem.truth_cost,
         problem.targets,
         *problem.trace,
+        problem.looked,
     )
 
 
@@ -123,6 +125,7 @@ class SuiteScore:
     dimension: int
     budget: int  # evaluations that a run could have had
     infeasible: str  # the way with infeasible proposals: see `posefit.suites.problem.Problem`
+    looked: bool  # whether the method read silhouettes, where the others search blind
     runs: int
     above: float  # median of the best costs above the true poses'; below 0 where searches find lower ones
     reached: float  # share of runs and targets
@@ -134,7 +137,7 @@ class SuiteScore:
 
 
 def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
-    """Return the scores of runs, by dimension, function and method, the best first.
+    """Return the scores of runs, by dimension, function and method, the best first, and after them those that look.
 
     In a dimension with several functions those of all together come first, as function 0. Methods with other settings
     are other methods; runs with another budget, or with another way with what is not feasible, have a score of their
@@ -156,13 +159,22 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
     ]
     return sorted(
         scores,
-        key=lambda one: (one.dimension, one.function, -one.reached, one.above, one.method, one.budget, one.infeasible),
+        key=lambda one: (
+            one.dimension,
+            one.function,
+            one.looked,
+            -one.reached,
+            one.above,
+            one.method,
+            one.budget,
+            one.infeasible,
+        ),
     )
 
 
 def method_name(run: SuiteRun) -> str:
-    """Return a run's method with its settings."""
-    chosen = ", ".join(f"{name}={value}" for name, value in sorted(run.settings.items()))
+    """Return a run's method with its settings, marked where it looks."""
+    chosen = ", ".join([f"{name}={value}" for name, value in sorted(run.settings.items())] + ["looks"] * run.looked)
     return f"{run.method} ({chosen})" if chosen else run.method
 
 
@@ -183,6 +195,7 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
         dimension,
         budget,
         runs[0].infeasible,
+        runs[0].looked,
         len(runs),
         float(np.median([run.cost - run.truth_cost for run in runs])),
         float(np.isfinite(reached).mean()),

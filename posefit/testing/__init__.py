@@ -1,4 +1,4 @@
-"""Is a plugin right? Checks for optimisers, priors, trackers and segmenters, for an author's own tests.
+"""Is a plugin right? Checks for optimisers, priors, trackers, starts and segmenters, for an author's own tests.
 
     from posefit.testing import check_optimiser
 
@@ -21,7 +21,16 @@ from posefit.testing.results import Check, Report, Result, run_checks
 if TYPE_CHECKING:
     from posefit.fitting.optimiser import NextFrame
 
-__all__ = ["Check", "Report", "Result", "check_optimiser", "check_prior", "check_segmenter", "check_tracker"]
+__all__ = [
+    "Check",
+    "Report",
+    "Result",
+    "check_optimiser",
+    "check_prior",
+    "check_segmenter",
+    "check_start",
+    "check_tracker",
+]
 
 Factory = Callable[..., Any]
 Settings = Mapping[str, Any] | None
@@ -40,6 +49,11 @@ def check_prior(factory: Factory, *, settings: Settings = None) -> Report:
 def check_tracker(factory: Factory, *, looks_ahead: bool = False, settings: Settings = None) -> Report:
     """Return the report on a tracker's factory, true where no check failed; `looks_ahead` as it is registered."""
     return run_checks(factory, checks_of("tracker", factory, settings, looks_ahead))
+
+
+def check_start(factory: Factory, *, settings: Settings = None) -> Report:
+    """Return the report on a start's factory, true where no check failed."""
+    return run_checks(factory, checks_of("start", factory, settings))
 
 
 def check_segmenter(factory: Factory, *, settings: Settings = None) -> Report:

@@ -23,7 +23,7 @@ from posefit.testing.problem import SIZE
 from posefit.testing.results import BrokenError, expect
 
 FRAMES = 12
-EVALUATIONS = 400
+EVALUATIONS = 800
 
 
 @lru_cache(maxsize=1)

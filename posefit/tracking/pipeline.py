@@ -83,6 +83,8 @@ def track_scene(
                     outside = "tracked again before frame {} and after frame {}".format(*tracked.stay)
                     progress.log(f"the body turned faster than a person can: {outside}")
         frames = tracked.frames
+        if scene.count == 1 and task.before and frames[0].posterior is None:
+            frames = [replace(frames[0], posterior=task.before[-1].posterior)]
         if options.smooth:
             with progress.phase("smooth"):
                 scene, frames, shape = smooth(scene, frames, shape, method.audit.beta)

@@ -20,20 +20,23 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting.space import ROOT_RANGE_DEGREES
+from posefit.fitting.start import TEMPERATURE
 from posefit.fitting.tracker import Frame, Observation, Task, guessed_modes
 from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import Skeleton
+from posefit.geometry.skeleton import ANGLES, JOINTS, Skeleton
 from posefit.geometry.symmetry import exchanged_limbs, facing, mirrored_poses, reflected_poses, turned_poses
 from posefit.motion.steadiness import runs
 from posefit.reading import counted
 from posefit.silhouette.mask import coarser_camera, coarser_silhouette
 from posefit.tracking.trajectory import Tracked, mean_cost, with_effort_of, with_total_effort
+from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
 
 RNG_STREAMS = {"hypothesis": 2005, "spin": 450, "back": 1902}  # part of the seed of what is tracked again
 RESTARTS = 8  # searches of the first frame, at most
 MIN_WEIGHT = 0.05  # of a mode of the first frame that is tried
+JOINT_ERROR, ANGLE_ERROR = 0.06, 0.25  # metres along an axis, and radians, that the right one of searched poses is off
 TRIAL_FRAMES = 10  # by which a restart is judged
 TRIAL_STRIDE = 3  # frames between these, so that they show which way the person walks
 TRIAL_ROWS = 240  # pictures have at least so many in which restarts are compared
@@ -104,10 +107,11 @@ def best_restart(
     """Return the task with the best of several restarts as the frame before the first, and all frames of the trial.
 
     Each searches the first usable frame around a mode of what it may show, as many as are likely; or, where nothing is
-    guessed, anywhere, at all yaws where none is known. It then follows the person through a few more
-    frames. The least mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution,
-    and the first frame is then searched once more in the whole one, around the best. A task that is `going_on` is
-    followed beside the restarts, and is returned where none of them is better. `log` takes where they search.
+    guessed, anywhere, at all yaws where none is known. It then follows the person through a few more frames. The least
+    mean cost wins; walking backwards is penalised. Large pictures are compared at a lower resolution, and the first
+    frame is then searched once more in the whole one, around the best. Where there is only one frame, it has the
+    posterior of where all searches ended. A task that is `going_on` is followed beside the restarts, and is returned
+    where none of them is better. `log` takes where they search.
     """
     chosen = usable_observations(observations, TRIAL_FRAMES, TRIAL_STRIDE) or usable_observations(observations, 1)
     factor = max(min(camera.height for camera in task.cameras) // TRIAL_ROWS, 1)
@@ -132,9 +136,12 @@ def best_restart(
         tried += frames
         if (cost := _trial_cost(frames)) < least:
             best, least = after(task, frames[0]), cost
+    posterior = posterior_of(tried) if len(chosen) == 1 else None
     if factor > 1 and best is not (going_on or task):
         tried.append(next(follow(best, chosen[:1], np.random.default_rng([*prefix, restarts]))))
         best = after(task, tried[-1])
+    if posterior is not None and best.before:
+        best = after(task, replace(best.before[-1], posterior=posterior))
     return best, tried
 
 
@@ -146,6 +153,15 @@ def _trial_cost(frames: Sequence[Frame]) -> float:
     path[1] = 0.0
     backwards = np.linalg.norm(path) > WALKED and path @ ahead < 0.0
     return float(np.mean([frame.cost for frame in frames])) * (BACKWARDS_PENALTY if backwards else 1.0)
+
+
+def posterior_of(trials: Sequence[Frame]) -> Posterior:
+    """Return what one frame may show, by the poses at which its searches ended: cheaper ones are likelier."""
+    poses, places = np.array([trial.pose for trial in trials]), np.array([trial.translation for trial in trials])
+    costs = np.array([trial.cost for trial in trials])
+    errors = Recalibration(np.full(len(JOINTS), JOINT_ERROR), np.full(ANGLES, ANGLE_ERROR))
+    weights = np.exp((costs.min() - costs) / TEMPERATURE)
+    return Posterior(poses, places, weights, coherent=True, recalibration=errors)
 
 
 def around(task: Task, mode: Posterior) -> Task:

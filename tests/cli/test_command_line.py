@@ -363,11 +363,11 @@ def installed(kind: str, name: str, folder: Path) -> Callable[..., subprocess.Co
     return called
 
 
-@each("kind", ["optimiser", "prior", "tracker", "segmenter"])
+@each("kind", ["optimiser", "prior", "tracker", "start", "segmenter"])
 @pytest.mark.slow
 def test_a_new_plugin_installs_offline_and_passes_its_own_test(kind: str, tmp_path: Path) -> None:
     called = installed(kind, "my-own", tmp_path)
-    if kind != "segmenter":  # which takes no motion
+    if kind not in ("start", "segmenter"):  # which take no motion
         method = {"optimiser": "my-own", "prior": "@my-own", "tracker": "my-own"}[kind]
         used = called("posefit", "track", "walk", "--method", method, "--frames", "0:3", "--json")
         assert used.returncode == 0, used.stderr
@@ -396,7 +396,7 @@ def test_a_new_plugin_has_names_of_its_own_and_replaces_nothing(tmp_path: Path) 
         (["sapso"], "name must be a new one, got 'sapso', which posefit registers already"),
         *(([name], hidden.format(name)) for name in ("swarm", "reproduce", "envs")),
         (["9 lives"], "name must be small letters"),
-        (["a", "--kind", "camera"], "kind must be one of optimiser, prior, tracker, segmenter, command, got 'camera'"),
+        (["a", "--kind", "camera"], "kind must be one of optimiser, prior, tracker, start, segmenter, command"),
         (["a", "--out", tmp_path / "mine"], "got one that exists"),
     ]:
         assert message in error_of("plugins", "new", "--out", tmp_path / "x", *words)

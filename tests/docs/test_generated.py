@@ -10,7 +10,7 @@ import architecture
 import generator
 import pytest
 from click.testing import CliRunner
-from generator import angles, commands, equations, figures, settings
+from generator import angles, commands, figures, settings
 from generator.prose import restructured, shortened
 
 from posefit import track
@@ -77,13 +77,6 @@ def test_every_column_of_a_sweeps_csv_is_described() -> None:
         assert column in described or column.partition(".")[0] in described or column.startswith("joint_errors_mm."), (
             column
         )
-
-
-def test_every_equation_has_a_line_and_a_test() -> None:
-    tags = {f"{tag.source} {tag.step}": tag for tag in equations.tags()}
-    assert len(tags) > 100
-    assert {tag.source for tag in tags.values()} == set(equations.SOURCES)
-    assert [name for name, tag in tags.items() if not equations.tests_of(tag)] == []
 
 
 def test_every_angle_is_described(tracked: Path) -> None:

@@ -70,13 +70,13 @@ def test_what_cannot_be_driven_is_named() -> None:
 
 @pytest.fixture(scope="module")
 def tracking() -> Any:
-    return gym.make("posefit/Track-v0", instance=17, frames=4, evaluations_per_frame=400)
+    return gym.make("posefit/Track-v0", instance=17, frames=4, evaluations_per_frame=800)
 
 
 def test_a_reference_is_what_a_step_reports_that_commits_and_nearer_than_the_middle_of_the_box(tracking: Any) -> None:
     tracking.reset(seed=0)
     rows = track_reference(tracking)
-    infos = [tracking.step(np.zeros(9))[-1] for _ in range(4 * 400)]
+    infos = [tracking.step(np.zeros(9))[-1] for _ in range(4 * 800)]
     committed = [info for info in infos if "committed_pose" in info]
     assert [row["committed_frame"] for row in rows] == [info["committed_frame"] for info in committed] == [0, 1, 2, 3]
     assert set(rows[0]) == {name for name in committed[0] if name.startswith("committed_")}

@@ -125,6 +125,18 @@ def test_a_search_that_looks_faces_the_right_way(optimiser: str) -> None:
     assert abs(wrapped(fitted.pose[:1] - pose[:1])[0]) < np.radians(30.0)
 
 
+def test_one_image_leaves_open_where_the_searches_of_its_modes_end_and_a_film_does_not() -> None:
+    camera = camera_at(0.0)
+    masks = np.array([observed_by([camera], turned(k)).silhouettes[0].mask for k in (3, 4)])
+    options = {"train": TRAINING, "evaluations": 400, "height": BODY.stature, "camera": camera, "method": "sapso@pca"}
+    fitted = posefit.fit(masks[0], **options)
+    modes = fitted.frame.modes
+    assert sum(mode.weight for mode in modes) == pytest.approx(1.0)
+    assert modes[0].weight == max(mode.weight for mode in modes)
+    assert fitted.summary["modes"] == [round(mode.weight, 6) for mode in modes]
+    assert not any(frame.modes for frame in posefit.track(masks, body_frames=0, **options).frames)
+
+
 def test_an_unknown_start_is_refused_with_those_that_are_known() -> None:
     with pytest.raises(ValueError, match="start must be one of blind, lookup, got 'nowhere'"):
         posefit.fit("walk", method="sapso@pca", settings={"tracker.start": "nowhere"})

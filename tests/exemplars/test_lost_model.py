@@ -140,5 +140,3 @@ def test_evidence_of_a_track(walker: Walk) -> None:
     motion, fit = {"ahead", "speed"}, {"cost", "reflected", "mirrored"}
     assert first == EVIDENCE.keys() - motion
     assert others == [EVIDENCE.keys()] * 3 + [EVIDENCE.keys() - fit] * 2
-    unsampled = walker.track(0, 2, samples=0, evaluations=2440, lag=0, smoothing=0.0)
-    assert [frame.lost for frame in unsampled] == [None, None]

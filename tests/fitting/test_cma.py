@@ -10,7 +10,7 @@ from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.fitting.box import Start, displacement
 from posefit.fitting.cma import CMAES, Strategy
-from posefit.testing.toy import Toy, shell, sphere
+from posefit.testing.toy import Toy, shell
 from tests.cases import each
 
 
@@ -119,16 +119,6 @@ def test_what_leaves_the_box_is_drawn_again_before_it_is_moved_to_its_side() -> 
         assert space.feasible(asked).all()
         assert (asked[:, 0] < 1.0).all()
         optimiser.tell(asked, np.zeros(len(asked)))
-
-
-def test_where_too_few_draws_are_feasible_others_are_moved_until_they_are() -> None:
-    space = Toy(3, shell)
-    optimiser = CMAES(space, np.random.default_rng(0), population_size=40)
-    for _ in range(5):
-        asked = optimiser.ask()
-        assert asked.shape == (40, 3)
-        assert space.feasible(asked).all()
-        optimiser.tell(asked, sphere(asked))
 
 
 @each("wrapping", [1, 2])

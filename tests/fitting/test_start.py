@@ -41,12 +41,6 @@ def test_a_population_is_drawn_from_all_modes_by_their_weights() -> None:
         np.testing.assert_allclose(drawn[rows].std(axis=0), spread, atol=error)
 
 
-def test_one_mode_is_drawn_as_a_prediction_always_was() -> None:
-    start = Start(np.full(3, 0.1), np.full(3, 0.05), np.zeros(3))
-    drawn = draw_population(Toy(3, start=start), np.random.default_rng(7), 10)
-    np.testing.assert_array_equal(drawn, np.random.default_rng(7).normal(start.mean, start.spread, (10, 3)))
-
-
 def test_poses_near_each_other_are_one_mode_with_the_sum_of_their_weights() -> None:
     both = weighted([5, 5, 5], [0.0, 0.05, np.pi], [1.0, 3.0, 4.0])
     modes = modes_apart(WALK.skeleton, both)

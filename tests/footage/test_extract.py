@@ -296,11 +296,11 @@ def test_landmarks_are_kept_at_their_place_in_the_whole_picture(
     filmed: tuple[Path, list[Any]], segmenter: Callable[[str, Any], None]
 ) -> None:
     segmenter("box", Box)
-    masks = Segmentation(Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)).masks()
+    masks = Segmentation(Video.of(filmed[0]), Extraction("box", roi=(20, 10, 120, 100)), (0, 3)).read().masks
     assert masks.landmarks is not None
     assert masks.landmarks.shape == (3, len(JOINTS), 3)
     assert not masks.landmarks[0, :, 2].any()
     np.testing.assert_array_equal(masks.landmarks[1:, 0], [[25.0, 17.0, 0.5]] * 2)
     how = Extraction("box", settings={"wrong": "landmarks"})
     with pytest.raises(BrokenRuleError, match=r"landmarks must be finite numbers of shape \(27, 3\)"):
-        Segmentation(Video.of(filmed[0]), how, (0, 3)).masks()
+        Segmentation(Video.of(filmed[0]), how, (0, 3)).read()

@@ -18,7 +18,7 @@ from posefit.footage.cameras import yaws_of
 from posefit.footage.masks import Views
 from posefit.footage.quality import FrameQuality, apparent_sizes, disagreement, verdict
 from posefit.footage.readers import read_masks
-from posefit.footage.segmentation import Extraction, Segmentation, facings_on_the_spot
+from posefit.footage.segmentation import Extraction, Segmentation, Segmented, facings_on_the_spot
 from posefit.footage.source import scene_of
 from posefit.footage.video import Video
 from posefit.geometry.camera import Camera
@@ -41,10 +41,9 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, lis
     return {kind: composed(folder / f"{kind}.avi", kind, places) for kind in ("passing", "leaving", *ALWAYS)}
 
 
-def segmented(path: Path, how: Extraction, frames: Any = (None, None)) -> tuple[Segmentation, list[Any]]:
-    segmentation = Segmentation(Video.of(path), how, frames)
-    packed = segmentation.masks()
-    return segmentation, [packed.silhouette(k).mask for k in range(len(packed))]
+def segmented(path: Path, how: Extraction, frames: Any = (None, None)) -> tuple[Segmented, list[Any]]:
+    result = Segmentation(Video.of(path), how, frames).read()
+    return result, [result.masks.silhouette(k).mask for k in range(len(result.masks))]
 
 
 def overlap(masks: list[Any], true: list[Any]) -> float:
@@ -110,10 +109,9 @@ def test_where_a_network_is_installed_the_segmenter_that_is_not_doubted_takes_th
 def test_with_an_empty_picture_the_person_is_segmented_whatever_they_do(films: dict[str, Any], kind: Kind) -> None:
     path, true = films[kind]
     segmentation, masks = segmented(path, Extraction(background=str(path.with_name("empty.png"))))
-    assert segmentation.method == "mean"
     assert overlap(masks, true) > 0.8
     assert segmentation.verdict is None
-    assert segmentation.summary["usable"] >= 49  # of 60; a person who leaves is not whole in the last 11
+    assert segmentation.masks.usable.sum() >= 49  # of 60; a person who leaves is not whole in the last 11
 
 
 @each("method", ["mixture", "median"])
@@ -122,7 +120,7 @@ def test_a_person_who_passes_by_causes_no_warning(films: dict[str, Any], method:
     segmentation, masks = segmented(path, Extraction(method))
     assert overlap(masks, true) > 0.8
     assert segmentation.warnings == []
-    assert segmentation.summary["usable"] > 55
+    assert segmentation.masks.usable.sum() > 55
 
 
 @mediapipe
@@ -140,7 +138,7 @@ def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_i
     walker, jumper = ((0, 420, 1520, 532), (55, 166)), ((380, 0, 600, 450), (0, 160))
     segmentation, masks = segmented(DEMO, Extraction(roi=walker[0]), walker[1])
     assert segmentation.warnings == []
-    assert segmentation.summary["usable"] >= 110
+    assert segmentation.masks.usable.sum() >= 110
     assert segmented(DEMO, Extraction("median", roi=walker[0]), walker[1])[0].warnings == []
     verdict = segmented(DEMO, Extraction(roi=jumper[0]), jumper[1])[0].verdict
     assert verdict is not None
@@ -151,7 +149,7 @@ def test_of_two_real_people_the_one_who_passes_is_good_and_the_one_on_the_spot_i
         assert np.mean([iou(first, second) for first, second in zip(masks, others, strict=True)]) > 0.75
         segmentation, _ = segmented(DEMO, Extraction("mediapipe", roi=jumper[0]), jumper[1])
         assert segmentation.verdict is None
-        assert segmentation.summary["usable"] > 150
+        assert segmentation.masks.usable.sum() > 150
 
 
 def figure(shift: int = 0, tall: int = 60, wide: int = 22) -> tuple[Any, Any]:
@@ -214,7 +212,7 @@ def test_before_a_camera_that_pans_masks_that_need_no_still_background_are_usabl
     for still, usable in ((True, 1), (False, 24)):  # of the first there is none before
         segmenter("network", Network, still_background=still)
         segmentation, _ = segmented(path, Extraction("network"))
-        assert segmentation.usable.sum() == usable
+        assert segmentation.masks.usable.sum() == usable
         assert segmentation.camera_moves
         assert any("outside" in text for text in segmentation.warnings) == still
 
@@ -319,11 +317,11 @@ def test_a_segmenter_gets_the_roi_alone_and_its_masks_are_put_there(
     filmed: tuple[Path, list[Any]], segmenter: Callable[..., None]
 ) -> None:
     segmenter("box", Box)
-    segmentation, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
+    _, masks = segmented(filmed[0], Extraction("box", roi=(40, 10, 80, 100)), (0, 4))
     assert masks[0].shape == (120, 160)
     rows, columns = np.flatnonzero(masks[0].any(axis=1)), np.flatnonzero(masks[0].any(axis=0))
     assert (rows[0], columns[0], columns[-1]) == (30, 45, 57)
-    assert segmentation.summary["frames"] == 4
+    assert len(masks) == 4
 
 
 def test_a_segmenter_that_breaks_a_rule_is_named(

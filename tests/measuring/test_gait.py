@@ -110,6 +110,8 @@ def test_steps_that_touch_an_unknown_frame_count_for_nothing() -> None:
     assert [step.stance_share is not None for step in holed.steps][:3] == [False, False, True]
     assert figures(holed) == pytest.approx(figures(whole), rel=0.01)
     assert figures(gait_of(motion, range(len(motion)))) == [None] * 6
+    strikes = [step.strike_seconds for step in gait_of(motion, {89, 90, 91}).steps]
+    assert strikes == pytest.approx([0.3, 1.5, 2.1, 2.7, 3.3, 3.9], abs=0.02)
 
 
 def test_two_steps_are_enough_though_no_stride_is_whole() -> None:
@@ -160,11 +162,8 @@ def test_left_and_right_of_a_limp_are_apart(lengths: tuple[float, float], second
         assert foot.stride_length == pytest.approx(sum(lengths), abs=0.01)
         assert foot.stance_share == pytest.approx(STANCE, abs=0.03)
     assert gait.left.steps + gait.right.steps == gait.as_dict()["steps"] >= 8
-
-
-def test_the_line_of_a_limp_has_both_sides() -> None:
-    expected = "left and right: step -0.05 and 0.47 m, step 0.50 and 0.70 s, stance "
-    assert expected in gait_line(gait_of(limping(*LIMPS[0])).as_dict())
+    if lengths == LIMPS[0][0]:
+        assert "left and right: step -0.05 and 0.47 m, step 0.50 and 0.70 s, stance " in gait_line(gait.as_dict())
 
 
 @each(("lengths", "seconds"), LIMPS)
@@ -201,11 +200,6 @@ def test_a_stride_of_the_knee_is_that_between_two_strikes() -> None:
     assert np.diff(curves["left"]) == pytest.approx(0.24, abs=0.01)  # 120 frames a stride
     assert curves["left"][:, 0] - curves["right"][0, 0] == pytest.approx([16.0, 40.0, 64.0], abs=1.0)
     assert np.ptp(curves["right"]) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_strike_in_an_unknown_frame_does_not_count() -> None:
-    strikes = [step.strike_seconds for step in gait_of(walker(), {89, 90, 91}).steps]
-    assert strikes == pytest.approx([0.3, 1.5, 2.1, 2.7, 3.3, 3.9], abs=0.02)
 
 
 def test_the_filter_passes_low_frequencies_without_a_shift() -> None:

@@ -17,7 +17,7 @@ CELL = replace(FIRST, method="random@pca", frames=3, size=(80, 60), evaluations=
 @pytest.fixture(scope="module")
 def row():
     """Return the row of a method that has a posterior, with the floor of a prior, which it has not."""
-    row = run_cell(replace(CELL, method="exemplars", evaluations=300)).row
+    row = run_cell(replace(CELL, method="exemplars", evaluations=800)).row
     return {**row, "prior_floor_degrees": run_cell(CELL).row["prior_floor_degrees"]}
 
 

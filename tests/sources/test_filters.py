@@ -1,7 +1,5 @@
 """Gordon et al. 1993 and Deutscher and Reid 2005: each step by hand, by law, or against a Kalman filter."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -127,4 +125,3 @@ def test_a_frames_particles_are_carried_into_a_box_that_has_moved() -> None:
     particle.tell(particle.ask(), np.zeros(500))
     particle.advance(Moved(2))
     np.testing.assert_allclose(particle.ask(), 0.25, atol=1e-6)
-    assert replace(space, start=None).start is None

@@ -41,9 +41,3 @@ def test_ways_are_drawn_as_often_as_they_are_likely() -> None:  # GODSILL2004 (s
         # a sum of 287 squares: its mean is 287, its standard deviation the root of 574, 24
         assert abs(chi - (len(costs) - 1)) < 3 * 24
         assert sum(came.values()) == count
-
-
-def test_a_way_begins_anew_where_nothing_came_before() -> None:
-    one, rng = model(2), np.random.default_rng(0)
-    first = sample_states(one.frames[:1], None, Sampling(50_000, 1.0), rng)
-    np.testing.assert_allclose(np.bincount(first) / 50_000, one.frames[0].forward, atol=0.01)

@@ -195,25 +195,19 @@ def test_fusing_is_the_mean_over_the_models() -> None:  # VSMM 6.5
 
 def test_a_34_dimensional_residual_of_60_pixels_leaves_probabilities() -> None:  # Interpretation V13
     still = Linear(np.eye(34), np.eye(34))
-    imm = imm_of([still, still, still], np.full((3, 3), 1.0 / 3.0))
-    offsets = np.array([60.0, 55.0, 70.0])
-    belief = Belief(
-        np.tile(offsets[:, None], (1, 34)),
-        np.tile(0.01 * np.eye(34), (3, 1, 1)),
-        np.log(np.full(3, 1 / 3)),
-        np.zeros(3),
-    )
-    keep = imm_of([still, still, still], np.eye(3))  # no mixing: each model stays as far off as it is
+    states, covariances = np.outer([60.0, 55.0, 70.0], np.ones(34)), np.tile(0.01 * np.eye(34), (3, 1, 1))
+    belief = Belief(states, covariances, np.log(np.full(3, 1 / 3)), np.zeros(3))
 
     def measure(states: Array) -> Measurement:
         return Measurement(-states, np.tile(np.eye(34), (3, 1, 1)), np.eye(34))
 
-    after = keep.cycle(belief, measure)
+    # no mixing: each model stays as far off as it is
+    after = imm_of([still] * 3, np.eye(3)).cycle(belief, measure)
     assert (after.log_likelihoods < -745.0).all()  # exp() of it is 0
     assert np.isfinite(after.probabilities).all()
     assert after.probabilities.sum() == pytest.approx(1.0)
     assert after.probabilities.argmax() == 1
-    assert np.isfinite(imm.cycle(belief, measure).states).all()
+    assert np.isfinite(imm_of([still] * 3, np.full((3, 3), 1 / 3)).cycle(belief, measure).states).all()
 
 
 def plus(state: Array, error: Array) -> Array:

@@ -82,6 +82,23 @@ def test_scores_follow_from_the_traces() -> None:
     assert score.running_times[16.0] == (pytest.approx(used / count) if count else None)
 
 
+def test_methods_that_look_are_marked_and_stand_after_those_that_search_blind() -> None:
+    runs = []
+    for function in (2, 3, 4, 5):
+        for looks in (True, False):
+            problem = posefit.suite(function=function, dimension=10 if function == 5 else 9, budget=1)
+            views = problem.look() if looks else []
+            problem(problem.made.truth if looks else np.zeros(problem.dimension))
+            runs.append(run_of(problem, "mine"))
+            for camera, mask in (view for frame in views for view in frame):
+                assert mask.shape == (camera.height, camera.width)
+                assert mask.any()
+            assert [len(frame) for frame in views] == {2: [1], 3: [2], 4: [1], 5: [1] * 8}[function] * looks
+    for dimension in (9, 10):
+        named = [(score.method, score.looked) for score in suite_scores(runs) if score.dimension == dimension]
+        assert named == [("mine", False), ("mine (looks)", True)] * (len(named) // 2)
+
+
 @each("infeasible", ["repair", "reject", "penalise"])
 def test_any_loop_makes_a_run_whose_improvements_cost_the_same_again(infeasible: Any) -> None:
     problem = posefit.suite(function=1, instance=10_000, budget=200, infeasible=infeasible)

@@ -1,4 +1,4 @@
-"""Optimisers, priors and trackers that each break one rule on purpose. The kit has to find every one of them."""
+"""Optimisers, priors, trackers and starts that each break one rule on purpose. The kit has to find every one of them."""
 
 import ctypes
 import os
@@ -17,6 +17,7 @@ from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.motion import built_in
 from posefit.silhouette.cost import project
+from posefit.uncertainty.modes import Posterior
 from posefit_filters.annealed import Annealed
 from posefit_priors.pca import PCA
 
@@ -443,8 +444,49 @@ class Remembers(Holds, breaks="used_twice"):
         yield from super().track(observations, rng)
 
 
+class Guesses(Planted):
+    """A start that guesses the first training pose, which faces right; each below spoils one thing."""
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.pose = np.concatenate([np.zeros(3), task.training[0].poses[0, 3:]])
+
+    def posterior(self, observation: Any) -> Any:
+        return Posterior(self.pose[None], np.zeros((1, 3)), np.ones(1))
+
+
+class GivesAPose(Guesses, breaks="posterior"):
+    def posterior(self, observation: Any) -> Any:
+        return self.pose
+
+
+class NeedsTheWholePerson(Guesses, breaks="several_views"):
+    def posterior(self, observation: Any) -> Any:
+        if not np.isfinite(observation.silhouettes[0].extent).all():
+            raise IndexError("no border")
+        return super().posterior(observation)
+
+
+class TurnsAfterEach(Guesses, breaks="same_again"):
+    def posterior(self, observation: Any) -> Any:
+        self.pose = self.pose + 0.01
+        return super().posterior(observation)
+
+
+class DrawsGlobally(Guesses, breaks="global_randomness"):
+    def posterior(self, observation: Any) -> Any:
+        np.random.random()  # noqa: NPY002
+        return super().posterior(observation)
+
+
+class FacesTheSide(Guesses, breaks="gain"):
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        self.pose[0] += 0.5 * np.pi
+
+
 RIGHT: tuple[type, ...] = (Sound, KnowsItsRows)
-OPTIMISERS, PRIORS, TRACKERS = (
-    [kind for kind in base.__subclasses__() if kind.breaks] for base in (Sound, Learned, Holds)
+OPTIMISERS, PRIORS, TRACKERS, STARTS = (
+    [kind for kind in base.__subclasses__() if kind.breaks] for base in (Sound, Learned, Holds, Guesses)
 )
 APART = [kind for kind in Sound.__subclasses__() if kind.ends]  # what only a process of its own survives

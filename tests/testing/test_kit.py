@@ -10,7 +10,7 @@ import pytest
 from posefit.arrays import Array
 from posefit.fitting.tracker import Prediction, SynthesisTracker, Task
 from posefit.registry import registry
-from posefit.testing import check_optimiser, check_prior, check_tracker, checks_of, results, run_checks
+from posefit.testing import check_optimiser, check_prior, check_start, check_tracker, checks_of, results, run_checks
 from posefit_priors.pca import PCA
 from posefit_swarm.random import Random
 from posefit_swarm.sapso import SAPSO
@@ -77,6 +77,8 @@ def test_it_passes_sound_plugins() -> None:
     # once for all rules, once more for `same_again` and `silence`, three times for what `bad_input` has refused
     assert planted.Unhurried.fits <= 6
     assert check_tracker(planted.Holds)
+    assert check_start(planted.Guesses)
+    assert check_start(registry().offer("start", "lookup").factory)
 
 
 def test_it_fails_each_bug_planted_in_an_optimiser(monkeypatch: Any) -> None:
@@ -87,9 +89,10 @@ def test_it_fails_each_bug_planted_in_an_optimiser(monkeypatch: Any) -> None:
         assert {check.run().outcome for check in wanted} == {"failed"}, bug
 
 
-def test_it_fails_each_bug_planted_in_a_tracker() -> None:
-    for bug in planted.TRACKERS:
-        assert set(bug.breaks) <= {result.name for result in check_tracker(bug).of("failed")}, bug
+def test_it_fails_each_bug_planted_in_a_tracker_or_a_start() -> None:
+    for check, bugs in ((check_tracker, planted.TRACKERS), (check_start, planted.STARTS)):
+        for bug in bugs:
+            assert set(bug.breaks) <= {result.name for result in check(bug).of("failed")}, bug
 
 
 @pytest.mark.slow

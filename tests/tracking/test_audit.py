@@ -52,7 +52,7 @@ def test_an_honest_tracker_is_left_as_it_is() -> None:
 @each(
     ("kind", "warning"),
     [
-        (planted.SpendsAndSaysSo, "frame 0 must use at most 400 evaluations, got 20,000 (12 such frames)"),
+        (planted.SpendsAndSaysSo, "frame 0 must use at most 800 evaluations, got 20,000 (12 such frames)"),
         (planted.SpendsInSecret, "frame 0 must say how many poses it drew, 20,001, got 100 (12 such frames)"),
         (reporting(cost=0.0, trace=np.zeros((1, 2))), ", got 0 (12 such frames)"),
         (reporting(areas=np.array([[0, 0, 100]])), ", got [[0, 0, 100]] (12 such frames)"),

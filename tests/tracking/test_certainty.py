@@ -1,6 +1,5 @@
 """How certain a track is: measures by hand, blank fields, sentences, and modes."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from posefit.output.folder import OutputFolder
 from posefit.output.text import table
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
-from tests.files import arrays
+from tests.files import arrays, csv_rows
 from tests.tracking.scenes import MAXWELL, SPREAD, exact_frames, tracked, truth_of, uncertain_frames, walk
 
 FRAMES = 6
@@ -93,7 +92,7 @@ def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:
             replace(frames[0], lost=lost)
 
 
-def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_table(
+def test_held_and_lost_frames_are_blank_for_other_programs_and_have_their_numbers_as_filmed(
     scene: Scene, tmp_path: Path
 ) -> None:
     observations = list(scene.observations)
@@ -102,25 +101,26 @@ def test_held_and_lost_frames_are_blank_for_other_programs_and_marked_in_the_tab
     frames = [replace(frame, lost=0.9 if k == 4 else 0.1) for k, frame in enumerate(frames)]
     folder = tmp_path / "out"
     with OutputFolder(folder, False, False, {}, print) as output:
-        result = tracked(replace(scene, observations=observations), frames, output)
+        result = tracked(replace(scene, observations=observations, first=100), frames, output)
+    assert result.unseen == {101, 104}
+    assert np.flatnonzero(np.isnan(result.angles("left_knee_flexion"))).tolist() == [1, 4]
     markers = [line.split("\t") for line in (folder / "track.trc").read_text().splitlines()[6:]]
     assert [len(marker) for marker in markers] == [2 + 81] * FRAMES
-    assert [k for k, marker in enumerate(markers) if set(marker[2:]) == {""}] == [1, 4]
+    assert [marker[0] for marker in markers if set(marker[2:]) == {""}] == ["102", "105"]  # which count from 1
     assert all("" not in marker for k, marker in enumerate(markers) if k not in (1, 4))
-    tables = {}
     for name, column in (("frames", "left_knee_x"), ("angles", "left_knee_flexion")):
-        with (folder / f"{name}.csv").open(newline="") as file:
-            tables[name] = list(csv.DictReader(file))
-        assert [k for k, row in enumerate(tables[name]) if row[column] == ""] == [1, 4]
-    assert [row["usable"] for row in tables["frames"]] == ["1.0", "0.0", "1.0", "1.0", "1.0", "1.0"]
-    assert [row["lost"] for row in tables["frames"]] == ["0.1", "0.1", "0.1", "0.1", "0.9", "0.1"]
+        rows = csv_rows(folder / f"{name}.csv")
+        assert [row["frame"] for row in rows if row[column] == ""] == ["101", "104"]
+    rows = csv_rows(folder / "frames.csv")
+    assert [row["usable"] for row in rows] == ["1.0", "0.0", "1.0", "1.0", "1.0", "1.0"]
+    assert [row["lost"] for row in rows] == ["0.1", "0.1", "0.1", "0.1", "0.9", "0.1"]
     stored = arrays(folder / "poses.npz")
     assert stored["levels"].tolist() == [0.5, 0.8, 0.95]
     assert stored["angle_halves"].shape == (FRAMES, 3, 66)
     np.testing.assert_allclose(stored["joint_radii"][0, :, 1], 0.02 * np.array([*MAXWELL.values()]), atol=5e-4)
     summary = json.loads((folder / "summary.json").read_text())
-    assert summary["unknown_sides"] == [2, 3, 4]
-    assert summary["lost_frames"] == [4]
+    assert summary["unknown_sides"] == [102, 103, 104]
+    assert summary["lost_frames"] == [104]
     assert summary["lost_flagged_rate"] == pytest.approx(1 / 6)
     assert "\nleft and right: unknown in 3 of 6 frames; 1 frame lost\n" in table(result.content)
 
@@ -162,17 +162,3 @@ def test_a_resumed_track_keeps_the_certainty_of_its_first_part(scene: Scene, tmp
         np.testing.assert_allclose(estimate.posterior.poses, frame.posterior.poses, atol=1e-6)
         assert estimate.posterior.recalibration is not None
         np.testing.assert_array_equal(estimate.posterior.recalibration.joint_spreads, SPREAD.joint_spreads)
-
-
-def test_frames_of_which_nothing_is_known_have_their_numbers_as_filmed(scene: Scene, tmp_path: Path) -> None:
-    frames = [replace(frame, lost=0.9 if k == 4 else 0.1) for k, frame in enumerate(exact_frames(scene))]
-    later = replace(scene, first=100)
-    track = tracked(later, frames)
-    assert track.unseen == {104} == set(track.log.lost_frames or ())
-    assert np.flatnonzero(np.isnan(track.angles("left_knee_flexion"))).tolist() == [4]
-    track.save(tmp_path / "out")
-    for name, column in (("frames", "left_knee_x"), ("angles", "left_knee_flexion")):
-        with (tmp_path / "out" / f"{name}.csv").open(newline="") as file:
-            assert [row["frame"] for row in csv.DictReader(file) if row[column] == ""] == ["104"]
-    markers = [line.split("\t") for line in (tmp_path / "out" / "track.trc").read_text().splitlines()[6:]]
-    assert [marker[0] for marker in markers if set(marker[2:]) == {""}] == ["105"]  # which counts from 1

@@ -143,17 +143,17 @@ def test_guesses_do_not_contradict_what_is_known() -> None:
     assert given == [(SEARCHED_AGAIN, task)] * 5
 
 
-@each("method", [{}, {"method": "vsmm"}, {"method": "exemplars"}, {"method": "annealed"}])
+@each("method", [{}, {"method": "vsmm"}, {"method": "exemplars", "evaluations": 800}, {"method": "annealed"}])
 def test_the_evaluations_of_all_hypotheses_are_counted(method: dict[str, Any]) -> None:
-    drawn = PoseCount()
+    drawn, options = PoseCount(), {**QUICK, **method}
     with drawn.counting():
-        track = posefit.track("walk", hypotheses=3, view_degrees=90.0, **method, **QUICK)
-    single = posefit.track("walk", view_degrees=90.0, **method, **QUICK)
+        track = posefit.track("walk", hypotheses=3, view_degrees=90.0, **options)
+    single = posefit.track("walk", view_degrees=90.0, **options)
     summary, hypotheses = track.summary, track.summary["hypotheses"]
     assert summary["warnings"] == []
     assert summary["evaluations"] == track.table["evaluations"].sum() <= drawn.poses
     assert summary["evaluations"] > 2 * single.summary["evaluations"]
-    assert summary["evaluations_per_frame"] == 400
+    assert summary["evaluations_per_frame"] == options["evaluations"]
     totals = [hypothesis["cost"] + hypothesis["motion"] for hypothesis in hypotheses]
     assert [hypothesis["kept"] for hypothesis in hypotheses] == [k == np.argmin(totals) for k in range(3)]
     assert hypotheses[int(np.argmin(totals))]["cost"] == pytest.approx(summary["cost"])

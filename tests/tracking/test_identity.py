@@ -1,6 +1,5 @@
 """A track goes on that ended too early, where its arguments have the same content, whatever the objects are."""
 
-import csv
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from posefit.motion import built_in
 from posefit.output.folder import OutputFolder
 from posefit.output.identity import digest_of
 from tests.cases import each
+from tests.files import csv_rows
 from tests.fuzz.written import SPEC, mended, written
 from tests.tracking.scenes import stopping
 
@@ -40,8 +40,7 @@ def test_a_track_goes_on_as_if_it_had_not_ended_too_early(method: str, tmp_path:
         assert after.details.keys() == before.details.keys()
     first, again = (track.frames[0].details.get("probabilities", 0.0) for track in (whole, resumed))
     np.testing.assert_array_equal(first, again)
-    with (tmp_path / "out" / "frames.csv").open(newline="") as file:
-        activities = [row["activity"] for row in csv.DictReader(file)]
+    activities = [row["activity"] for row in csv_rows(tmp_path / "out" / "frames.csv")]
     assert [activity or None for activity in activities] == resumed.activity
     assert (None in resumed.activity) == (method == "sapso")
 

@@ -20,7 +20,7 @@ from posefit.silhouette.drawn import PoseCount
 from posefit.silhouette.mask import Silhouette
 from posefit.tracking.initialise import fitted_build, task_of
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.restarts import best_restart, first_shown_whole
+from posefit.tracking.restarts import best_restart, first_shown_whole, posterior_of
 from posefit.uncertainty.modes import Posterior
 from posefit_exemplars.lookup import Lookup
 from tests.cases import each
@@ -197,3 +197,9 @@ def test_footage_without_a_truth_needs_no_angles_of_the_whole_library(monkeypatc
     masks = [observation.silhouettes[0].mask for observation in scene.observations]
     track = posefit.track(masks, method="vsmm", evaluations=80, restarts=1, body_frames=0, smooth=False)
     assert track.truth is None
+
+
+def test_where_searches_of_one_image_end_is_as_likely_as_it_is_cheap() -> None:
+    trials = [Frame(np.zeros(66), np.zeros(3), cost, np.ones((1, 3), dtype=np.int64), 40) for cost in (3.0, 1.0, 5.0)]
+    shares = np.exp([-1.0, 0.0, -2.0])  # two of cost are a factor of e
+    np.testing.assert_allclose(posterior_of(trials).weights, shares / shares.sum())

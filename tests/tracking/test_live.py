@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import cv2
 import numpy as np
@@ -15,7 +16,7 @@ import pytest
 from posefit.errors import InputError
 from posefit.fitting.tracker import SynthesisTracker
 from posefit.footage import live
-from posefit.footage.live import LiveImage, Stream, live_masks, netpbm_images
+from posefit.footage.live import Stream, live_masks, netpbm_images
 from posefit.footage.segmentation import Extraction
 from posefit.geometry.body import Body
 from posefit.geometry.calibration import Calibration
@@ -204,50 +205,50 @@ def test_what_a_stream_does_not_state_is_logged_and_the_unit_of_its_calibration_
     [
         ({"hypotheses": 2}, "hypotheses must be left out with live, got 2"),
         ({"smooth": True}, "smooth must be left out with live, got True"),
-    ],
-)
-def test_options_that_need_all_frames_are_refused(options, expected):
-    with pytest.raises(InputError, match=expected):
-        next(track_live(**options))
-
-
-@each(
-    "options, expected",
-    [
         ({"extraction": Extraction("median")}, "extraction must be given for video only, got .* for masks"),
         ({"unit": "cm"}, "unit must be given for calibrations and files of motions only, got 'cm' for masks"),
         ({"up": "z"}, "up must be given for calibrations and files of motions only, got 'z' for masks"),
     ],
 )
-def test_options_that_masks_have_no_use_for_are_refused(options, expected, monkeypatch, every_frame, walk):
+def test_what_a_stream_of_masks_cannot_be_tracked_with_is_refused(options, expected, monkeypatch, every_frame, walk):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"".join(map(pgm, walk[:8])))))
     with pytest.raises(InputError, match=expected):
         next(track_live(**QUICK, **options))
 
 
 def test_images_of_another_size_are_refused(every_frame, walk):
-    stream = Stream("-", io.BytesIO(pgm(walk[0]) + pgm(walk[0][:60])))
-    masks = live_masks(stream, None, lambda _: None)
-    assert isinstance(next(masks).source, LiveImage)
+    masks = live_masks(Stream("-", io.BytesIO(pgm(walk[0]) + pgm(walk[0][:60]))), None, lambda _: None)
+    assert next(masks).source.number == 0
     with pytest.raises(InputError, match="expected frames of 160x120, got 160x60"):
         next(masks)
+
+
+IMPATIENT = """
+import posefit.footage.live as footage, posefit.tracking.live as tracking
+from posefit.cli import run
+def impatient(frame, row=tracking.LiveFrame.row.fget):
+    footage.STALL_SECONDS = 0.5
+    return row(frame)
+footage.STALL_SECONDS, tracking.LiveFrame.row = 600.0, property(impatient)
+run()
+"""  # which waits for as long as it has to until a frame is tracked, and not for long from then on
 
 
 def test_a_pipe_that_pauses_ends_the_process_with_one_line_and_keeps_its_frames(walk, tmp_path):
     out = tmp_path / "out"
     words = ["track", "--live", "-", "--out", out, "--evaluations", 80, "--restarts", 1]
-    script = "import posefit.footage.live as live; live.STALL_SECONDS = 20.0; from posefit.cli import run; run()"
-    command = [sys.executable, "-c", script, *map(str, words), "--view-degrees", "45"]
+    command = [sys.executable, "-c", IMPATIENT, *map(str, words), "--view-degrees", "45"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=False) as process:
         lines = out / "frames.jsonl"
         while process.poll() is None and not (lines.exists() and lines.stat().st_size):  # a frame is tracked
-            process.stdin.write(pgm(walk[0]))
-            process.stdin.flush()
+            with suppress(BrokenPipeError):  # it may have ended meanwhile
+                process.stdin.write(pgm(walk[0]))
+                process.stdin.flush()
             time.sleep(0.02)  # and the pipe stays open
         errors = process.stderr.read().decode()
         status = process.wait()
     assert status == 2, errors
-    assert errors.splitlines()[-1] == "posefit: -: expected a frame, got none for 20 s"
+    assert errors.splitlines()[-1] == "posefit: -: expected a frame, got none for 0.5 s"
     assert "Traceback" not in errors
     rows = (out / "frames.jsonl").read_text().splitlines()
     assert len(np.load(out / "poses.npz")["poses"]) == len(rows) > 0

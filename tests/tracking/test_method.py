@@ -197,12 +197,6 @@ def test_every_default_is_completed(motion: Any, options: dict[str, Any], **expe
     assert completed(done, motion) == done
 
 
-def test_what_is_the_default_may_be_given() -> None:
-    brief: dict[str, Any] = {"frames": (0, 2), "evaluations": 80, "size": (80, 60)}
-    default, given = posefit.track("walk", **brief), posefit.track("walk", restarts=0, **brief)
-    np.testing.assert_array_equal(given.motion.poses, default.motion.poses)
-
-
 def test_footage_is_searched_where_the_tracker_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     without = replace(registry(), plugins=tuple(plugin for plugin in registry().plugins if plugin.name != "exemplars"))
     monkeypatch.setattr(method, "registry", lambda: without)
@@ -215,12 +209,12 @@ def test_masks_are_followed_through_the_library_once_and_a_build_is_fitted(tmp_p
     scene, log = scene_of(["09_01"], frames=(0, 8), size=(120, 90)), list[str]()
     masks = [observation.silhouettes[0].mask for observation in scene.observations]
     np.savez(tmp_path / "masks.npz", masks=masks)
-    track = posefit.track(tmp_path / "masks.npz", evaluations=400, body_frames=5, progress=Progress(log.append))
+    track = posefit.track(tmp_path / "masks.npz", evaluations=800, body_frames=5, progress=Progress(log.append))
     assert track.summary["method"] == "exemplars"
     assert track.summary["train"] == [clip.name for clip in recorded.clips()]
     assert track.summary["build"] is not None
     assert not any("looking for the first pose" in line for line in log)
     assert "fitting the person's build to 5 frames" in log
     more = {"train": ["walk-a"], "restarts": 1, "body_frames": 0}
-    posefit.track(tmp_path / "masks.npz", evaluations=400, progress=Progress(log.append), **more)
+    posefit.track(tmp_path / "masks.npz", evaluations=800, progress=Progress(log.append), **more)
     assert "looking for the first pose around 1 pose with such a silhouette" in log

@@ -86,19 +86,17 @@ def test_stances_at_two_heights_are_half_of_that_apart() -> None:
     assert stance_spread(joints[:8], stands[:8]) is None
 
 
-def test_frames_before_the_person_comes_and_after_they_have_gone_are_not_held() -> None:
-    usable = np.array([0, 0, 1, 0, 1, 1, 0, 0], dtype=bool)
-    assert held_share(usable, ~ALL[:8]) == 0.25
-    assert held_share(~ALL, ~ALL) == 1.0
-
-
-def test_frames_in_which_the_person_is_out_of_the_picture_are_not_held() -> None:
-    usable = np.array([1, 1, 0, 0, 0, 1, 1, 0, 1, 1], dtype=bool)
-    cut = np.zeros(10, dtype=bool)
-    cut[3] = True  # in the middle of a gap: no mask beside it says that the person left
-    assert held_share(usable, cut) == 0.4
-    cut[2] = True
-    assert held_share(usable, cut) == 0.1
+@each(
+    ("usable", "cut", "held"),
+    [
+        ("00101100", "00000000", 0.25),  # nobody is missed before the person comes and after they have gone
+        ("00000000", "00000000", 1.0),
+        ("1100011011", "0001000000", 0.4),  # in the middle of a gap no mask beside it says that the person left
+        ("1100011011", "0011000000", 0.1),  # they are out of the picture
+    ],
+)
+def test_frames_between_others_that_show_too_little_are_held(usable: str, cut: str, held: float) -> None:
+    assert held_share(*(np.array([*digits]) == "1" for digits in (usable, cut))) == held
 
 
 def test_a_body_covers_half_of_what_moves() -> None:

@@ -1,0 +1,153 @@
+"""Is a start right: weighted poses or None for whatever a camera shows, the same again, and does a search gain?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from posefit.fitting.box import draw_population
+from posefit.fitting.problem import PoseProblem
+from posefit.fitting.space import SearchSpace
+from posefit.fitting.start import modes_apart, start_in
+from posefit.fitting.tracker import Initialiser, Observation, Task
+from posefit.geometry.camera import Camera
+from posefit.registry import registry
+from posefit.silhouette.cost import project
+from posefit.silhouette.mask import Silhouette
+from posefit.testing import common
+from posefit.testing.common import PluginCase, check_speed, unchanged
+from posefit.testing.problem import SIZE, walking_angles
+from posefit.testing.results import SkippedError, expect
+from posefit.testing.tracker_rules import scene
+from posefit.uncertainty.modes import Posterior
+
+FRAMES, DISTANCE = (0, 4, 8), 5.0  # of the walk, and of its camera, metres
+POPULATION = 40
+MAX_SECONDS = 2.0  # for a frame
+
+
+@lru_cache(maxsize=1)
+def images() -> tuple[Task, Sequence[Observation]]:
+    """Return a task whose first yaw is unknown, and what one camera shows of three frames of the built-in walk."""
+    task, motion, _ = scene()
+    camera = Camera.around(motion.translations[0], 0.8, DISTANCE, SIZE)
+    masks = [project(task.body, camera, motion.poses[k], motion.translations[k]) for k in FRAMES]
+    observations = [Observation([Silhouette.of(mask)]) for mask in masks]
+    return replace(task, cameras=[camera], yaw=None, translation="aligned"), observations
+
+
+@dataclass(frozen=True)
+class Case(PluginCase):
+    """A start's factory with its settings."""
+
+    arguments = ("task",)
+
+    def build(self, task: Task | None = None, **more: Any) -> Initialiser:
+        """Return a new start of the task."""
+        start: Initialiser = self.factory(task or images()[0], **{**self.settings, **more})
+        return start
+
+    def use(self, **more: Any) -> object:
+        """Guess the poses of a frame."""
+        return self.build(**more).posterior(images()[1][0])
+
+    @cached_property
+    def first(self) -> list[Posterior | None]:
+        """What a start guesses of each frame, once for all rules."""
+        start = self.build()
+        return [start.posterior(observation) for observation in images()[1]]
+
+
+def _check_guess(guess: Posterior | None) -> None:
+    expect(guess is None or isinstance(guess, Posterior), f"it must be a Posterior or None, got {type(guess).__name__}")
+    if guess is not None:
+        finite = np.isfinite(guess.poses).all() and np.isfinite(guess.translations).all()
+        expect(finite, "poses and translations must be finite, got nan or infinity")
+
+
+def posterior(case: Case) -> str:
+    """A frame gives a Posterior of finite poses, or None."""
+    for guess in case.first:
+        _check_guess(guess)
+    return f"{', '.join('none' if guess is None else str(len(guess)) for guess in case.first)} poses of a frame"
+
+
+def several_views(case: Case) -> None:
+    """Cameras that show a part of the person, or nothing, and several of them, are no reason to fail."""
+    task, (observation, *_) = images()
+    (near,), parts = scene()[0].cameras, scene()[2][0].silhouettes  # which the feet are below
+    whole, empty = observation.silhouettes, [Silhouette.of(np.zeros(SIZE[::-1], dtype=bool))]
+    for cameras, shown in (
+        ([near], parts),
+        ([*task.cameras, near], [*whole, *parts]),
+        ([near, near], [*parts, *empty]),
+    ):
+        _check_guess(case.build(replace(task, cameras=cameras)).posterior(Observation(shown)))
+
+
+def same_again(case: Case) -> None:
+    """The same frame gives the same poses and weights."""
+    start = case.build()
+    for observation in [images()[1][-1], *images()[1]]:  # whatever came before
+        guess = start.posterior(observation)
+    again, first = guess, case.first[-1]
+    same = again is first is None or (
+        again is not None
+        and first is not None
+        and np.array_equal(again.poses, first.poses)
+        and np.array_equal(again.weights, first.weights)
+    )
+    expect(same, "two starts must guess the same of one frame, got other poses")
+
+
+def inputs(case: Case) -> None:
+    """Observations and task stay as they were."""
+    task, (observation, *_) = images()
+    same = unchanged(observation.silhouettes[0].mask, task.anchor)
+    case.build().posterior(observation)
+    expect(same(), "observations and task must stay as they are, got others")
+
+
+def gain(case: Case) -> str:
+    """The best of a population drawn from its modes costs less than that of one from anywhere."""
+    task, observations = images()
+    prior = registry().prior("pca")().fit(walking_angles())
+    space = SearchSpace(prior, np.zeros(3), np.radians([180.0, 15.0, 15.0]), task.anchor, "aligned")
+    costs = []
+    for guess, observation in zip(case.first, observations, strict=True):
+        if guess is not None:
+            problem = PoseProblem(task.body, task.cameras, observation.silhouettes, space)
+            start = start_in(problem, modes_apart(task.body.skeleton, guess))
+            drawn = [
+                draw_population(each, np.random.default_rng(0), POPULATION)
+                for each in (replace(space, start=start), space)
+            ]
+            costs.append([problem.evaluate(population).min() for population in drawn])
+    if not costs:
+        raise SkippedError("it knows no pose of the built-in walk")
+    guided, blind = np.mean(costs, axis=0)
+    expect(guided < blind, f"the best of a population must cost less than {blind:.1f}, from anywhere, got {guided:.1f}")
+    return f"cost {guided:.1f}, from anywhere {blind:.1f}"
+
+
+def speed(case: Case) -> str:
+    """A frame takes less than two seconds."""
+    start, (observation, *_) = case.build(), images()[1]
+    return check_speed("a frame", MAX_SECONDS, lambda _: len([start.posterior(observation)]))
+
+
+RULES = [
+    common.construction,
+    posterior,
+    several_views,
+    same_again,
+    inputs,
+    common.global_randomness,
+    gain,
+    common.silence,
+    common.nonsense_settings,
+    common.unknown_setting,
+    speed,
+]
