@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from posefit.fitting import contour_kernels as kernels
+from posefit.fitting.contours import MaskContours, contour_squares, distances_outside
 from posefit.fitting.shape import NAMES, SPREAD, Shape, shaped
 from posefit.fitting.tracker import Frame, Observation
 from posefit.footage.scene import Scene, synthetic
@@ -16,14 +18,8 @@ from posefit.motion import built_in
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import project
 from posefit.silhouette.mask import Silhouette
-from posefit.tracking.smoothing import contours, kernels
-from posefit.tracking.smoothing.contours import (
-    MaskContours,
-    contour_squares,
-    distances_outside,
-    fit_contours,
-    growth,
-)
+from posefit.tracking.smoothing import contours
+from posefit.tracking.smoothing.contours import fit_contours, growth
 from posefit.tracking.smoothing.path import Visibility
 from posefit.tracking.smoothing.smooth import smooth
 from posefit.uncertainty.calibration import Recalibration
