@@ -68,31 +68,31 @@ def condition_of(row: Row) -> Condition:
 
 
 def methods(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of methods, the most accurate first: medians of their tracks, and those of parts of them."""
-    parts: dict[str, Callable[[Condition], bool]] = {
-        "one camera": lambda at: at[1] == 1,
-        "more": lambda at: at[1] > 1,
-        "known yaw": lambda at: at[2],
-        "unknown": lambda at: not at[2],
-        "clean": lambda at: at[3],
-        "damaged": lambda at: not at[3],
+    """Yield the table of methods, the most accurate first: medians of all tracks, and of four parts of them."""
+    parts = {
+        f"{views}, {masks}": (views == "one camera", masks == "clean")
+        for views in ("one camera", "two")
+        for masks in ("clean", "damaged")
     }
     cells = []
     for name in dict.fromkeys(map(name_of, rows)):
         mine = [row for row in rows if name_of(row) == name]
-
-        def median(figure: str, some: Sequence[Row]) -> float | None:
-            return float(np.median([row[figure] for row in some])) if some else None
-
-        angles = float(np.median([row["error_degrees"]["mean"] for row in mine]))
-        lost = float(np.mean([row["lost_rate"] for row in mine]))
-        some = [median(WORSE, [row for row in mine if part(condition_of(row))]) for part in parts.values()]
-        figures = [number("error_degrees", angles), number(WORSE, median(WORSE, mine)), percent(lost)]
-        figures += [*(number(WORSE, value) for value in some), number(SLOWER, median(SLOWER, mine))]
-        cells.append([f"`{name}`", str(len(mine)), *figures])
-    cells.sort(key=lambda cell: float(cell[3].replace(",", "")))
-    heads = ["method", "tracks", head_of("error_degrees", "median"), head_of(WORSE, "median"), head_of("lost_rate")]
-    yield from markdown([*heads, *parts, head_of(SLOWER)], cells)
+        split: dict[tuple[bool, bool], list[float]] = {part: [] for part in parts.values()}
+        for row in mine:
+            _, cameras, _, clean = condition_of(row)
+            split[cameras == 1, clean].append(row[WORSE])
+        angles = np.median([row["error_degrees"]["mean"] for row in mine])
+        medians = [
+            np.median([row[WORSE] for row in mine]),
+            *(np.median(some) if some else None for some in split.values()),
+        ]
+        lost = percent(float(np.mean([row["lost_rate"] for row in mine])))
+        figures = [number(WORSE, None if median is None else float(median)) for median in medians]
+        cpu = number(SLOWER, float(np.median([row[SLOWER] for row in mine])))
+        cells.append([f"`{name}`", number("error_degrees", float(angles)), figures[0], lost, *figures[1:], cpu])
+    cells.sort(key=lambda cell: float(cell[2].replace(",", "")))
+    heads = ["method", head_of("error_degrees"), head_of(WORSE), head_of("lost_rate"), *parts, head_of(SLOWER)]
+    yield from markdown(heads, cells)
 
 
 def paired(rows: Sequence[Row], method: str, reference: str, figure: str) -> dict[tuple[Condition, int], float]:
@@ -145,9 +145,8 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
             strata = [condition[0] for condition, _ in pairs]
             values = [MEASURES[sentence.figure].factor * value for value in pairs.values()]
             cells = list(difference(values, strata, [condition for condition, _ in pairs]))
-        conditions = len({condition for condition, _ in pairs})
-        lines.append([sentence.says, what, cells[2], f"{len(pairs)} in {conditions}", *cells[:2]])
-    heads = ["the paper says", "compared, above 0 if so", "verdict", "pairs in conditions", "effect", "95 % interval"]
+        lines.append([sentence.says, what, str(len(pairs)), cells[2], *cells[:2]])
+    heads = ["the paper says", "compared, above 0 if so", "pairs", "verdict", "effect", "95 % interval"]
     yield from markdown(heads, lines, words=3)
 
 
