@@ -50,6 +50,19 @@ def sources_from(_context: click.Context, _parameter: click.Parameter, begun: st
 COMPLETED = {"method": methods_from, "train": sources_from}  # options whose values a shell completes
 
 
+def number_by(parse: Callable[[str], float]) -> Callable[[str], float]:
+    """Return a function that reads a number, a whole one where `parse` is int, and says what it expected."""
+
+    def read(text: str) -> float:
+        try:
+            return parse(text)
+        except ValueError:
+            expected = "a whole number such as 30" if parse is int else "a number such as 1.75"
+            raise InputError(f"expected {expected}, got {quoted(str(text))}") from None
+
+    return read
+
+
 class Flag(click.Option):
     """An option that the help of its command lists under a heading."""
 
@@ -94,7 +107,8 @@ def track_flags(*names: str) -> list[Decorator]:
             continue
         words |= {"metavar": option.unit or None, "multiple": option.repeated}
         if option.parse in (int, float):
-            words["type"] = option.parse
+            words["metavar"] = option.unit or ("INTEGER" if option.parse is int else "FLOAT")
+            words |= {"type": str, "callback": parsed_by(number_by(option.parse))}
         else:
             words["callback"] = parsed_by(option.parse)
         if not isinstance(default, tuple) and default is not None:

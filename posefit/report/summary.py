@@ -66,7 +66,7 @@ def _certainty(contest: Contest, others: Sequence[Row]) -> list[str]:
         sentences.append(f"{over} are too few to tell it from {listed([*map(effect, unclear)])}.")
     if least_p >= LEVEL:
         pairs = counted(count, "pair")
-        sentences.append(f"So few cannot show any difference: of {pairs} no p can be below {least_p:.2g}.")
+        sentences.append(f"So few cannot show any difference: of {pairs} of methods no p can be below {least_p:.2g}.")
     return sentences
 
 

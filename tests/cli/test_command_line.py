@@ -219,7 +219,8 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path: Path) -> None:
         (["walk", "--device", "tpu"], "device must be one of cpu, cuda, got 'tpu'"),
         (["walk", "--camera", "no.json"], "no.json"),
         (["walk-a", "--train", "walk-a"], "train must not contain the source itself, got walk-a"),
-        (["walk", "--seed", "abc"], "'abc' is not a valid integer"),
+        (["walk", "--seed", "abc"], "expected a whole number such as 30, got 'abc'"),
+        (["walk", "--fps", "30,0"], "expected a number such as 1.75, got '30,0'"),
         (["walk", "--wrong"], "No such option"),
         (["walk", "--seed", "-1"], "seed must be 0 or more, got -1"),
     ]:

@@ -24,7 +24,7 @@ def test_a_method_with_a_large_error_that_no_test_tells_apart_has_its_effect(tmp
     errors = full({"a": 1.0, "b": 3.0}, instances=5, seeds=1)  # of five blocks, the least p is 0.0625
     assert sentences(contest_of_errors(tmp_path, errors))[1:3] == [
         "5 paired runs are too few to tell it from b (median difference +2.00°, p = 0.062).",
-        "So few cannot show any difference: of 1 pair no p can be below 0.062.",
+        "So few cannot show any difference: of 1 pair of methods no p can be below 0.062.",
     ]
 
 
@@ -62,7 +62,7 @@ def test_too_few_runs_for_any_difference_are_reported(tmp_path: Path) -> None:
     methods = dict.fromkeys("abcde", 1.0) | {"e": 2.0}
     errors = full(methods, instances=4, seeds=2)
     assert sentences(contest_of_errors(tmp_path / "eight", errors))[2] == (
-        "So few cannot show any difference: of 10 pairs no p can be below 0.078."
+        "So few cannot show any difference: of 10 pairs of methods no p can be below 0.078."
     )
     text = sentences(contest_of_errors(tmp_path / "eleven", errors | full(methods, instances=3, seeds=3)))
     assert text[1] == "Over 11 paired runs it is better than e."
