@@ -81,10 +81,12 @@ def _tops(series: Array) -> Array:
 
     A top is the highest place between two where it is lower by a fifth of the whole range, and by `MIN_FOOT_SWING`.
     """
-    from scipy.signal import find_peaks  # takes a tenth of a second to import
-
     lowest, highest = np.percentile(series, [2, 98])
     step = max(MIN_FOOT_SWING, MIN_SWING_SHARE * float(highest - lowest))
+    if np.ptp(series) < step:
+        return np.empty(0)  # without a library that takes a tenth of a second to import
+    from scipy.signal import find_peaks
+
     return np.array([_between(series, int(k)) for k in find_peaks(series, prominence=step)[0]])
 
 
