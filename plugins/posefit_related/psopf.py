@@ -58,11 +58,6 @@ class PSOPF:
         positive("noise", noise)
         positive("alpha", alpha)
         self._space, self._rng, self._waiting = space, rng, 0
-        self._x: Array
-        self._v: Array
-        self._pbest: Array
-        self._pbest_cost: Array
-        self._moves: int
         self._iterations = min(iterations, evaluations - 1)
         self._sharpness, self._noise, self._alpha = sharpness, noise, alpha
         self._begin(draw_population(space, rng, evaluations // (self._iterations + 1)))

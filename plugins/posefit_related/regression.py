@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, project
-from posefit_related.frames import frame_of, place_of, squared_distances, training_poses
+from posefit_related.frames import frame_of, place_of, squared_distances
+from posefit_related.training import training_poses
 
 POINTS = 80  # ours: of a border, at most
 SECTORS, RINGS = 12, 5  # ours: the bins of a shape context
