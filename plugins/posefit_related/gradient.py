@@ -4,7 +4,7 @@ S. Wachter, H.-H. Nagel, Tracking persons in monocular image sequences, Computer
 1999. A body of cones is tracked by an iterated extended Kalman filter: the motion is predicted at constant velocity,
 and the pose that fits the picture's edges best is found from there by iterated linearisation.
 
-Interpretations: the edges are the masks' contours, fitted as where posefit smooths footage, robust against outliers; the
+Interpretations: the edges are the masks' contours, fitted as posefit smooths footage, robust against outliers; the
 covariance of the prediction is diagonal and the same in all frames; region information is not used. A step counts as
 the evaluations that take as long. The first pose is the best of some training poses.
 """
