@@ -10,8 +10,9 @@
 - `isomap.IsomapPrior`: an Isomap with a local linear way back (Wang, Xu and Ai, 2003).
 - `gplvm.GPLVM`: latents of a Gaussian process (Urtasun, Fleet, Hertzmann and Fua, 2005).
 
-`stages` has what the searches share, `frames` what the trackers share, `training` the poses that models learn from. None
-of these publications was at hand in full: docs/ways/related.md says what was; docstrings name the rest interpretations.
+`stages` has what the searches share, `frames` what the trackers share, `training` the poses that models learn from.
+None of these publications was at hand in full: docs/ways/related.md says what was, and docstrings name the rest
+interpretations.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="psopf", frames=(0, 3))
