@@ -27,7 +27,7 @@ EVALUATIONS = PARTICLES * (ITERATIONS + 1)
 SEEDS = 8  # a frame's time is the mean over so many
 ENVIRONMENTS = 40
 ENDLESS: dict[str, dict[str, Any]] = {
-    "FitImage-v0": {"max_evaluations": 10**9, "target_cost": -1.0},
+    "FitImage-v0": {"max_evaluations": 10**9},
     "Race-v0": {"generations": (10**9, 10**9)},
 }
 SEARCHES = 5  # of each optimiser, of which the fastest counts
