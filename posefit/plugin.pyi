@@ -18,6 +18,7 @@ from posefit.fitting.check import choices as choices
 from posefit.fitting.check import one_of as one_of
 from posefit.fitting.check import positive as positive
 from posefit.fitting.check import whole as whole
+from posefit.fitting.contours import contour_fit as contour_fit
 from posefit.fitting.optimiser import Adapter as Adapter
 from posefit.fitting.optimiser import Filter as Filter
 from posefit.fitting.optimiser import Optimiser as Optimiser
@@ -49,5 +50,4 @@ from posefit.testing import check_prior as check_prior
 from posefit.testing import check_segmenter as check_segmenter
 from posefit.testing import check_start as check_start
 from posefit.testing import check_tracker as check_tracker
-from posefit.tracking.smoothing.contours import contour_fit as contour_fit
 from posefit.uncertainty.modes import Posterior as Posterior

@@ -1,6 +1,6 @@
 """Mutants of the equations and the kernels, and whether tests notice: `python -m tests.mutants --count 60 --seed 1`.
 
-Drawn lines carry a tag such as `# SAPSO (4)`, whose tests in `tests/sources` must then fail, or stand in a `kernels.py`,
+Drawn lines carry a tag such as `# SAPSO (4)`, whose tests in `tests/sources` must then fail, or stand in a `*kernels.py`,
 which the tests of its package must notice. In each an operator, a comparison or a number changes. Every mutant that
 lives is printed; exit status 1 where the share of those that are killed is less than `--least`. Some change nothing
 that can be noticed: a `<` of two floats that are never equal, a number that only guards.
@@ -26,8 +26,7 @@ NAMES |= {"BitAnd": "&", "BitOr": "|"}
 KERNEL_TESTS = {  # which tests notice a change of a package's kernels
     "posefit/silhouette": ["tests/silhouette"],
     "posefit/geometry": ["tests/geometry", "tests/silhouette/test_kernels.py"],
-    "posefit/fitting": ["tests/fitting"],
-    "posefit/tracking/smoothing": ["tests/tracking/test_contours.py"],
+    "posefit/fitting": ["tests/fitting", "tests/tracking/test_contours.py"],
     "plugins/posefit_exemplars": ["tests/sources", "tests/exemplars"],
 }
 
@@ -51,9 +50,9 @@ def mutants() -> Iterator[Mutant]:
         tests = tuple(f"tests/sources/{name}" for name in equations.tests_of(tag))
         if tests:
             yield from _of_lines(tag.path, {tag.line}, tests)
-    for path in sorted(ROOT.glob("p*/**/kernels.py")):
+    for path in sorted(ROOT.glob("p*/**/*kernels.py")):
         name = path.relative_to(ROOT).as_posix()
-        folder = name.removesuffix("/kernels.py")
+        folder = path.parent.relative_to(ROOT).as_posix()
         yield from _of_lines(name, None, tuple(KERNEL_TESTS.get(folder, ["tests/sources"])))
 
 

@@ -136,14 +136,6 @@ def landmark_figures(scene: Scene, actor: Motion, seen: NDArray[np.bool_]) -> di
     return median | {name: float(np.mean(flags)) for name, flags in exchanged.items()}
 
 
-def inside(track: Track, radii: Array, situation: Situation, truth: Masks) -> float:
-    """Return the share of joints but the root whose truth lies within radii (T, 27), both roots at one point."""
-    actor, estimate = situation.actors[0].motion, track.motion
-    off = np.linalg.norm(actor.skeleton.joints(actor.poses) - estimate.skeleton.joints(estimate.poses), axis=2)
-    rows = np.asarray(uncut(truth).any(axis=0)) & np.isfinite(radii).all(axis=1)
-    return float((off <= radii)[rows, 1:].mean())
-
-
 def _body_iou(estimate: Motion, body: Body, situation: Situation, truth: Masks) -> float:
     """Return the overlap of the fitted body with the whole true one, seen by the cameras that see all of it."""
     actor, found = situation.actors[0], []
@@ -184,7 +176,6 @@ COLUMNS: Mapping[str, tuple[str, int, float]] = {
     "swapped": ("swapped %", 0, 100.0),
     "said_unknown": ("unknown %", 0, 100.0),
     "known_wrong": ("known and wrong %", 0, 100.0),
-    "inside": ("inside 80 %", 0, 100.0),
     **{name: (f"{name} off %", 0, 100.0) for name, _ in PARTS},
     **{name: (f"{name.replace('_', ' ')} off, degrees", 1, 1.0) for name in SAGITTAL},
     "cpu_ms": ("CPU ms a frame", 0, 1.0),
@@ -279,10 +270,9 @@ def measured(video: str, shot: Shot) -> dict[str, Any]:
         row["minutes"] = (time.perf_counter() - began) / 60.0
         row["cpu_ms"] = 1e3 * (time.process_time() - spent) / len(scene)
         with np.load(folder / "track" / "poses.npz") as stored:
-            radii, joint_radii = stored["radii"], stored["joint_radii"][:, list(stored["levels"]).index(0.8)]
+            radii = stored["radii"]
         row |= extraction_figures(result.scene, made.masks) | track_figures(result, radii, scene, made.masks)
         row |= landmark_figures(result.scene, scene.actors[0].motion, uncut(made.masks))
-        row["inside"] = inside(result, joint_radii, scene, made.masks)
         if importlib.util.find_spec("mediapipe"):
             angles = landmark_angles(made.videos[0], made.first, SIZE)
             row["landmarks"] = angle_errors(scene.actors[0].motion, angles, uncut(made.masks)[0])

@@ -12,13 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from clips import EVALUATIONS
 from posefit.cli.output import Command
+from posefit.fitting.contours import fitted, precisions
 from posefit.fitting.tracker import Observation, Task
 from posefit.footage.scene import Scene, synthetic
 from posefit.motion import recorded
 from posefit.registry import registry
 from posefit.tracking.initialise import task_of
 from posefit.tracking.options import TrackOptions
-from posefit.tracking.smoothing.contours import fitted, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from posefit_exemplars.hypotheses import CONTINUED_REACHES, KNOWN_SHIFT, START_TURN
 

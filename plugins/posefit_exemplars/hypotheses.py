@@ -22,11 +22,11 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit.fitting.landmarks import exchanged_given, exchanged_next, landmark_costs, usually_exchanged
 from posefit.fitting.tracker import Task
 from posefit.geometry.rotation import wrapped
 from posefit.geometry.skeleton import ANGLES, JOINTS, LIMBS, root_centred
-from posefit.tracking.smoothing.contours import STEP_EVALUATIONS, fitted, precisions
 from posefit_exemplars import markov
 from posefit_exemplars.beam import Step, root_deviation_costs, squared_distances
 from posefit_exemplars.exemplars import Exemplars, Rows

@@ -15,6 +15,7 @@
 | checks of what optimisers and priors return | validation.py |
 | the loop that drives a tracker, and the audit of its frames | driving.py |
 | the build of one person, fitted with the poses | shape.py |
+| one frame fitted to the contours of its masks | contours.py, contour_kernels.py |
 | CMA-ES | cma.py |
 | aligning and decoding, compiled | kernels.py |
 | checks of settings; arrays of other libraries | check.py, exchange.py |

@@ -16,8 +16,9 @@ from posefit.footage.scene import Scene
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.measuring.gait import Gait
 from posefit.motion.motion import Motion
-from posefit.uncertainty.calibration import LEVELS
+from posefit.uncertainty.calibration import LEVELS, Recalibration
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
+from posefit.uncertainty.shared import depth_halves
 from posefit.version import __version__
 
 
@@ -98,14 +99,21 @@ class Content:
     def intervals(self) -> dict[str, Array]:
         """How far joints and angles may be off, as poses.npz has it; empty where no frame has a posterior.
 
-        `levels` (3,), `joint_radii` (T, 3, 27) metres, `angle_halves` (T, 3, 66) radians; NaN in frames without any.
+        `levels` (3,), `joint_radii` (T, 3, 27) metres about the root, of footage `place_radii` in the world, too, and
+        `angle_halves` (T, 3, 66) radians; NaN in frames without any.
         """
         if all(frame.posterior is None for frame in self.frames):
             return {}
-        radii = np.full((len(self.frames), len(LEVELS), len(JOINTS)), np.nan)
+        skeleton, camera = self.scene.body.skeleton, self.scene.cameras[0]
+        radii, places = np.full((2, len(self.frames), len(LEVELS), len(JOINTS)), np.nan)
         halves = np.full((len(self.frames), len(LEVELS), ANGLES), np.nan)
         for k, frame in enumerate(self.frames):
             if frame.posterior is not None:
-                radii[k] = joint_intervals(self.scene.body.skeleton, frame.posterior, frame.pose)
+                radii[k], in_world = (
+                    joint_intervals(skeleton, frame.posterior, frame.pose, world) for world in (False, True)
+                )
+                model = frame.posterior.recalibration or Recalibration()
+                places[k] = np.hypot(in_world, depth_halves(model, camera, frame.translation))
                 halves[k] = angle_intervals(frame.posterior, frame.pose)
-        return {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
+        intervals = {"levels": np.array(LEVELS), "joint_radii": radii, "angle_halves": halves}
+        return intervals | ({"place_radii": places} if self.scene.truth is None else {})

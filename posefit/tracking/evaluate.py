@@ -18,7 +18,8 @@ from posefit.tracking.options import TrackOptions
 from posefit.tracking.restarts import RELOCALISED
 from posefit.tracking.result import Track
 from posefit.tracking.trajectory import Tracked
-from posefit.uncertainty.modes import modes_of, track_modes
+from posefit.uncertainty.modes import Posterior, modes_of, track_modes
+from posefit.uncertainty.shared import in_footage
 
 
 def evaluate(
@@ -37,8 +38,7 @@ def evaluate(
     from the first mask that was read. The build is that of `scene`; that of `task` is from before smoothing.
     """
     skeleton = scene.body.skeleton
-    posteriors = [frame.posterior for frame in frames]
-    posteriors = [None if each is None else replace(each, modes=modes_of(skeleton, each)) for each in posteriors]
+    posteriors = [frame.posterior and _finished(scene, frame.posterior, options.height is not None) for frame in frames]
     frames = [replace(frame, posterior=each) for frame, each in zip(frames, posteriors, strict=True)]
     training = None if scene.truth is None else task.angles
     table, measures = evaluated(scene, frames, method.prior, training, method.audit.beta, clock)
@@ -68,6 +68,14 @@ def evaluate(
     )
     gait = gait_of(motion, unseen(table))
     return Track(motion, frames, table, measures, trust, gait, setup, log, modes, scene)
+
+
+def _finished(scene: Scene, posterior: Posterior, height_known: bool) -> Posterior:
+    """Return a posterior with its modes, and less sure where footage leaves more open than single frames show."""
+    model = posterior.recalibration
+    if scene.truth is None and model is not None:
+        model = in_footage(model, len(scene.cameras), height_known)
+    return replace(posterior, modes=modes_of(scene.body.skeleton, posterior), recalibration=model)
 
 
 def _setup(scene: Scene, method: Method, task: Task, options: TrackOptions) -> Setup:

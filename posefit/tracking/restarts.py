@@ -8,10 +8,11 @@
 | where the body spins | `retrack_spins`: all before and after the longest run without | the new one, if as cheap |
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from copy import copy, deepcopy
+from copy import deepcopy
 from dataclasses import replace
-from itertools import chain, islice, tee
+from itertools import islice
 from typing import Literal
 
 import numpy as np
@@ -191,18 +192,18 @@ def relocalised(
     if not gap:
         yield from follow(task, observations, rng)
         return
-    coming, rest = tee(observations)
-    frames, watch = follow(task, rest, rng), _Watch(task, gap)
-    for observation in coming:
-        trials = list[Frame]()
+    coming, watch = _Coming(observations), _Watch(task, gap)
+    frames = follow(task, coming, rng)
+    while shown := coming.ahead(1):
+        (observation,), trials = shown, list[Frame]()
         if observation.usable and (latest := watch.due()) is not None:
-            window = [observation, *islice(copy(coming), (TRIAL_FRAMES - 1) * TRIAL_STRIDE)]  # a copy reads ahead
+            window = coming.ahead(1 + (TRIAL_FRAMES - 1) * TRIAL_STRIDE)
             seeds = independent(rng).integers(0, 2**32, 2).tolist()
             unconstrained = replace(task, yaw=None, anchor=latest.translation, first_pose=None, modes=(), before=())
             continuation = after(unconstrained, latest)
             best, trials = best_restart(unconstrained, window, follow, RESTARTS, seeds, continuation)
             if best is not continuation:
-                frames = follow(best, chain([observation], copy(coming)), rng)
+                frames = follow(best, coming, rng)
         if (frame := next(frames, None)) is None:
             return
         if trials:
@@ -211,6 +212,21 @@ def relocalised(
         watch.add(frame, observation.usable)
         yield frame
     yield from frames  # none: the tracker gets to its end
+
+
+class _Coming(Iterator[Observation]):
+    """Observations that a tracker takes one by one, and that can be read ahead."""
+
+    def __init__(self, observations: Iterable[Observation]) -> None:
+        self._observations, self._waiting = iter(observations), deque[Observation]()
+
+    def __next__(self) -> Observation:
+        return self._waiting.popleft() if self._waiting else next(self._observations)
+
+    def ahead(self, count: int) -> list[Observation]:
+        """Return the next observations, up to `count` of them, which stay to be taken."""
+        self._waiting.extend(islice(self._observations, max(count - len(self._waiting), 0)))
+        return list(islice(self._waiting, count))
 
 
 class _Watch:

@@ -14,5 +14,6 @@ A silhouette seldom determines one pose. What it leaves open is a `Posterior`: w
 |---|---|---|
 | weighted poses, clustered by their joints; exchanged sides | modes, clustering, mirror ambiguity | modes.py |
 | errors of joints and angles | credible intervals, of a mixture | intervals.py |
+| errors that all frames of footage share | systematic error | shared.py |
 | calibrated probabilities and intervals | conformal prediction, coverage, ECE | calibration.py |
 """

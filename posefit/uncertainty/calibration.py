@@ -30,15 +30,22 @@ class Recalibration:
     second_side: float = SECOND_SIDE
     sharpness: float = 1.0  # the power of modes' weights: below 1, modes are less sure than their share of samples
     none: float = 0.0  # the probability that no mode is right
+    place_spreads: Array = field(default_factory=lambda: np.zeros(len(JOINTS)), repr=False)  # (27,) in the world
+    depth: float = 0.0  # standard deviation of the distance from a camera that is alone, a share of it
 
     def __post_init__(self) -> None:
-        for name in ("joint_spreads", "angle_spreads", "joint_factors", "angle_factors"):
-            length = len(JOINTS) if name.startswith("joint") else ANGLES
+        for name in ("joint_spreads", "angle_spreads", "place_spreads", "joint_factors", "angle_factors"):
+            length = ANGLES if name.startswith("angle") else len(JOINTS)
             value = frozen(name, getattr(self, name), (length,) if name.endswith("spreads") else (len(LEVELS), length))
             if value.min() < 0.0:
                 raise InputError(f"{name} must be 0 or more, got {value.min():g}")
             object.__setattr__(self, name, value)
-        for name, low, high in (("second_side", 0.0, 1.0), ("sharpness", 1e-9, 1e9), ("none", 0.0, 1.0)):
+        for name, low, high in (
+            ("second_side", 0.0, 1.0),
+            ("sharpness", 1e-9, 1e9),
+            ("none", 0.0, 1.0),
+            ("depth", 0.0, 1.0),
+        ):
             if not low <= getattr(self, name) <= high:
                 raise InputError(f"{name} must lie in {low:g} to {high:g}, got {getattr(self, name)}")
 

@@ -16,16 +16,17 @@ FARTHEST = 6.0  # spreads: the widest radius searched
 CLOSE = 1e-3  # spreads: the least distance that a difference is divided by
 
 
-def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array) -> Array:
+def joint_intervals(skeleton: Skeleton, posterior: Posterior, pose: Array, world: bool = False) -> Array:
     """Return the radii (levels, 27), metres, of the balls about the joints of a `pose` (66,) that hold the true ones.
 
-    Joints are relative to the root. A radius is the quantile, at each of the `LEVELS`, of the distance to a joint of a
-    pose drawn by weight, with a normal error along each axis, times a factor; the posterior's recalibration has both.
-    Where two modes are likely, the wider balls reach from one to the other.
+    Joints are relative to the root, or in the `world`. A radius is the quantile, at each of the `LEVELS`, of the
+    distance to a joint of a pose drawn by weight, with a normal error along each axis, times a factor; the posterior's
+    recalibration has both. Where two modes are likely, the wider balls reach from one to the other.
     """
     model = posterior.recalibration or Recalibration()
+    spreads = model.place_spreads if world else model.joint_spreads
     distances = np.linalg.norm(skeleton.joints(posterior.poses) - skeleton.joints(pose), axis=2)
-    return np.asarray(model.joint_factors * _quantiles(distances, posterior.weights, model.joint_spreads, 3))
+    return np.asarray(model.joint_factors * quantiles(distances, posterior.weights, spreads, 3))
 
 
 def angle_intervals(posterior: Posterior, pose: Array) -> Array:
@@ -35,11 +36,11 @@ def angle_intervals(posterior: Posterior, pose: Array) -> Array:
     """
     model = posterior.recalibration or Recalibration()
     distances = np.abs(wrapped(posterior.poses - pose))
-    halves = model.angle_factors * _quantiles(distances, posterior.weights, model.angle_spreads, 1)
+    halves = model.angle_factors * quantiles(distances, posterior.weights, model.angle_spreads, 1)
     return np.asarray(np.minimum(halves, np.pi))
 
 
-def _quantiles(distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]) -> Array:
+def quantiles(distances: Array, weights: Array, spreads: Array, dimensions: Literal[1, 3]) -> Array:
     """Return the radii (levels, n) that hold such shares of normal errors about points at distances (K, n)."""
     from scipy.special import ndtr
 

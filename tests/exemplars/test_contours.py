@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from posefit.arrays import Array
+from posefit.fitting.contours import POINT_SPACING, MaskContours, fitted, precisions
 from posefit.geometry.skeleton import ANGLES
 from posefit.motion import built_in
-from posefit.tracking.smoothing.contours import POINT_SPACING, MaskContours, fitted, precisions
 from posefit_exemplars.frame_costs import FrameCosts
 from tests.cases import each
 from tests.exemplars.conftest import EMPTY, Walk, walk_of

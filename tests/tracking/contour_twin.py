@@ -3,11 +3,11 @@
 import numpy as np
 
 from posefit.arrays import Array
+from posefit.fitting import contour_kernels as kernels
+from posefit.fitting.contours import MaskContours
 from posefit.geometry.body import Body
 from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import BONES, JOINTS, PARENTS
-from posefit.tracking.smoothing import kernels
-from posefit.tracking.smoothing.contours import MaskContours
 
 STEP = 1e-5
 BONE_STARTS = np.array(PARENTS[1:])

@@ -16,6 +16,7 @@ from posefit.output.folder import OutputFolder
 from posefit.output.text import table
 from posefit.uncertainty.calibration import Recalibration
 from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.shared import depth_halves, in_footage, shared_spreads
 from tests.files import arrays, csv_rows
 from tests.tracking.scenes import MAXWELL, SPREAD, exact_frames, tracked, truth_of, uncertain_frames, walk
 
@@ -78,6 +79,20 @@ def test_the_width_is_the_mean_radius_of_the_frames_that_have_one(scene: Scene) 
     without_truth = evaluated(replace(scene, truth=None), frames, None, np.zeros((1, 63)), 0.5, np.ones(2))[1]
     assert without_truth.interval_mm == measures.interval_mm
     assert without_truth.coverage is None
+
+
+def test_footage_has_intervals_in_the_world_too_which_are_wider(scene: Scene) -> None:
+    model = in_footage(SPREAD, 1, True)
+    posterior = Posterior(np.zeros((1, 66)), np.zeros((1, 3)), np.ones(1), recalibration=model)
+    frames = [replace(frame, pose=np.zeros(66), posterior=posterior) for frame in exact_frames(scene)]
+    content = replace(tracked(scene, exact_frames(scene)).content, frames=frames)
+    intervals = replace(content, scene=replace(scene, truth=None)).intervals
+    depth = depth_halves(model, scene.cameras[0], frames[0].translation)
+    for name, least in (("joint_radii", 0.0), ("place_radii", depth)):
+        spreads = np.hypot(0.02, shared_spreads(1, world=name == "place_radii"))
+        expected = np.hypot(np.outer([*MAXWELL.values()], spreads), least)
+        np.testing.assert_allclose(intervals[name][0], expected, rtol=0.01)
+    assert "place_radii" not in content.intervals
 
 
 def test_frames_are_lost_from_a_probability_of_a_half_on(scene: Scene) -> None:

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posefit.geometry.camera import Camera
 from posefit.geometry.skeleton import ANGLES, JOINTS
 from posefit.motion.built_in import average_skeleton
 from posefit.uncertainty.calibration import LEVELS, Recalibration, reliability
 from posefit.uncertainty.intervals import angle_intervals, joint_intervals
 from posefit.uncertainty.modes import Posterior
+from posefit.uncertainty.shared import DEPTH, STATURE, depth_halves, in_footage, shared_spreads
 from tests.cases import each
 
 SKELETON = average_skeleton()
@@ -57,6 +59,35 @@ def test_factors_multiply_the_intervals() -> None:
     known = replace(plain, recalibration=twice)
     np.testing.assert_allclose(joint_intervals(SKELETON, known, STILL), 2.0 * joint_intervals(SKELETON, plain, STILL))
     np.testing.assert_allclose(angle_intervals(known, STILL), 3.0 * angle_intervals(plain, STILL))
+
+
+def test_errors_of_footage_add_by_squares() -> None:
+    model = in_footage(Recalibration(joint_spreads=np.full(27, 0.03)), 2, True)
+    np.testing.assert_allclose(model.joint_spreads**2, 0.03**2 + shared_spreads(2) ** 2)
+    np.testing.assert_allclose(model.place_spreads**2, 0.03**2 + shared_spreads(2, world=True) ** 2)
+    some = yawed([0, 10, 20], [0.5, 0.3, 0.2], model)
+    other = replace(some, recalibration=replace(model, joint_spreads=model.place_spreads))
+    radii = joint_intervals(SKELETON, some, STILL, world=True)
+    np.testing.assert_array_equal(radii, joint_intervals(SKELETON, other, STILL))
+
+
+def test_the_root_is_off_in_the_world_alone() -> None:
+    for cameras in (1, 2, 4):
+        about, world = shared_spreads(cameras), shared_spreads(cameras, world=True)
+        assert about[0] == 0.0
+        assert world[0] > 0.0
+    np.testing.assert_array_equal(shared_spreads(2), shared_spreads(4))
+
+
+def test_one_camera_alone_does_not_show_the_depth() -> None:
+    camera = Camera.around(np.zeros(3), 1.0, 8.0, (640, 360), 0.6)
+    given, guessed, several = (
+        depth_halves(in_footage(Recalibration(), *known), camera, np.zeros(3))
+        for known in ((1, True), (1, False), (2, False))
+    )
+    np.testing.assert_allclose(given, DEPTH * 8.0 * np.array([[0.6745], [1.2816], [1.96]]), rtol=1e-4)
+    np.testing.assert_allclose(guessed, np.hypot(DEPTH, STATURE) / DEPTH * given)
+    np.testing.assert_array_equal(several, 0.0)
 
 
 def test_angles_are_circular() -> None:

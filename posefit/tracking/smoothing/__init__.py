@@ -4,5 +4,5 @@
 |---|---|
 | the step of the pipeline: path, contours, path | smooth.py |
 | the likeliest path of a root and two legs; which foot stands | path.py |
-| poses, path and build fitted to the contours of the masks | contours.py, kernels.py |
+| poses, path and build fitted to the contours of the masks | contours.py |
 """

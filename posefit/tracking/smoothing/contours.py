@@ -5,150 +5,21 @@ gives way a little, and smoothly, to the contours of the masks; so does the buil
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Self
+from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from posefit.arrays import Array, writeable
+from posefit.arrays import Array
+from posefit.fitting.contours import MAX_ANGLE_STEP, ROBUST_SCALES, MaskContours, contour_squares
 from posefit.fitting.shape import MODEL_SPREAD, NAMES, PRECISION, REACH, SPREAD, Shape, shaped
-from posefit.fitting.tracker import Observation, Task
+from posefit.fitting.tracker import Observation
 from posefit.footage.scene import Scene
 from posefit.geometry.body import Body
-from posefit.geometry.camera import Camera
 from posefit.geometry.rotation import wrapped
-from posefit.geometry.skeleton import ANGLES, BONES, JOINTS
 from posefit.motion.motion import Motion
 from posefit.silhouette.cost import BETA, pose_costs
-from posefit.silhouette.mask import Mask, coarser_camera, without_small_pieces
-from posefit.tracking.smoothing import kernels
 from posefit.tracking.smoothing.path import Squares, Visibility, add_root, add_standing, standing_feet, windows_over
-
-FINE_PIXELS = 80.0  # pixels of a metre; of finer masks only every second pixel, third, ... is used
-FIELD_MARGIN = 48  # pixels around a mask whose distance from it is known
-
-Distances = NDArray[np.float32]
-Integers = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class MaskContours:
-    """What one camera shows of the border in T frames; a frame that shows too little has no points."""
-
-    camera: Camera  # whose pixels these are: of fine masks a coarser one than theirs
-    metres: Array  # (T,) pixels of a metre where the person is
-    step: float  # pixels of the border that a point stands for
-    fields: Distances = field(repr=False)  # (T, h, w) pixels outside the mask, below 0 within; 0 where it is unknown
-    corners: Integers = field(repr=False)  # (T, 2) column and row of each field's first pixel
-    sizes: Integers = field(repr=False)  # (T, 2) rows and columns of each field
-    points: Array = field(repr=False)  # (n, 2) pixels: of the borders, frame after frame
-    starts: Integers = field(repr=False)  # (T + 1,) where the points of each frame begin
-
-    @classmethod
-    def of(
-        cls, camera: Camera, view: int, observations: Sequence[Observation], places: Array, spacing: float = 0.0
-    ) -> Self:
-        """Return the borders of a person whose root is about at `places` (T, 3), from a camera, number `view`.
-
-        Points are about `spacing` metres apart, but at least a pixel.
-        """
-        far = np.maximum(camera.project(places)[1], 0.1)
-        metres = np.sqrt(camera.focal.prod()) / far
-        factor = max(int(np.median(metres) / FINE_PIXELS), 1)
-        factor = min(factor, camera.width, camera.height)
-        camera, metres = coarser_camera(camera, factor), metres / factor
-        step = max(round(float(np.median(metres)) * spacing), 1)
-        traced = [_border(observation, view, factor, step) for observation in observations]
-        points, corners, distances = zip(*traced, strict=True)
-        sizes = np.array([part.shape for part in distances])
-        fields = np.zeros((len(traced), *sizes.max(axis=0)), dtype=np.float32)
-        for whole, part in zip(fields, distances, strict=True):
-            whole[: part.shape[0], : part.shape[1]] = part
-        starts = np.cumsum([0, *map(len, points)])
-        return cls(camera, metres, float(step), fields, np.array(corners), sizes, np.concatenate(points), starts)
-
-    def add(self, body: Body, frames: Array, scale: float, grown: kernels.Growth, sums: kernels.BoneSquares) -> None:
-        """Add the squares of the distances between these borders and those of bodies, see `kernels.add_frames`."""
-        camera = tuple(writeable(getattr(self.camera, name)) for name in ("rotation", "translation", "focal", "centre"))
-        contours = kernels.Contours(self.fields, self.corners, self.sizes, self.points, self.starts, self.step)
-        kernels.add_frames(body.skeleton.chain.parents, body.radii, camera, frames, contours, scale, grown, sums)
-
-
-def _border(observation: Observation, view: int, factor: int, step: int) -> tuple[Array, tuple[int, int], Distances]:
-    """Return every `step`th point of a mask's border (n, 2), and the corner and the distances about it."""
-    nothing = np.empty((0, 2)), (0, 0), np.zeros((1, 1), dtype=np.float32)
-    if not observation.usable:
-        return nothing
-    silhouette, first = observation.silhouettes[view], factor // 2
-    pictures = silhouette.mask, silhouette.valid
-    mask, valid = (np.ascontiguousarray(picture[first::factor, first::factor]) for picture in pictures)
-    mask = without_small_pieces(mask)
-    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-    right, bottom = left + width + FIELD_MARGIN, top + height + FIELD_MARGIN
-    left, top = max(left - FIELD_MARGIN, 0), max(top - FIELD_MARGIN, 0)
-    mask, valid = mask[top:bottom, left:right], valid[top:bottom, left:right]
-    around = valid & ~mask  # the background there is known
-    if not width or not around.any():
-        return nothing
-    pixels = np.concatenate([_between(mask, around), _between(mask.T, around.T)[:, ::-1]])
-    return pixels[::step] + np.array([left, top]), (left, top), distances_outside(mask, around)
-
-
-def distances_outside(mask: Mask, around: Mask) -> Distances:
-    """Return how far pixels (h, w) are outside a mask's border, below 0 within, and 0 where neither is true."""
-    out, within = (cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) - 0.5 for part in (mask, around))
-    return np.asarray(np.where(mask, -within, np.where(around, out, 0.0)), dtype=np.float32)
-
-
-def _between(mask: Mask, around: Mask) -> Array:
-    """Return the middles (n, 2) of edges between a pixel of the mask and its neighbour to the side."""
-    meet = (mask[:, 1:] & around[:, :-1]) | (mask[:, :-1] & around[:, 1:])
-    rows, columns = np.nonzero(meet)
-    return np.column_stack([columns + 1.0, rows + 0.5])
-
-
-class ContourSquares(NamedTuple):
-    """Half the second derivatives and half the gradients of the squared distances between borders.
-
-    They are by n numbers of each frame, the root's place and the free angles, and by F factors of the build.
-    """
-
-    curves: Array  # (T, n, n)
-    slopes: Array  # (T, n)
-    mixed: Array  # (T, n, F) second derivatives by numbers and factors
-    factor_curve: Array  # (F, F) over all frames
-    factor_slope: Array  # (F,)
-
-
-def contour_squares(
-    body: Body,
-    views: Sequence[MaskContours],
-    poses: Array,
-    places: Array,
-    scale: float,
-    grown: tuple[Array, Array] | None = None,
-) -> ContourSquares:
-    """Return the squares of the distances between the borders of masks and those of a body in T poses at places.
-
-    Views have T frames, or one that all poses belong to. Distances beyond `scale` metres count less. `grown` is the
-    `growth` of the body; without it there are no factors.
-    """
-    skeleton, count = body.skeleton, len(poses)
-    wider, larger = grown or (np.empty((count, 0, len(JOINTS), 3)), np.empty((0, len(BONES), 2)))
-    factors = len(larger)
-    placed = skeleton.frames(poses, places)
-    squares = np.zeros((1 + factors, 1 + factors))
-    bones = [np.zeros((count, len(JOINTS), 6, columns)) for columns in (6, 1 + factors)]
-    sums = kernels.BoneSquares(*bones)
-    for view in views:
-        view.add(body, placed[0], scale, kernels.Growth(wider, larger, squares), sums)
-    free = np.flatnonzero(np.append([True] * 3, skeleton.free))
-    curves, slopes = (np.empty((count, len(free), size)) for size in (len(free), 1 + factors))
-    kernels.add_all_bones(skeleton.chain, placed, sums, free, (curves, slopes))
-    return ContourSquares(curves, slopes[..., 0], slopes[..., 1:], squares[1:, 1:], squares[1:, 0])
-
 
 FACTOR_DIFFERENCE = 1e-4  # of the logarithm of a factor: of a difference quotient
 
@@ -162,12 +33,10 @@ def growth(body: Body, height: float | None, motion: Motion) -> tuple[Array, Arr
     return np.stack(joints, axis=1) / FACTOR_DIFFERENCE, np.stack(radii) / FACTOR_DIFFERENCE
 
 
-# metres, step by step: what is farther off counts less, as it may be another person's, or a bag's
-ROBUST_SCALES = (0.09, 0.09, 0.065, 0.065, 0.045, 0.045, *[0.033] * 6)
 ANGLE_DEVIATION = np.radians(8.0)  # that an angle may be off the estimate: standard deviation, as all that follow
 ANGLE_ACCELERATION = np.radians(450.0)  # a second squared, of that difference
 CONTOUR_ROOT_DEVIATION = 0.03  # metres that the root may be off the estimate, across the line of sight
-MAX_ANGLE_STEP, MAX_FACTOR_STEP = np.radians(20.0), 0.2  # of a step: of an angle, and of the logarithm of a factor
+MAX_FACTOR_STEP = 0.2  # of a step: of the logarithm of a factor
 BUILD_FRAMES = 2.0  # that weigh as much as what is known of people: errors of successive contours are correlated
 CONTOUR_WINDOW, CONTOUR_OVERLAP = 300, 30  # frames that are solved for at once, and those that two windows share
 
@@ -276,53 +145,3 @@ def _stepped(part: _Part, borders: Sequence[MaskContours], scale: float) -> _Par
     body = shaped(part.body, np.exp(-changes), part.height) if factors else part.body
     fitted = replace(fitted, skeleton=body.skeleton, poses=poses, translations=places - steps[:, :3])
     return replace(part, fitted=fitted, body=body, factors=part.factors - changes, spread=spread)
-
-
-POINT_SPACING = 0.04  # metres, about, between two points of a mask's border, where one frame is fitted
-STEP_EVALUATIONS = 27.0  # effort of a step of one frame, in costs of poses, which docs/studies/follow.py measures
-
-
-def fitted(
-    body: Body,
-    views: Sequence[MaskContours],
-    start: tuple[Array, Array],
-    means: Array,
-    precisions: Array,
-    scales: Sequence[float],
-) -> tuple[Array, Array]:
-    """Return poses (n, 66) and places (n, 3) after a step to the contours of one frame for each of `scales`.
-
-    Angles are pulled to `means` (n, 66), places to where they `start`, with `precisions` (69,) of places and angles.
-    Contours farther off than a scale, metres, count less.
-    """
-    angles = np.flatnonzero(body.skeleton.free)
-    poses, places, weights = start[0].copy(), start[1].copy(), precisions[np.append([0, 1, 2], 3 + angles)]
-    for scale in scales:
-        curves, slopes, *_ = contour_squares(body, views, poses, places, scale)
-        off = np.concatenate([places - start[1], (poses - means)[:, angles]], axis=1)
-        np.einsum("nii->ni", curves)[:] += weights  # on the diagonals
-        steps = np.linalg.solve(curves, (slopes + weights * off)[..., None])[..., 0]
-        places -= steps[:, :3]
-        poses[:, angles] -= np.clip(steps[:, 3:], -MAX_ANGLE_STEP, MAX_ANGLE_STEP)
-    return poses, places
-
-
-def precisions(turn: float, shift: float) -> Array:
-    """Return the precisions (69,) of a place and of angles with standard deviations, metres and radians."""
-    return np.concatenate([np.full(3, shift**-2.0), np.full(ANGLES, turn**-2.0)])
-
-
-def contour_fit(
-    task: Task, observation: Observation, start: tuple[Array, Array], deviations: tuple[float, float], evaluations: int
-) -> tuple[Array, Array, int]:
-    """Return a pose (66,) and a place (3,) moved until the body's contours are those of the masks, and what it costs.
-
-    `start` is the pose and the place to begin with, which angles and place are off by about `deviations`, radians and
-    metres. Up to twelve steps of Gauss and Newton are made, each of which costs as much as 27 evaluations.
-    """
-    pose, place = (np.array(part, dtype=np.float64)[None] for part in start)
-    scales = ROBUST_SCALES[: max(int(evaluations // STEP_EVALUATIONS), 0)]
-    cameras = enumerate(task.cameras)
-    views = [MaskContours.of(camera, view, [observation], place, POINT_SPACING) for view, camera in cameras]
-    poses, places = fitted(task.body, views, (pose, place), pose, precisions(*deviations), scales)
-    return poses[0], places[0], int(len(scales) * STEP_EVALUATIONS)

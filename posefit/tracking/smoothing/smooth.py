@@ -15,8 +15,6 @@ from posefit.tracking.smoothing.contours import fit_contours
 from posefit.tracking.smoothing.path import Visibility, smooth_path
 from posefit.tracking.trajectory import mean_cost
 
-# metres, on each axis, that a joint may be off the root because a fitted build is: seeds 3 to 5 of composites.py
-BUILD_DEVIATION = 0.008
 STEADY_SECONDS = 1.0 / 30.0  # standard deviation of the filter of angles that a single camera sees
 
 
@@ -32,7 +30,7 @@ def smooth(
     motion, shape = fit_contours(scene, motion, visibility, shape, beta)
     motion = smooth_path(motion, visibility)  # contours pull at standing feet
     scene = scene if shape is None else replace(scene, body=shape.body)
-    smoothed = [_moved(scene, k, frame, motion, beta, shape is not None) for k, frame in enumerate(frames)]
+    smoothed = [_moved(scene, k, frame, motion, beta) for k, frame in enumerate(frames)]
     if shape is not None:
         shape = replace(shape, cost=mean_cost(smoothed, visibility.usable))
     return scene, smoothed, shape
@@ -49,17 +47,13 @@ def steadied(motion: Motion, visibility: Visibility) -> Motion:
     return replace(motion, poses=np.where(np.isfinite(visibility.viewpoints[:, :1]), angles, motion.poses))
 
 
-def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float, fitted: bool) -> Frame:
-    """Return a frame at the pose that a motion has in frame k, less sure where the build was `fitted`."""
+def _moved(scene: Scene, k: int, frame: Frame, motion: Motion, beta: float) -> Frame:
+    """Return a frame at the pose that a motion has in frame k."""
     pose, place, silhouettes = motion.poses[k], motion.translations[k], scene.observations[k].silhouettes
     costs, counts = pose_costs(scene.body, scene.cameras, silhouettes, pose[None], place[None], beta)
     posterior = frame.posterior
     if posterior is not None:
         poses = posterior.poses + wrapped(pose - frame.pose)
-        model = posterior.recalibration
-        if fitted and model is not None:
-            spreads = np.hypot(model.joint_spreads, BUILD_DEVIATION)
-            model = replace(model, joint_spreads=np.append(0.0, spreads[1:]))
         places = posterior.translations + (place - frame.translation)
-        posterior = replace(posterior, poses=poses, translations=places, recalibration=model)
+        posterior = replace(posterior, poses=poses, translations=places)
     return replace(frame, pose=pose, translation=place, cost=float(costs[0]), areas=counts[:, 0], posterior=posterior)
