@@ -145,7 +145,7 @@ def setting_text(value: Any) -> str:
     if isinstance(value, bool) or value is None:
         return str(value).lower()
     if isinstance(value, list | tuple):
-        return ",".join(setting_text(one) for one in value)
+        return ",".join(map(setting_text, value))
     return str(value)
 
 
@@ -155,14 +155,10 @@ def accepts(annotation: Any, value: Any) -> bool:
     if origin is Literal:
         return value in get_args(annotation)
     if origin in (Union, types.UnionType):
-        return any(accepts(one, value) for one in get_args(annotation))
+        return any(accepts(member, value) for member in get_args(annotation))
     if origin is tuple:
         parts: tuple[Any, ...] = get_args(annotation)
-        return (
-            isinstance(value, tuple)
-            and len(value) == len(parts)
-            and all(accepts(part, one) for part, one in zip(parts, value, strict=True))
-        )
+        return isinstance(value, tuple) and len(value) == len(parts) and all(map(accepts, parts, value))
     if annotation in (None, type(None)):
         return value is None
     if annotation is float:
@@ -207,7 +203,7 @@ def _shown(annotation: Any, default: Any) -> str:
     if origin is Literal:
         return " | ".join(map(str, get_args(annotation)))
     if origin in (Union, types.UnionType):
-        return " | ".join(_shown(one, default) for one in get_args(annotation))
+        return " | ".join(_shown(member, default) for member in get_args(annotation))
     if annotation is type(None):
         return "none"
     return annotation.__name__ if isinstance(annotation, type) else str(annotation)

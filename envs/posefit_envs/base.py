@@ -78,8 +78,8 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         **arguments: Any,
     ) -> None:
         checked(whole, "num_envs", num_envs, 1)
-        own = inspect.signature(type(self)).parameters.values()
-        self.world = world_of([one.name for one in own if one.kind is one.KEYWORD_ONLY], **arguments)
+        parameters = inspect.signature(type(self)).parameters.values()
+        self.world = world_of([each.name for each in parameters if each.kind is each.KEYWORD_ONLY], **arguments)
         checked(lambda: self.world.learned)  # names motions and priors that are unknown
         check_mode(render_mode)
         mode = getattr(autoreset_mode, "value", autoreset_mode)
@@ -224,9 +224,9 @@ class SearchVectorEnv(VectorEnv[Any, Any, Any], ABC):
         self._stage.set_values(i, values_of(episode.problem))
         self._truths[i] = episode.instance.truth.poses[episode.frame]
 
-    def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Array, **own: NDArray[Any]) -> Infos:
+    def _progress(self, best: Array, evaluations: NDArray[np.int64], poses: Array, **more: NDArray[Any]) -> Infos:
         """Return the infos that all searches have, beside an environment's own; poses (n, 66) are compared."""
-        infos = own | {"best_cost": best.copy(), "evaluations": evaluations.copy(), "instance": self._numbers.copy()}
+        infos = more | {"best_cost": best.copy(), "evaluations": evaluations.copy(), "instance": self._numbers.copy()}
         if self.world.errors:
             infos["error_degrees"] = np.degrees(np.abs(wrapped(self._truths - poses))).mean(axis=1)
         return infos
@@ -336,7 +336,7 @@ def _infos_of(infos: Infos, i: int) -> Infos:
 
 
 def check_options(options: Mapping[str, Any] | None, known: Sequence[str]) -> None:
-    """Return nothing. Raises ArgumentError where a reset has an option that is not known."""
+    """Raise ArgumentError where a reset has an option that is not known."""
     for name in options or {}:
         if name not in known:
             came = f"{quoted(name)}{suggestion(str(name), known)}"

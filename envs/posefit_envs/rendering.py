@@ -18,7 +18,7 @@ Picture = NDArray[np.uint8]  # (height, width, 3) red, green, blue
 
 
 def check_mode(mode: str | None) -> None:
-    """Return nothing. Raises gymnasium.error.UnsupportedMode for an unknown render mode."""
+    """Raise gymnasium.error.UnsupportedMode for an unknown render mode."""
     if mode is not None and mode not in MODES:
         raise error.UnsupportedMode(f"render_mode must be one of {', '.join(MODES)}, got {mode!r}")
 

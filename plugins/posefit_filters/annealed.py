@@ -21,9 +21,8 @@ from posefit.plugin import (
     systematic_rows,
     weigh,
 )
-from posefit_filters.weighting import sharpness
+from posefit_filters.weighting import EVALUATIONS, sharpness
 
-EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 LAYERS = 10
 SURVIVAL = 0.5  # alpha, the share of particles that survive a layer
 DIFFUSION = 0.35  # ours: the noise of a layer, as a multiple of the particles' own spread

@@ -18,8 +18,8 @@ from posefit.plugin import (
     systematic_rows,
     weigh,
 )
+from posefit_filters.weighting import EVALUATIONS
 
-EVALUATIONS = 2440  # as many as SAPSO's N (C + 1)
 SHARPNESS = 1.0  # how fast the likelihood falls with the cost
 NOISE = 0.15  # standard deviation of the motion from frame to frame, in half-ranges of the box
 

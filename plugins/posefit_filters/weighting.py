@@ -1,7 +1,8 @@
-"""How sharply costs are weighed."""
+"""How sharply costs are weighed, and the default budget of both filters."""
 
 from posefit.plugin import Array, effective_sample_size, weigh
 
+EVALUATIONS = 2440  # of a frame, as many as SAPSO's N (C + 1)
 TOLERANCE, MAX_STEPS = 1e-9, 100  # ours: of the share that survives, and steps towards it
 MAX_SHARPNESS = 1e12  # ours: where more particles than wanted share the lowest cost, none is sharp enough
 

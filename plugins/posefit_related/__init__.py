@@ -1,4 +1,4 @@
-"""The methods that the SAPSO paper weighs itself against, each from its publication, on posefit's masks and budget.
+"""The methods that the SAPSO paper compares itself with, each from its publication, on posefit's masks and budget.
 
 - `hpso.HPSO`: a swarm that searches the body's chain part by part (John, Trucco and Ivekovic, 2010).
 - `haga.HAGA`: an annealed genetic search in layers of coordinates (Zhao and Liu, 2008).
@@ -10,8 +10,9 @@
 - `isomap.IsomapPrior`: an Isomap with a local linear way back (Wang, Xu and Ai, 2003).
 - `gplvm.GPLVM`: latents of a Gaussian process (Urtasun, Fleet, Hertzmann and Fua, 2005).
 
-`stages` has what the searches share, `frames` what the trackers share. None of these publications was at hand in full:
-docs/ways/related.md says what was, and a docstring names the rest an interpretation.
+`stages` has what the searches share, `frames` what the trackers share, `training` the poses that models learn from.
+None of these publications was at hand in full: docs/ways/related.md says what was, and docstrings name the rest
+interpretations.
 
 >>> import posefit
 >>> track = posefit.track("walk", method="psopf", frames=(0, 3))

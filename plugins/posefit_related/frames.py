@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from posefit import pose_costs
 from posefit.plugin import Array, Frame, Observation, Task, project
+from posefit_related.training import training_poses
 
-YAW_REACH = np.radians(45.0)  # ours: of a known first yaw, to either side
+YAW_REACH = np.radians(45.0)  # ours: to either side of a known first yaw
 
 
 def costs_of(task: Task, observation: Observation, poses: Array, places: Array) -> Array:
@@ -14,15 +15,8 @@ def costs_of(task: Task, observation: Observation, poses: Array, places: Array) 
     return pose_costs(task.body, task.cameras, observation.silhouettes, poses, places)[0]
 
 
-def training_poses(task: Task) -> Array:
-    """Return the poses (T, 66) of all training motions. Raises ValueError where there is none."""
-    if not task.training:
-        raise ValueError("training must hold a motion to learn from, got none")
-    return np.concatenate([motion.poses for motion in task.training])
-
-
 def first_poses(task: Task, rng: np.random.Generator, count: int) -> Array:
-    """Return poses (count, 66) that a first frame may show: training's, or the known one, and yaws as far as known."""
+    """Return poses (count, 66) for a first frame: random training poses, or the known one, at yaws near a known yaw."""
     poses = training_poses(task)
     poses = poses[rng.integers(len(poses), size=count)]
     if task.first_pose is not None:
@@ -39,16 +33,16 @@ def squared_distances(first: Array, second: Array) -> Array:
 
 
 def frame_of(task: Task, observation: Observation, pose: Array, place: Array, evaluations: int) -> Frame:
-    """Return the frame of a pose (66,) at a place (3,), whose cost is one evaluation more."""
+    """Return the frame of a pose (66,) at a place (3,); its cost is one more evaluation."""
     costs, counts = pose_costs(task.body, task.cameras, observation.silhouettes, pose[None], place[None])
     return Frame(pose, place, float(costs[0]), counts[:, 0], evaluations + 1)
 
 
 def place_of(task: Task, observation: Observation, pose: Array, place: Array) -> tuple[Array, int]:
-    """Return where the root is (3,), and the poses drawn to know it: the known place, or where the mask says.
+    """Return the place (3,) of the root, known or estimated by a mask, and how many poses were drawn for that.
 
-    The mask of the first view that shows something is compared with that of the pose at `place`: it is as much farther
-    as it is lower, and as far to the side as its middle.
+    The mask of the first view that shows something is compared with that of the pose at `place`: the ratio of their
+    heights gives the depth, the offset of their centres the direction.
     """
     if observation.translation is not None:
         return np.array(observation.translation, dtype=np.float64), 0
@@ -64,7 +58,7 @@ def place_of(task: Task, observation: Observation, pose: Array, place: Array) ->
 
 
 def _box(mask: NDArray[np.bool_]) -> tuple[Array, Array] | None:
-    """Return the middle (2,) and the size (2,), columns and rows, of what a mask shows; None where it shows nothing."""
+    """Return the centre (2,) and the size (2,), columns and rows, of a mask's bounding box; None where it is empty."""
     rows, columns = np.nonzero(np.asarray(mask))
     if not len(rows):
         return None

@@ -2,11 +2,11 @@
 
 R. Urtasun, D. Fleet, A. Hertzmann, P. Fua, Priors for people tracking from small training sets, ICCV 2005. Poses are
 functions of few latents, drawn from a Gaussian process that is scaled for each angle; latents and kernel are those of
-the highest likelihood for a small set of poses. SAPSO's paper says that such a space is hardly continuous in the
+the highest likelihood for a small set of poses. The SAPSO paper objects that such a space is hardly continuous along a
 motion, so that poses between those of training come out badly.
 
-Interpretations: angles are scaled by their deviations; the model starts from principal components and L-BFGS ends it;
-the latents of a pose are the mean of those of the nearest training poses, by the inverse of their squared distance; a
+Interpretations: angles are scaled by their deviations; L-BFGS fits the model, starting from principal components; the
+latents of a pose are the mean of those of the nearest training poses, by the inverse of their squared distance; a
 latent is feasible where the process is certain enough, instead of a cost that grows with its variance.
 """
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from posefit.plugin import Array, at_least
 from posefit_related.frames import squared_distances
-from posefit_related.isomap import evenly, training_angles
+from posefit_related.training import evenly, training_angles
 
 STEPS = 150  # ours: of L-BFGS
 NEAREST = 4  # ours: training poses whose latents a pose has
@@ -30,23 +30,23 @@ def kernel(first: Array, second: Array, logs: Array) -> Array:
     return np.asarray(np.exp(logs[0] - 0.5 * np.exp(logs[1]) * squares))
 
 
-def loss(numbers: Array, y: Array) -> tuple[float, Array]:
+def loss(parameters: Array, y: Array) -> tuple[float, Array]:
     """Return the negative log posterior of latents and kernel, but for a constant, and its gradient.
 
-    `numbers` are the latents (n, m), and the logarithms of variance, inverse square width and noise; `y` (n, D).
+    `parameters` are the latents (n, m), then the logarithms of variance, inverse square width and noise; `y` (n, D).
     """
-    n, logs = len(y), numbers[-3:]
-    x = numbers[:-3].reshape(n, -1)
+    n, logs = len(y), parameters[-3:]
+    x = parameters[:-3].reshape(n, -1)
     smooth = kernel(x, x, logs)
     inverse = np.linalg.inv(smooth + (np.exp(logs[2]) + 1e-6) * np.eye(n))
     fitted = inverse @ y
     logdet = -np.linalg.slogdet(inverse)[1]
     value = 0.5 * y.shape[1] * logdet + 0.5 * np.sum(fitted * y) + 0.5 * np.sum(x**2)  # URTASUN2005 (likelihood)
-    slope = 0.5 * (y.shape[1] * inverse - fitted @ fitted.T)  # of the value by the covariances
+    by_covariances = 0.5 * (y.shape[1] * inverse - fitted @ fitted.T)
     away, width = x[:, None] - x, np.exp(logs[1])
-    by_x = -2.0 * width * np.einsum("ij,ijm->im", slope * smooth, away) + x
-    by_width = -0.5 * width * np.sum(slope * smooth * (away**2).sum(axis=2))
-    by_logs = [np.sum(slope * smooth), by_width, np.exp(logs[2]) * np.trace(slope)]
+    by_x = -2.0 * width * np.einsum("ij,ijm->im", by_covariances * smooth, away) + x
+    by_width = -0.5 * width * np.sum(by_covariances * smooth * (away**2).sum(axis=2))
+    by_logs = [np.sum(by_covariances * smooth), by_width, np.exp(logs[2]) * np.trace(by_covariances)]
     return float(value), np.concatenate([by_x.ravel(), by_logs])
 
 
@@ -54,8 +54,8 @@ class GPLVM:
     """Latents of a Gaussian process, learned from a subsample of poses.
 
     Settings:
-        components: of a latent, 1 or more.
-        poses: of training at most, 20 or more.
+        components: dimensions of a latent, 1 or more.
+        poses: of the training poses, the most that are used, 20 or more.
     """
 
     low: Array  # (m,)
@@ -74,8 +74,8 @@ class GPLVM:
         y = (self.angles - self.mean) / self.scale
         from scipy.optimize import minimize  # not before it is needed: it takes a third of a second
 
-        left, sizes, _ = np.linalg.svd(y, full_matrices=False)
-        x = (left * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[: self._components]
+        scores, sizes, _ = np.linalg.svd(y, full_matrices=False)
+        x = (scores * np.sqrt(len(y)))[:, : self._components] * (sizes > 1e-9)[: self._components]
         start = np.concatenate([x.ravel(), [0.0, 0.0, np.log(0.05)]])
         end = np.asarray(minimize(loss, start, (y,), jac=True, method="L-BFGS-B", options={"maxiter": STEPS}).x)
         self.latents, self.logs = end[:-3].reshape(len(y), -1), end[-3:]

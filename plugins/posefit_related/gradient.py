@@ -4,9 +4,9 @@ S. Wachter, H.-H. Nagel, Tracking persons in monocular image sequences, Computer
 1999. A body of cones is tracked by an iterated extended Kalman filter: the motion is predicted at constant velocity,
 and the pose that fits the picture's edges best is found from there by iterated linearisation.
 
-Interpretations: the edges are those of the masks, by the fit that posefit smooths footage with, robust against what is
-far off; the covariance of the prediction is diagonal and the same in all frames, and region information is not used. A
-step is paid for as the poses that take as long. The first pose is the best of some training poses.
+Interpretations: the edges are the masks' contours, fitted as posefit smooths footage, robust against outliers; the
+covariance of the prediction is diagonal and the same in all frames; region information is not used. A step counts as
+the evaluations that take as long. The first pose is the best of some training poses.
 """
 
 from collections.abc import Iterable, Iterator
@@ -24,7 +24,7 @@ class Gradient:
     """A prediction at constant velocity, and iterated steps to the contours.
 
     Settings:
-        turn_degrees: that an angle may be off the prediction, a standard deviation; above 0.
+        turn_degrees: standard deviation of an angle from its prediction, above 0.
         damping: share of the velocity that the prediction has, 0 or more.
     """
 
@@ -55,7 +55,7 @@ class Gradient:
             yield frame_of(self.task, observation, pose, place, used)
 
     def _first(self, observation: Observation, rng: np.random.Generator) -> tuple[Array, Array, int]:
-        """Return a pose, a place, and the evaluations to find them."""
+        """Return the first pose and place, and the evaluations that they took."""
         count = max(int(FIRST_SHARE * self.task.evaluations), 1)
         poses = first_poses(self.task, rng, count)
         place, drawn = place_of(self.task, observation, poses[0], np.array(self.task.anchor, dtype=np.float64))

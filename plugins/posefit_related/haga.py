@@ -81,17 +81,17 @@ class HAGA:
         children = self._children(np.array(proposals), costs)
         self._generation, self._waiting = self._generation + 1, 0
         if self._generation == self._generations:
-            before, self._generation, self._layer = self._open(), 0, self._layer + 1
+            before, self._generation, self._layer = self._opened_count(), 0, self._layer + 1
             children = self._grown(children, before) if self._layer < self._layers else children
         children[0] = self._best  # ZHAO2008 (elite)
         self._x = children
 
-    def _open(self) -> int:
+    def _opened_count(self) -> int:
         return opened(self._space.dimensions, self._layer, self._layers)
 
     def _grown(self, x: Array, before: int) -> Array:
         """Return individuals (n, d) whose coordinates that a layer opens are drawn."""
-        now, drawn = self._open(), draw_population(self._space, self._rng, self._size)
+        now, drawn = self._opened_count(), draw_population(self._space, self._rng, self._size)
         grown = x.copy()
         grown[:, before:now] = drawn[:, before:now]
         return repair(self._space, grown, self._best)
@@ -103,7 +103,7 @@ class HAGA:
         return first * math.exp(share * math.log(last / first))  # ZHAO2008 (annealing)
 
     def _children(self, x: Array, costs: Array) -> Array:
-        n, d, count = *x.shape, self._open()
+        n, d, count = *x.shape, self._opened_count()
         fitness = weigh(costs, 1.0 / self.temperature())  # ZHAO2008 (selection)
         mothers, fathers = x[self._rng.choice(n, n, p=fitness)], x[self._rng.choice(n, n, p=fitness)]
         share = self._rng.uniform(-BEYOND, 1.0 + BEYOND, (n, d))

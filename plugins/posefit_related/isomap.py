@@ -2,12 +2,12 @@
 
 Q. Wang, G. Xu, H. Ai, Learning object intrinsic structure for robust visual tracking, CVPR 2003. Isomap gives poses of
 training coordinates that keep their geodesic distances; the way back from such coordinates to a pose, which Isomap does
-not have, is a linear model of the nearest training poses. SAPSO's paper says of manifolds that the lack of an inverse
-in closed form is their largest obstacle.
+not have, is a linear model of the nearest training poses. The SAPSO paper calls the lack of a closed-form inverse the
+largest obstacle of manifolds.
 
 Interpretations: the linear model has the weights that rebuild the coordinates best from those of the nearest poses
-(Roweis and Saul, 2000), damped; a latent is feasible if a training pose is near enough; the graph of neighbours has as
-few as connect all poses; at most `poses` of training are used, evenly.
+(Roweis and Saul, 2000), damped; a latent is feasible if a training pose is near enough; poses have as few neighbours in
+the graph as connect all of them; at most `poses` training poses are used, evenly spaced.
 """
 
 import warnings
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.plugin import Array, at_least
+from posefit_related.training import evenly, training_angles
 
 NEIGHBOURS = 8  # ours: of a pose in the graph; more where they do not connect all poses
 NEAREST = 6  # ours: training poses of the way back
@@ -40,8 +41,8 @@ class IsomapPrior:
     """Geodesic coordinates of poses, and a local linear way back.
 
     Settings:
-        components: of a latent, 1 or more.
-        poses: of training at most, 20 or more.
+        components: dimensions of a latent, 1 or more.
+        poses: of the training poses, the most that are used, 20 or more.
     """
 
     low: Array  # (m,)
@@ -87,19 +88,3 @@ class IsomapPrior:
         """Return which latents (n, m) have a training pose near them (n,)."""
         squares = ((np.asarray(latents)[:, None] - self.centres) ** 2).sum(axis=2)
         return np.asarray(squares.min(axis=1) <= self.reach**2)
-
-
-def training_angles(angles: Array, least: int) -> Array:
-    """Return joint angles (T, 63) of training. Raises ValueError where they are none, or fewer than `least` frames."""
-    angles = np.asarray(angles, dtype=np.float64)
-    if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
-        raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")
-    if len(angles) < least:
-        raise ValueError(f"angles must hold at least {least} frames, got {len(angles)}")
-    return angles
-
-
-def evenly(angles: Array, count: int) -> Array:
-    """Return at most `count` of the angles (T, 63), evenly."""
-    rows = np.unique(np.linspace(0, len(angles) - 1, min(count, len(angles))).astype(int))
-    return np.asarray(angles[rows])

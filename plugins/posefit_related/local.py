@@ -17,7 +17,7 @@ from posefit.plugin import Array, Space, at_least, check_tell, positive, repair,
 from posefit_related.stages import EVALUATIONS, first_population, runs
 
 MIN_STEP = 1e-3  # ours: half-ranges of the box
-SAME = 1e-9  # of a coordinate: two poses that differ by less are one
+SAME_POSE = 1e-9  # poses whose coordinates all differ by less are one
 
 
 class Local:
@@ -82,7 +82,7 @@ class Local:
                 pose = heappop(self._open)[2]  # GAVRILA1996 (best first)
                 moves = np.eye(self._space.dimensions)[self._runs[self._part]] * self._step
                 near = repair(self._space, pose + np.concatenate([moves, -moves]), pose)
-                new: Array = near[(np.abs(near[:, None] - self._closed).max(axis=2) > SAME).all(axis=1)]
+                new: Array = near[(np.abs(near[:, None] - self._closed).max(axis=2) > SAME_POSE).all(axis=1)]
                 if len(new):
                     return new
             self._next_part()

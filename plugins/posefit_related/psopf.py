@@ -58,14 +58,13 @@ class PSOPF:
         positive("noise", noise)
         positive("alpha", alpha)
         self._space, self._rng, self._waiting = space, rng, 0
-        self._x: Array
-        self._v: Array
-        self._pbest: Array
-        self._pbest_cost: Array
-        self._moves: int
         self._iterations = min(iterations, evaluations - 1)
         self._sharpness, self._noise, self._alpha = sharpness, noise, alpha
         self._begin(draw_population(space, rng, evaluations // (self._iterations + 1)))
+
+    def _begin(self, x: Array) -> None:
+        self._x, self._v, self._moves = x, np.zeros_like(x), 0
+        self._pbest, self._pbest_cost = x.copy(), np.full(len(x), np.inf)
 
     def ask(self) -> Array:
         """Return the particles (n, d) after their move; none after the last one of a frame."""
@@ -94,7 +93,3 @@ class PSOPF:
         moved = converted(space, self._pbest[rows], self._space)
         self._space = space
         self._begin(sample_normal(space, self._rng, moved, np.full(space.dimensions, self._noise)))
-
-    def _begin(self, x: Array) -> None:
-        self._x, self._v, self._moves = x, np.zeros_like(x), 0
-        self._pbest, self._pbest_cost = x.copy(), np.full(len(x), np.inf)

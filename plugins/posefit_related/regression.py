@@ -1,13 +1,13 @@
 """Poses from silhouettes by regression: no body is drawn to fit a frame.
 
 A. Agarwal, B. Triggs, Recovering 3D human pose from monocular images, IEEE Trans. Pattern Analysis and Machine
-Intelligence 28(1), 2006. A silhouette is a histogram of shape contexts: those of the points of its border, as votes for
-the centres of a codebook. Poses are regressed by kernels on a training set of rendered poses; in a sequence, a
-predicted pose joins the silhouette, since one silhouette may be of several poses.
+Intelligence 28(1), 2006. A silhouette becomes a histogram: the shape contexts of its border's points vote for the words
+of a codebook. Kernel regression on rendered training poses gives the pose; in a sequence the predicted pose is a second
+input, since one silhouette may be of several poses.
 
 Interpretations: damped least squares over a kernel at every training pose, where the publication prefers a relevance
-vector machine for its sparseness; a product of kernels of silhouette and predicted pose; several views side by side. To
-render training poses counts in no frame's budget.
+vector machine for its sparseness; a product of kernels of silhouette and predicted pose; several views side by side.
+Rendering the training poses is in no frame's budget.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,29 +16,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, project
-from posefit_related.frames import frame_of, place_of, squared_distances, training_poses
+from posefit_related.frames import frame_of, place_of, squared_distances
+from posefit_related.training import training_poses
 
-POINTS, ANGLES, RADII = 80, 12, 5  # ours: of a border and of a shape context
+POINTS = 80  # ours: of a border, at most
+SECTORS, RINGS = 12, 5  # ours: the bins of a shape context
 YAW_REACH = np.radians(90.0)  # ours: of training poses to either side of a known first yaw
-VOTES, STATE_NOISE = 0.25, 0.5  # ours: widths of a vote, in usual distances, and of a prediction, in deviations
-DAMPING, SHARPNESS = 0.5, (3.0, 0.3, 0.5)  # ours: of velocity; of the kernel in silhouette, yaw, and other angles
+VOTE_WIDTH = 0.25  # ours: of a vote for a word, as a share of the root mean square distance from the words
+PREDICTION_NOISE = 0.5  # ours: that training's predicted poses are off, in standard deviations of each number
+DAMPING = 0.5  # ours: share of the velocity that the prediction has
+SILHOUETTE_SHARPNESS, YAW_SHARPNESS, ANGLES_SHARPNESS = 3.0, 0.3, 0.5  # ours: of the factors of the kernel
 
 
 def contexts(mask: NDArray[np.bool_]) -> Array:
-    """Return the shape contexts (n, 60) of points on a mask's border: where its other points are, around each."""
+    """Return the shape contexts (n, 60) of points on a mask's border: the shares of the other points in each bin.
+
+    The bins lie around the point, `SECTORS` in each of `RINGS` whose radii double.
+    """
     padded = np.pad(np.asarray(mask, dtype=bool), 1)
     inner = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     points = np.argwhere(padded[1:-1, 1:-1] & ~inner).astype(np.float64)
     if len(points) < 3:
-        return np.zeros((1, ANGLES * RADII))
+        return np.zeros((1, SECTORS * RINGS))
     points = points[np.linspace(0, len(points) - 1, min(POINTS, len(points))).astype(int)]
     away = points[None] - points[:, None]
     far = np.hypot(*np.moveaxis(away, 2, 0))
-    ring = np.clip(np.log2(far / far.mean() + 1e-9) + RADII - 1.5, 0.0, RADII - 1.0).astype(int)
-    sector = ((np.arctan2(away[..., 0], away[..., 1]) + np.pi) * ANGLES / (2.0 * np.pi)).astype(int) % ANGLES
-    bins = ring * ANGLES + sector + ANGLES * RADII * np.arange(len(points))[:, None]
+    ring = np.clip(np.log2(far / far.mean() + 1e-9) + RINGS - 1.5, 0.0, RINGS - 1.0).astype(int)
+    sector = ((np.arctan2(away[..., 0], away[..., 1]) + np.pi) * SECTORS / (2.0 * np.pi)).astype(int) % SECTORS
+    bins = ring * SECTORS + sector + SECTORS * RINGS * np.arange(len(points))[:, None]
     others = bins[~np.eye(len(points), dtype=bool)]
-    counts = np.bincount(others, minlength=ANGLES * RADII * len(points)).reshape(len(points), -1)
+    counts = np.bincount(others, minlength=SECTORS * RINGS * len(points)).reshape(len(points), -1)
     return np.asarray(counts / (len(points) - 1.0))  # AGARWAL2006 (shape context)
 
 
@@ -46,7 +53,7 @@ def histogram(shapes: Array, words: Array) -> Array:
     """Return the votes (k,) of contexts (n, 60) for the words (k, 60) of a codebook; they sum to 1."""
     squares = squared_distances(shapes, words)
     squares -= squares.min(axis=1, keepdims=True)
-    votes = np.exp(-squares / (2.0 * (VOTES * np.sqrt(squares.mean()) + 1e-9) ** 2))
+    votes = np.exp(-squares / (2.0 * (VOTE_WIDTH * np.sqrt(squares.mean()) + 1e-9) ** 2))
     return np.asarray((votes / votes.sum(axis=1, keepdims=True)).mean(axis=0))  # AGARWAL2006 (histogram)
 
 
@@ -70,17 +77,17 @@ class Regression:
         poses = poses[rng.integers(len(poses), size=samples)]
         poses[:, 0] = rng.uniform(-1.0, 1.0, samples) * (np.pi if task.yaw is None else YAW_REACH) + (task.yaw or 0.0)
         shapes = [[contexts(project(task.body, view, pose, task.anchor)) for pose in poses] for view in task.cameras]
-        some = np.concatenate([part for view in shapes for part in view[:: max(samples // 200, 1)]])
+        some = np.concatenate([shape for view in shapes for shape in view[:: max(samples // 200, 1)]])
         self.words = MiniBatchKMeans(min(words, len(some)), n_init=1, random_state=0).fit(some).cluster_centers_
-        signs = np.concatenate([[histogram(part, self.words) for part in view] for view in shapes], axis=1)
-        values = numbers(poses)
+        self.histograms = np.concatenate([[histogram(shape, self.words) for shape in view] for view in shapes], axis=1)
+        self.spread = float(((self.histograms - self.histograms.mean(axis=0)) ** 2).sum(axis=1).mean())
+        values = regressed(poses)
         self.mean, self.scale = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-3)
-        self.targets, self.signs = (values - self.mean) / self.scale, signs
-        self.states = self.targets + STATE_NOISE * rng.standard_normal(values.shape)
-        self.width = float(((signs - signs.mean(axis=0)) ** 2).sum(axis=1).mean())
+        self.targets = (values - self.mean) / self.scale
+        self.predictions = self.targets + PREDICTION_NOISE * rng.standard_normal(values.shape)
         self.factors = {}  # by how many numbers of the predicted pose are known: none, two of the yaw, or all
         for known in (0, 2, values.shape[1]):
-            gram = self._kernel(signs, self.states, known)
+            gram = self._kernel(self.histograms, self.predictions, known)
             self.factors[known] = np.linalg.solve(gram + ridge * np.eye(samples), self.targets)  # AGARWAL2006 (ridge)
 
     def track(self, observations: Iterable[Observation], rng: np.random.Generator) -> Iterator[Frame]:
@@ -88,13 +95,13 @@ class Regression:
         task, latest, place = self.task, list[Array](), np.array(self.task.anchor, dtype=np.float64)
         for observation in observations:
             if observation.usable or not latest:
-                state, known = self._predicted(latest)
+                prediction, known = self._predicted(latest)
                 masks = [silhouette.mask for silhouette in observation.silhouettes]
-                sign = np.concatenate([histogram(contexts(mask), self.words) for mask in masks])
-                value = (self._kernel(sign[None], state[None], known) @ self.factors[known])[0]
-                latest = [*latest, value][-2:]
-            value = self.mean + self.scale * latest[-1]
-            pose = np.append(np.arctan2(value[1], value[0]), value[2:])
+                votes = np.concatenate([histogram(contexts(mask), self.words) for mask in masks])
+                estimate = (self._kernel(votes[None], prediction[None], known) @ self.factors[known])[0]
+                latest = [*latest, estimate][-2:]
+            cosine, sine, *angles = self.mean + self.scale * latest[-1]
+            pose = np.array([np.arctan2(sine, cosine), *angles])
             place, drawn = place_of(task, observation, pose, place)
             yield frame_of(task, observation, pose, place, drawn)
 
@@ -105,16 +112,16 @@ class Regression:
         yaw, angles = self.task.yaw, self.task.first_pose
         pose = np.concatenate([[yaw or 0.0, 0.0, 0.0], np.zeros(63) if angles is None else angles])
         known = 0 if yaw is None else 2 if angles is None else len(self.mean)
-        return (numbers(pose[None])[0] - self.mean) / self.scale, known
+        return (regressed(pose[None])[0] - self.mean) / self.scale, known
 
-    def _kernel(self, signs: Array, states: Array, known: int) -> Array:
+    def _kernel(self, histograms: Array, predictions: Array, known: int) -> Array:
         """Return the kernels (n, samples) of silhouettes, and of the first `known` numbers of predicted poses."""
-        scales = np.sqrt(np.repeat([SHARPNESS[1] / 2, SHARPNESS[2] / 65], [2, 65]))[:known]
-        squares = squared_distances(states[:, :known] * scales, self.states[:, :known] * scales)
-        squares += SHARPNESS[0] * squared_distances(signs, self.signs) / self.width
+        scales = np.sqrt(np.repeat([YAW_SHARPNESS / 2, ANGLES_SHARPNESS / 65], [2, 65]))[:known]
+        squares = squared_distances(predictions[:, :known] * scales, self.predictions[:, :known] * scales)
+        squares += SILHOUETTE_SHARPNESS * squared_distances(histograms, self.histograms) / self.spread
         return np.asarray(np.exp(-squares))  # AGARWAL2006 (kernel)
 
 
-def numbers(poses: Array) -> Array:
-    """Return what is regressed (n, 67): the yaw's cosine and sine, so that it may turn, and the other angles."""
+def regressed(poses: Array) -> Array:
+    """Return the numbers (n, 67) that are regressed: cosine and sine of the yaw, and the other angles of poses."""
     return np.column_stack([np.cos(poses[:, 0]), np.sin(poses[:, 0]), poses[:, 1:]])

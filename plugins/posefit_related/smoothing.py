@@ -1,4 +1,4 @@
-"""A particle filter whose weights are smoothed backwards, so that later frames tell about earlier ones.
+"""A particle filter whose weights are smoothed backwards: later frames correct earlier ones.
 
 P. Peursum, S. Venkatesh, G. West, A study on smoothing for particle-filtered 3D human body tracking, International
 Journal of Computer Vision 87, 2010. Of its three smoothed inferences this is the first, particle-filtered backwards
@@ -16,7 +16,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from posefit.plugin import Array, Frame, Observation, Task, at_least, positive, systematic_rows, weigh
-from posefit_related.frames import costs_of, first_poses, frame_of, training_poses
+from posefit_related.frames import costs_of, first_poses, frame_of
+from posefit_related.training import training_poses
 
 HEAVIEST = 600  # ours: particles of a frame that are smoothed
 MIN_STEPS = np.array([np.radians(2.0), 0.005, 0.005, 0.005])  # ours: least deviations a frame of yaw and place
@@ -50,26 +51,26 @@ class Smoothing:
         count = max(self.task.evaluations - 1, 1)
         poses = first_poses(self.task, rng, count)
         where = np.tile(self.task.anchor, (count, 1))
-        here = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
+        particles = np.column_stack([poses[:, 0], where, (poses[:, 1:] - self.mean) @ self.axes.T])
         likelihood = np.full(count, 1.0 / count)
         for observation in sequence:
             if states:
                 rows = systematic_rows(likelihood, rng.random(), len(likelihood))
-                here = here[rows] + self.steps * rng.standard_normal((count, len(self.steps)))
+                particles = particles[rows] + self.steps * rng.standard_normal((count, len(self.steps)))
             if observation.translation is not None:
-                here[:, 1:4] = observation.translation
+                particles[:, 1:4] = observation.translation
             costs = np.zeros(count)
             if observation.usable:
-                costs = costs_of(self.task, observation, self._poses(here), here[:, 1:4])
+                costs = costs_of(self.task, observation, self._poses(particles), particles[:, 1:4])
             likelihood = weigh(costs, self.sharpness)
             heaviest = np.argsort(-likelihood, kind="stable")[:HEAVIEST]
-            states.append(here[heaviest])
+            states.append(particles[heaviest])
             weights.append(likelihood[heaviest] / likelihood[heaviest].sum())
         if self.backwards:
             weights = smoothed(states, weights, self.steps)
-        for observation, here, weight in zip(sequence, states, weights, strict=True):
-            leading = here[weight.argmax()]
-            mean = leading + weight @ differences(here, leading)
+        for observation, particles, weight in zip(sequence, states, weights, strict=True):
+            leading = particles[weight.argmax()]
+            mean = leading + weight @ differences(particles, leading)
             evaluations = count if observation.usable else 0
             yield frame_of(self.task, observation, self._poses(mean[None])[0], mean[1:4], evaluations)
 
@@ -98,11 +99,11 @@ def differences(states: Array, origin: Array) -> Array:
 def smoothed(states: list[Array], weights: list[Array], steps: Array) -> list[Array]:
     """Return the weights (n,) of each frame's states (n, D) given all frames, for normal steps (D,) between frames."""
     after = weights[-1:]
-    for here, there, weight in reversed(list(zip(states, states[1:], weights, strict=False))):
-        moves = differences(there[None], here[:, None]) / steps
+    for now, later, weight in reversed(list(zip(states, states[1:], weights, strict=False))):
+        moves = differences(later[None], now[:, None]) / steps
         logs = -0.5 * (moves**2).sum(axis=2)
-        chances = np.exp(logs - logs.max(axis=0))  # (here, there), each column to a factor that cancels
-        reached = chances / np.maximum(weight @ chances, 1e-300)
+        likelihoods = np.exp(logs - logs.max(axis=0))  # (now, later), each column up to a factor that cancels
+        reached = likelihoods / np.maximum(weight @ likelihoods, 1e-300)
         backward = weight * (reached @ after[0])  # PEURSUM2010 (backward)
         after.insert(0, backward / backward.sum())
     return after

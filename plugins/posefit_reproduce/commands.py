@@ -7,7 +7,7 @@ it runs.
 import json
 from collections.abc import Iterator, Mapping
 from functools import partial
-from importlib import import_module
+from importlib import import_module  # of figures, for which matplotlib may be missing
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -45,7 +45,7 @@ def vsmm_command(films: int, out: str | None, workers: int, as_json: bool) -> No
     """Stepping, waving, jumping jacks and squats: the experiment of CN101894278, by its letter and by default."""
     from posefit_reproduce.vsmm.experiment import Scale
 
-    _print(patent_experiment(Scale(films)), out, workers, as_json)
+    _run(patent_experiment(Scale(films)), out, workers, as_json)
 
 
 @reproduce_group.command("sapso")
@@ -63,10 +63,11 @@ def sapso_command(clips: str | None, seeds: int, quick: bool, out: str | None, w
     """A walk, a walk with a turn and a run: Acta Automatica Sinica 38(5), and what each part of its method is worth."""
     from posefit_reproduce.sapso.experiment import Scale
 
-    _print(paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers, as_json)
+    _run(paper_experiment(clips, Scale(**QUICK) if quick else Scale(seeds)), out, workers, as_json)
 
 
-def _print(experiment: "Experiment", out: str | None, workers: int, as_json: bool) -> None:
+def _run(experiment: "Experiment", out: str | None, workers: int, as_json: bool) -> None:
+    """Run an experiment and print its tables."""
     from posefit_reproduce.experiment import reproduce
 
     tables = reproduce(experiment, out, workers, partial(progress, unit="run"))
@@ -124,7 +125,9 @@ def patent_experiment(scale: Any) -> "Experiment":
     from posefit_reproduce.vsmm.experiment import perform
     from posefit_reproduce.vsmm.tables import patent_tables
 
-    def figures(results: Any) -> Any:
-        return import_module("posefit_reproduce.vsmm.figures").patent_figures(results)  # matplotlib may be missing
-
-    return Experiment([*scale.runs], perform, patent_tables, figures)
+    return Experiment(
+        [*scale.runs],
+        perform,
+        patent_tables,
+        lambda results: import_module("posefit_reproduce.vsmm.figures").patent_figures(results),
+    )

@@ -52,7 +52,7 @@ class Run(NamedTuple):
 
 
 class Results:
-    """What runs gave."""
+    """The arrays of all runs."""
 
     def __init__(self, runs: Mapping[Run, Arrays]) -> None:
         self.runs = runs
@@ -127,15 +127,16 @@ def claims_table(name: str, claims: Sequence[Claim]) -> Table:
         texts.setdefault(claim.text, {})[claim.subject] = claim
     subjects = [*max(texts.values(), key=len)]
     rows = []
-    for text, tried in texts.items():
-        claim, cells = next(iter(tried.values())), dict.fromkeys(subjects, "")
-        for subject, claim in tried.items():
+    for text, by_subject in texts.items():
+        cells = dict.fromkeys(subjects, "")
+        for subject, claim in by_subject.items():
             verdict, mean = claim.verdict(level)
             cells[subject] = f"**{verdict}** {bounded(mean)}"
-        count = str(claim.values.size) if claim.values.ndim else "-"
-        bound = f"{'above' if claim.above else 'below'} {{}} {claim.unit}"
-        bounds = dict.fromkeys(f"{claim.bound:.3g}" for claim in tried.values())
-        rows.append([text, claim.source, bound.format(" / ".join(bounds)), count, *cells.values()])
+        *_, last = by_subject.values()  # source, unit, direction and number of runs are the same in all
+        count = str(last.values.size) if last.values.ndim else "-"
+        bounds = " / ".join(dict.fromkeys(f"{claim.bound:.3g}" for claim in by_subject.values()))
+        condition = f"{'above' if last.above else 'below'} {bounds} {last.unit}"
+        rows.append([text, last.source, condition, count, *cells.values()])
     return Table(name, ["claim", "where", "holds if", "n", *subjects], rows, 3)
 
 
@@ -169,12 +170,7 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
         library("")
     with nullcontext(out) if out is not None else TemporaryDirectory() as place:
         folder = Path(place)
-        try:
-            if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
-                raise InputError(f"{folder}: expected a new folder or one of an earlier reproduction, got another one")
-            (folder / "runs").mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: expected a folder to write to, got {error.strerror}") from error
+        _make_runs_folder(folder)
         files = {run: folder / "runs" / f"{run.file}.npz" for run in experiment.runs}
         jobs = {run: partial(_store, experiment.perform, run, file) for run, file in files.items() if not file.exists()}
         _check_record(folder, experiment.shared, bool(jobs))
@@ -184,18 +180,24 @@ def reproduce(experiment: Experiment, out: str | Path | None, workers: int, prog
         tables = list(experiment.tables(results))
         if out is not None:
             _write(folder, tables, results)
-            for name, figure in experiment.figures(results):
-                if isinstance(figure, np.ndarray):
-                    (folder / name).write_bytes(cv2.imencode(Path(name).suffix, figure)[1].tobytes())
-                else:
-                    figure.savefig(folder / name, dpi=130)
+            _write_figures(folder, experiment.figures(results))
     return tables
 
 
-def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None:
-    """Raise InputError where runs of a folder depend on something else; record what they do where none is there.
+def _make_runs_folder(folder: Path) -> None:
+    """Make the folder of runs where there is none. Raises InputError where the folder holds something else."""
+    try:
+        if folder.is_dir() and any(folder.iterdir()) and not (folder / "runs").is_dir():
+            raise InputError(f"{folder}: expected a new folder or one of an earlier reproduction, got another one")
+        (folder / "runs").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: expected a folder to write to, got {error.strerror}") from error
 
-    A build counts only where runs are added to others.
+
+def _check_record(folder: Path, shared: Mapping[str, Any], adding: bool) -> None:
+    """Raise InputError where a folder's record of what its runs depend on is another; write it where there is no run.
+
+    The build of posefit counts only where runs are added to others.
     """
     file = folder / RECORD
     now = {name: digest_of(value) for name, value in {**shared, "build": posefit_build()}.items()}
@@ -236,3 +238,11 @@ def _write(folder: Path, tables: Sequence[Table], results: Results) -> None:
     builds = sorted({str(arrays["build"]) for arrays in results.runs.values()})
     report = {"builds": builds, "runs": len(results.runs), "tables": [table._asdict() for table in tables]}
     (folder / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+def _write_figures(folder: Path, figures: Iterable[tuple[str, Any]]) -> None:
+    for name, figure in figures:
+        if isinstance(figure, np.ndarray):
+            (folder / name).write_bytes(cv2.imencode(Path(name).suffix, figure)[1].tobytes())
+        else:
+            figure.savefig(folder / name, dpi=130)

@@ -178,7 +178,7 @@ class Switching:
         self.active = self.models.names
         self.group: str | None = None
         self.candidate_group: str | None = None
-        self._log_ratio = 0.0  # of the likelihoods since the candidate_group came, new to old
+        self._log_ratio = 0.0  # of the likelihoods since the candidate group came into force, new to old
         self._cycles = 0
         self._points: list[Array] = []
 
@@ -223,14 +223,10 @@ class Switching:
             return after if self._cycles < self.form.first_cycles(self.models) else self._only(likely, after)
         if self.candidate_group is not None:
             return self.decided(after)
-        number = requested_group(self._points)
-        if (
-            number is None
-            or number >= len(self.groups)
-            or (candidate_group := tuple(self.groups)[number]) == self.group
-        ):
+        number, names = requested_group(self._points), tuple(self.groups)
+        if number is None or number >= len(names) or names[number] == self.group:
             return after
-        return self.form.cycle_over_both(self, before, candidate_group, measure)
+        return self.form.cycle_over_both(self, before, names[number], measure)
 
     def bring_in(self, candidate_group: str) -> None:
         """Bring another group into force beside the present one."""

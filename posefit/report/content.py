@@ -12,7 +12,7 @@ from posefit.reading import counted
 from posefit.report import charts
 from posefit.report.kind import Contest, Runs
 from posefit.report.leaderboard import contest_of, leaderboard, paired_tests
-from posefit.report.page import COLOURS
+from posefit.report.page import COLOUR_COUNT
 from posefit.report.searches import running_times, search_charts
 from posefit.report.summary import leader_sentences, unpaired_sentence
 from posefit.statistics.intervals import RESAMPLES
@@ -38,7 +38,7 @@ def data_of(ledger: Ledger, runs: Runs) -> dict[str, Any]:
         "instances": [{"name": name} for name in runs.instances],
         "baseline_names": kind.baselines,
         "joints": [place.replace("_", " ") for place in PLACES],
-        "colours": COLOURS,
+        "colours": COLOUR_COUNT,
         "columns": {name: kind.columns[name].as_dict() for name in runs.table_figures},
         "score": vars(kind.score),
         "warnings": warnings,
@@ -165,9 +165,10 @@ def _notes(runs: Runs, contest: Contest | None) -> list[str]:
                 f"Too few runs in common with the others, so not compared: {'; '.join(apart)}. "
                 "Their rows of the leaderboard use their own runs."
             )
+    budget = "Budgets differ: compare methods of one budget only, as a longer search has lower costs."
     for field, advice in {
-        "evaluations": "Budgets differ: compare methods of one budget only, as a longer search has lower costs.",
-        "budget": "Budgets differ: compare methods of one budget only, as a longer search has lower costs.",
+        "evaluations": budget,
+        "budget": budget,
         "infeasible": "Infeasible proposals are treated differently: compare methods that treat them in the same way.",
         "version": "Commands run rows again if the same versions are installed.",
     }.items():

@@ -20,9 +20,8 @@ def contest_of(runs: Runs) -> Contest | None:
 def leaderboard(contest: Contest) -> list[dict[str, Any]]:
     """Return a row for each method, best first; those that do not take part come last, with their own runs.
 
-    Figures are averages, the score has an interval, and the kind of runs adds its own: see `board` of `Tracks` and
-    `Searches`. `behind` is the median difference from the leader in paired runs with its interval, `p` is Wilcoxon's
-    after Holm.
+    Figures are averages, the score has an interval, and the kind of runs adds its own by `Kind.board`. `behind` is the
+    median difference from the leader in paired runs with its interval, `p` is Wilcoxon's after Holm.
     """
     runs, score = contest.runs, contest.runs.kind.score
     more = runs.kind.board(contest)

@@ -49,6 +49,44 @@ def _frozen(value: Any) -> Hashable:
     return value if isinstance(value, str) else (type(value), value)
 
 
+class _Rows:
+    """The finished rows of a ledger as they come, with their methods, instances and heads of commands numbered.
+
+    Raises InputError where there is no row, finished or quarantined, and where there are both tracks and searches.
+    """
+
+    def __init__(self, ledger: "Ledger", quarantined: Sequence[Mapping[str, Any]]) -> None:
+        self.methods, self.places, self.heads = _Distinct(), _Distinct(), _Distinct()
+        self.numbers: list[tuple[int, int, int]] = []  # of instance, method and head of each row
+        self.seeds: list[int] = []  # of any size
+        self.keys: list[str] = []
+        self.warnings: list[tuple[str, ...]] = []
+        self.measured: list[tuple[Array, tuple[Any, ...]]] = []
+        shared: dict[bytes, Any] = {}  # arrays that many rows have
+        kinds: dict[str, None] = {}
+        for row in chain(ledger.rows(), quarantined):
+            kinds[row["spec"]["kind"]] = None
+            if len(kinds) > 1:
+                raise InputError(
+                    f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one"
+                )
+            if row["status"] == "done":
+                self._add(row, shared)
+        if not kinds:
+            raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
+        (self.kind,) = map(KINDS.__getitem__, kinds)
+
+    def _add(self, row: Mapping[str, Any], shared: dict[bytes, Any]) -> None:
+        spec = row["spec"]
+        place, method = self.places.number(_place(spec)), self.methods.number(_variant(spec))
+        head = self.heads.number({name: value for name, value in spec.items() if name not in LAST_FIELDS})
+        self.numbers.append((place, method, head))
+        self.seeds.append(spec["seed"])
+        self.keys.append(row["key"])
+        self.warnings.append(tuple(row["warnings"]))
+        self.measured.append(KINDS[spec["kind"]].read(row, shared))
+
+
 def runs_of(ledger: "Ledger") -> Runs:
     """Return the finished rows of a ledger, in an order that does not depend on which of them finished first.
 
@@ -56,31 +94,10 @@ def runs_of(ledger: "Ledger") -> Runs:
     both tracks and single searches.
     """
     quarantined = ledger.quarantined()
-    methods, places, heads = _Distinct(), _Distinct(), _Distinct()
-    numbers: list[tuple[int, int, int]] = []  # of instance, method and head of each row
-    seeds: list[int] = []  # of any size
-    keys: list[str] = []
-    warnings: list[tuple[str, ...]] = []
-    measured: list[tuple[Array, tuple[Any, ...]]] = []
-    shared: dict[bytes, Any] = {}  # arrays that many rows have
-    kinds: dict[str, None] = {}
-    for row in chain(ledger.rows(), quarantined):
-        spec = row["spec"]
-        kinds[spec["kind"]] = None
-        if len(kinds) > 1:
-            raise InputError(f"{ledger.path}: expected a ledger of tracks or one of single searches, got both in one")
-        if row["status"] == "done":
-            head = {name: value for name, value in spec.items() if name not in LAST_FIELDS}
-            numbers.append((places.number(_place(spec)), methods.number(_variant(spec)), heads.number(head)))
-            seeds.append(spec["seed"])
-            keys.append(row["key"])
-            warnings.append(tuple(row["warnings"]))
-            measured.append(KINDS[spec["kind"]].read(row, shared))
-    if not kinds:
-        raise InputError(f"{ledger.path}: expected a ledger with finished rows, got one with none")
-    (kind,) = map(KINDS.__getitem__, kinds)
-    figures = np.array([values for values, _ in measured], dtype=float).reshape(-1, len(kind.columns))
-    instance, method, head_number = np.array(numbers, dtype=int).reshape(-1, 3).T
+    rows = _Rows(ledger, quarantined)
+    kind, methods, places = rows.kind, rows.methods, rows.places
+    figures = np.array([values for values, _ in rows.measured], dtype=float).reshape(-1, len(kind.columns))
+    instance, method, head_number = np.array(rows.numbers, dtype=int).reshape(-1, 3).T
 
     errors = np.nan_to_num(figures[:, list(kind.columns).index("error")], nan=np.inf)
     count = len(methods.values)  # those that only failed come after them
@@ -97,14 +114,14 @@ def runs_of(ledger: "Ledger") -> Runs:
         {name: _text(value).strip('"') for name, value in place.items() if name not in kind.named}
         for place in sorted_places
     ]
-    commands = [command_head(spec) for spec in heads.values]
-    rising = sorted(set(seeds))
+    commands = [command_head(spec) for spec in rows.heads.values]
+    rising = sorted(set(rows.seeds))
     rank = {seed: k for k, seed in enumerate(rising)}
-    seed = np.array([rank[seed] for seed in seeds], dtype=int)
+    seed = np.array([rank[seed] for seed in rows.seeds], dtype=int)
     instance, method = np.argsort(place_order)[instance], np.argsort(best_first)[method]
     head_number = np.argsort(_order(commands))[head_number]
     order = np.lexsort((seed, method, instance))
-    data = zip(*(measured[k][1] for k in order), strict=True)
+    data = zip(*(rows.measured[k][1] for k in order), strict=True)
     return Runs(
         kind=kind,
         version=ledger.version,
@@ -116,13 +133,13 @@ def runs_of(ledger: "Ledger") -> Runs:
         instance=instance[order],
         seed=seed[order],
         seeds=tuple(rising),
-        keys=tuple(keys[k] for k in order),
+        keys=tuple(rows.keys[k] for k in order),
         figures=dict(zip(kind.columns, figures[order].T, strict=True)),
         data={
             name: np.array(values) if isinstance(values[0], np.ndarray) else values
             for name, values in zip(kind.data, data, strict=False)  # none without rows
         },
-        warnings={k: tuple(map(printable, warnings[row])) for k, row in enumerate(order) if warnings[row]},
+        warnings={k: tuple(map(printable, rows.warnings[row])) for k, row in enumerate(order) if rows.warnings[row]},
         failures=tuple(_failure(cell, label_of[methods.number(_variant(cell["spec"]))]) for cell in quarantined),
         failed=tuple(failed[m] for m in best_first[:count]),
         unfinished=labels[count:],

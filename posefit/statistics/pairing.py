@@ -40,9 +40,8 @@ class Shared:
     rows: Array  # (methods, instances, seeds) which row each is
     blocks: Array  # (methods, blocks) the same of each block; these are more where instances differ in their seeds
     left_out: int  # runs of these methods that not all of them have
-    missing: tuple[
-        tuple[int, tuple[int, ...]], ...
-    ]  # instances without a shared run, and the methods without any there
+    # instances without a shared run, and the methods without any there
+    missing: tuple[tuple[int, tuple[int, ...]], ...]
 
 
 def most_shared(method: Array, instance: Array, seed: Array, error: Array) -> Shared | None:

@@ -219,7 +219,10 @@ def _sequence(draft: _Draft) -> SuiteInstance:
     camera, truth = draft.camera(rng.uniform(-np.pi, np.pi)), draft.nearest(space, poses)
     spaces = [replace(space, prior=frame) for frame in box.frames]
     silhouettes = [draft.silhouette(camera, frame.decode(truth)[0][0]) for frame in spaces]
-    problems = [PoseProblem(draft.body, [camera], [one], frame) for one, frame in zip(silhouettes, spaces, strict=True)]
+    problems = [
+        PoseProblem(draft.body, [camera], [silhouette], frame)
+        for silhouette, frame in zip(silhouettes, spaces, strict=True)
+    ]
     return draft.made(truth[0], *problems)
 
 

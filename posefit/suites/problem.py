@@ -294,13 +294,13 @@ class Suite:
         chosen = FUNCTIONS if functions is None else [suite_function(number) for number in functions]
         for dimension in dimensions:
             one_of("dimension", dimension, DIMENSIONS)
-        self.passed_over = tuple(one for one in chosen if not set(dimensions) & set(one.dimensions))
+        self.passed_over = tuple(function for function in chosen if not set(dimensions) & set(function.dimensions))
         self.name = name
         self._options: dict[str, Any] = {"infeasible": infeasible, "budget": budget}
         self._addresses = [
-            checked_address(name, one.number, instance, dimension)
-            for dimension, one, instance in product(dimensions, chosen, instances)
-            if dimension in one.dimensions
+            checked_address(name, function.number, instance, dimension)
+            for dimension, function, instance in product(dimensions, chosen, instances)
+            if dimension in function.dimensions
         ]
         if not self._addresses:
             raise InputError(f"a suite must hold at least one problem, got none in {list(dimensions)} dimensions")

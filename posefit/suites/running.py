@@ -94,20 +94,22 @@ def run_of(
         raise InputError(f"{problem.id}: budget must be known, here or of the problem, got none")
     if problem.evaluations > budget:
         raise InputError(f"{problem.id}: evaluations must be at most {budget}, the budget, got {problem.evaluations}")
+    evaluations, costs = problem.trace
     return SuiteRun(
-        problem.suite,
-        method,
-        dict(chosen or {}),
-        problem.id_function,
-        problem.dimension,
-        problem.instance,
-        seed,
-        budget,
-        problem.infeasible,
-        problem.truth_cost,
-        problem.targets,
-        *problem.trace,
-        problem.looked,
+        suite=problem.suite,
+        method=method,
+        settings=dict(chosen or {}),
+        function=problem.id_function,
+        dimension=problem.dimension,
+        instance=problem.instance,
+        seed=seed,
+        budget=budget,
+        infeasible=problem.infeasible,
+        truth_cost=problem.truth_cost,
+        targets=problem.targets,
+        evaluations=evaluations,
+        costs=costs,
+        looked=problem.looked,
     )
 
 
@@ -157,19 +159,12 @@ def suite_scores(runs: Iterable[SuiteRun]) -> list[SuiteScore]:
         for (dimension, function, method, *_), group in groups.items()
         if function != ALL or dimension in several
     ]
-    return sorted(
-        scores,
-        key=lambda one: (
-            one.dimension,
-            one.function,
-            one.looked,
-            -one.reached,
-            one.above,
-            one.method,
-            one.budget,
-            one.infeasible,
-        ),
-    )
+    return sorted(scores, key=_rank)
+
+
+def _rank(score: SuiteScore) -> tuple[Any, ...]:
+    best_first = -score.reached, score.above
+    return score.dimension, score.function, score.looked, *best_first, score.method, score.budget, score.infeasible
 
 
 def method_name(run: SuiteRun) -> str:
@@ -180,7 +175,6 @@ def method_name(run: SuiteRun) -> str:
 
 def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     """Return the score of runs that differ only in their instances, seeds and functions."""
-    dimension, budget = runs[0].dimension, runs[0].budget
     reached = np.array([hits((run.evaluations, run.costs), run.targets) for run in runs])
     used = np.array([run.evaluations[-1] for run in runs])
     times = expected_running_time(reached, used)
@@ -189,18 +183,18 @@ def _score(method: str, function: int, runs: Sequence[SuiteRun]) -> SuiteScore:
     rng, instances = np.random.default_rng(RNG_STREAM), [run.instance for run in runs]
     low, high = running_time_interval(reached[:, places], used, instances, rng)
     return SuiteScore(
-        method,
-        function,
-        "all functions" if function == ALL else suite_function(function).name,
-        dimension,
-        budget,
-        runs[0].infeasible,
-        runs[0].looked,
-        len(runs),
-        float(np.median([run.cost - run.truth_cost for run in runs])),
-        float(np.isfinite(reached).mean()),
-        {above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
-        {above: (_finite(low[k]), _finite(high[k])) for k, above in enumerate(shown)},
+        method=method,
+        function=function,
+        name="all functions" if function == ALL else suite_function(function).name,
+        dimension=runs[0].dimension,
+        budget=runs[0].budget,
+        infeasible=runs[0].infeasible,
+        looked=runs[0].looked,
+        runs=len(runs),
+        above=float(np.median([run.cost - run.truth_cost for run in runs])),
+        reached=float(np.isfinite(reached).mean()),
+        running_times={above: _finite(times[place]) for above, place in zip(shown, places, strict=True)},
+        running_time_ends={above: (_finite(low[k]), _finite(high[k])) for k, above in enumerate(shown)},
     )
 
 

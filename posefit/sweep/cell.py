@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 ALL_AROUND = 180.0  # degrees that a yaw may be off when it is unknown
 RNG_STREAM_PERSON = 2001  # of what a method knows of the person
 DROPPED = "dropped"  # the corruption that removes whole frames, a share of them
-RENAMED_MEASURES = (
-    "evaluations",
-    "evaluations_per_second",
-)  # measures that a row has under another name, or not at all
+RENAMED_MEASURES = ("evaluations", "evaluations_per_second")  # that a row has under another name, or not at all
 
 
 @dataclass(frozen=True)
@@ -136,11 +133,8 @@ class TrackCell(Cell):
                 raise InputError(f"{path} must be the file that was planned, {digest[:8]}, got {present[:8]}")
         scene = cell_scene(self)
         training = training_motions(training_clips(self.train, followed=self.motion), scene.fps)
-        shared = {option.name for option in fields(TrackOptions)} & {field.name for field in fields(self)} - {
-            *VIEW,
-            "train",
-        }
-        values = {name: getattr(self, name) for name in shared}
+        options_of_cells = {field.name for field in fields(TrackOptions)} - {*VIEW, "train"}
+        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name in options_of_cells}
         options = TrackOptions(**{**values, "settings": settings_text(self.settings)})
         result = track_scene(scene, training, completed(options, self.motion))
         assert result.truth is not None

@@ -265,8 +265,8 @@ SEARCH_CHECKS: Checks = {
 }
 
 
-def _of(outer: type, *inner: type) -> Check:
-    """Return the check of a list or table of plain values."""
+def _plain(outer: type, *inner: type) -> Check:
+    """Return the check of a value of type `outer`, whose parts, if it is a list or a table, are of `inner` types."""
 
     def check(field: str, value: Any) -> Any:
         parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
@@ -290,14 +290,14 @@ def _figure(field: str, value: Any) -> None:
 
 
 def _numbers(field: str, value: Any, count: int | None = None) -> list[float]:
-    numbers = [_number(field, part) for part in _of(list, int, float)(field, value)]
+    numbers = [_number(field, part) for part in _plain(list, int, float)(field, value)]
     if count is not None and len(numbers) != count:
         raise InputError(f"{field} must be {count} numbers, got {len(numbers)}")
     return numbers
 
 
 def _trace(field: str, value: Any) -> None:
-    trace = _of(dict, list)(field, value)
+    trace = _plain(dict, list)(field, value)
     used, costs = (_numbers(field, trace.get(name)) for name in ("evaluations", "cost"))
     rising = used == sorted(set(used)) and costs == sorted(costs, reverse=True) and all(number >= 1 for number in used)
     if not rising or len(used) != len(costs):
@@ -305,7 +305,7 @@ def _trace(field: str, value: Any) -> None:
 
 
 def _modes(field: str, value: Any) -> None:
-    for part in _of(list, list)(field, value):
+    for part in _plain(list, list)(field, value):
         between(f"the probability of {field}", _numbers(field, part, 3)[1], 0.0, 1.0)
 
 
@@ -313,21 +313,21 @@ def _modes(field: str, value: Any) -> None:
 WRITTEN: Checks = {
     **CHECKS,
     **SEARCH_CHECKS,
-    **dict.fromkeys(("kind", "method", "motion", "version"), _of(str, str)),
-    "train": _of(list, str),
-    "files": _of(dict, str),
-    "settings": _of(dict, int, float, str, bool, type(None), list),
+    **dict.fromkeys(("kind", "method", "motion", "version"), _plain(str, str)),
+    "train": _plain(list, str),
+    "files": _plain(dict, str),
+    "settings": _plain(dict, int, float, str, bool, type(None), list),
     "evaluations": _whole(1),
 }
 # the figures that a row must have; others are numbers
 FIGURES: Mapping[str, Checks] = {
     "track": {
-        "warnings": _of(list, str),
+        "warnings": _plain(list, str),
         "trace": _trace,
         "joint_errors_mm": partial(_numbers, count=len(JOINTS)),
         "mode_reliability": _modes,
     },
-    "search": {"warnings": _of(list, str), "trace": _trace, "truth_cost": _number},
+    "search": {"warnings": _plain(list, str), "trace": _trace, "truth_cost": _number},
 }
 
 
@@ -343,7 +343,7 @@ def checked_row(key: str, spec: str, status: str, faults: str, row: str | None) 
     if kind == "search":
         checked_address(*(values[name] for name in ("suite", "function", "instance", "dimension")))
     if status != "done":
-        reasons = _of(list, str)("reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons"))
+        reasons = _plain(list, str)("reasons", _parsed(f'{{"reasons": {faults}}}').get("reasons"))
         return {"key": key, "spec": values, "status": "quarantined", "reasons": reasons}
     figures = _parsed(row or "")
     _check_names(figures, FIGURES[kind].keys() | figures.keys())

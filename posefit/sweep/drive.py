@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from posefit.errors import InputError
-from posefit.sweep.engine import POLL_SECONDS, Engine
+from posefit.sweep.engine import POLL_SECONDS, Engine, Outcome
 from posefit.sweep.ledger import Writer
 
 
@@ -51,19 +51,9 @@ def drive(
                     continue
                 with ledger.transaction():
                     for outcome in outcomes:
-                        key = outcome.job.key
-                        place = running.pop(key)
-                        if outcome.result is not None:
-                            tally.ran += 1
-                            tally.done += ledger.finish(key, outcome.result)
-                        elif outcome.reason is None:
+                        place = running.pop(outcome.job.key)
+                        if not _record(ledger, tally, outcome):
                             waiting.append(place)
-                        else:
-                            tally.failed += 1
-                            if ledger.fail(key, outcome.reason, outcome.is_own_fault):
-                                tally.quarantined += 1
-                            else:
-                                waiting.append(place)
                 watch(tally)
             tally.stopped = bool(waiting or running)
     except InputError as error:
@@ -72,6 +62,21 @@ def drive(
     finally:
         engine.close()
     return tally
+
+
+def _record(ledger: Writer, tally: Tally, outcome: Outcome) -> bool:
+    """Write what became of a cell, count it, and return whether the cell has ended; else it is to be tried again."""
+    key = outcome.job.key
+    if outcome.result is not None:
+        tally.ran += 1
+        tally.done += ledger.finish(key, outcome.result)
+        return True
+    if outcome.reason is None:
+        return False
+    tally.failed += 1
+    quarantined = ledger.fail(key, outcome.reason, outcome.is_own_fault)
+    tally.quarantined += quarantined
+    return quarantined
 
 
 @contextmanager

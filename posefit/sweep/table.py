@@ -44,12 +44,12 @@ def dataframe(rows: Iterable[Mapping[str, Any]]) -> "pd.DataFrame":
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns of a row of a ledger."""
     spec = row["spec"]
-    flat: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
-    flat["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
-    flat |= {name: value for name, value in spec.items() if name not in ("files", "version")}
-    flat["settings"] = ", ".join(settings_text(spec["settings"]))
+    columns: dict[str, Any] = {"key": row["key"], "version": spec["version"], "status": row["status"]}
+    columns["reason"] = "; ".join(row["reasons"]) if "reasons" in row else ""
+    columns |= {name: value for name, value in spec.items() if name not in ("files", "version")}
+    columns["settings"] = ", ".join(settings_text(spec["settings"]))
     if spec["kind"] == "track":
-        flat |= {
+        columns |= {
             "corruption": ", ".join(f"{kind} {strength:g}" for kind, strength in sorted(spec["corruption"].items())),
             "train": ", ".join(spec["train"]),
             "view_degrees": ", ".join(f"{view:g}" for view in spec["view_degrees"]),
@@ -59,12 +59,12 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
         if name in ("key", "spec", "status", "reasons", "trace", "mode_reliability"):
             continue
         if name == "joint_errors_mm":
-            flat |= {f"{name}.{joint}": error for joint, error in zip(JOINTS, value, strict=True)}
+            columns |= {f"{name}.{joint}": error for joint, error in zip(JOINTS, value, strict=True)}
         elif isinstance(value, Mapping):
-            flat |= {f"{name}.{inner}": one for inner, one in value.items()}
+            columns |= {f"{name}.{part}": figure for part, figure in value.items()}
         else:
-            flat[name] = "; ".join(value) if isinstance(value, list) else value
-    return flat
+            columns[name] = "; ".join(value) if isinstance(value, list) else value
+    return columns
 
 
 def write_csv(rows: Iterable[Mapping[str, Any]], path: str | Path) -> None:

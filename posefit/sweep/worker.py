@@ -49,9 +49,7 @@ def become_worker(parent: int, path: list[str], prepare: bytes) -> None:
         os.setpgid(0, 0)
     sys.path[:] = path
     leave = os._exit
-    os._exit = lambda status: leave(
-        status or EXIT_ZERO_STATUS
-    )  # pebble takes a process that ends with 0 for one that may
+    os._exit = lambda status: leave(status or EXIT_ZERO_STATUS)  # see above
     single_thread()
     end_with_parent(parent)
     if (called := pickle.loads(prepare)) is not None:

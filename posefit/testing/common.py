@@ -49,9 +49,11 @@ class PluginCase:
 def construction(case: PluginCase) -> None:
     """A factory takes what its kind is given, and keyword-only settings."""
     parameters = inspect.signature(case.factory).parameters
-    kinds = [one.kind for one in parameters.values()]
+    kinds = [parameter.kind for parameter in parameters.values()]
     expect(inspect.Parameter.VAR_KEYWORD not in kinds, "settings must be named, got **settings that swallow mistakes")
-    by_position = [name for name, one in parameters.items() if one.kind is not inspect.Parameter.KEYWORD_ONLY]
+    by_position = [
+        name for name, kind in zip(parameters, kinds, strict=True) if kind is not inspect.Parameter.KEYWORD_ONLY
+    ]
     taken, more = ", ".join(case.arguments), ", ".join(by_position[len(case.arguments) :])
     came = f"{more} before the *" if more else f"({', '.join(by_position)})"
     expect(

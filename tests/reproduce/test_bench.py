@@ -31,6 +31,13 @@ def test_opencv_finds_the_same_costs_whatever_the_two_focal_lengths(stretch: tup
     assert np.abs(ours - theirs).mean() < 1.0
 
 
+@each("name", loop.ENDLESS)
+def test_episodes_that_never_end_have_arguments_that_exist(name: str) -> None:
+    step, proposals = loop._step(name, "native")
+    step()
+    assert proposals >= loop.ENVIRONMENTS
+
+
 @pytest.mark.slow
 def test_its_json_holds_every_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernel, "ROUNDS", 1)

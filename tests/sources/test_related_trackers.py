@@ -75,17 +75,17 @@ def learned() -> Regression:
 
 def test_the_regression_is_damped_least_squares_over_the_kernel(learned: Regression) -> None:  # AGARWAL2006 (ridge)
     for known, factors in learned.factors.items():
-        gram = learned._kernel(learned.signs, learned.states, known)
+        gram = learned._kernel(learned.histograms, learned.predictions, known)
         np.testing.assert_allclose(gram @ factors + 0.1 * factors, learned.targets, atol=1e-9)
 
 
 def test_the_kernel_falls_with_silhouette_and_pose(learned: Regression) -> None:  # AGARWAL2006 (kernel)
-    signs, states = learned.signs[:2], learned.states[:2]
-    far = 3.0 * ((signs[0] - signs[1]) ** 2).sum() / learned.width
-    yaw = 0.3 * ((states[0, :2] - states[1, :2]) ** 2).mean()
-    for known, apart in ((0, 0.0), (2, yaw), (67, yaw + 0.5 * ((states[0, 2:] - states[1, 2:]) ** 2).mean())):
+    histograms, predictions = learned.histograms[:2], learned.predictions[:2]
+    far = 3.0 * ((histograms[0] - histograms[1]) ** 2).sum() / learned.spread
+    yaw = 0.3 * ((predictions[0, :2] - predictions[1, :2]) ** 2).mean()
+    for known, apart in ((0, 0.0), (2, yaw), (67, yaw + 0.5 * ((predictions[0, 2:] - predictions[1, 2:]) ** 2).mean())):
         by_hand = np.exp(-far - apart)
-        assert learned._kernel(signs, states, known)[0, 1] == pytest.approx(by_hand, abs=1e-9)
+        assert learned._kernel(histograms, predictions, known)[0, 1] == pytest.approx(by_hand, abs=1e-9)
 
 
 def test_the_pose_that_joins_a_silhouette_is_predicted(learned: Regression) -> None:  # AGARWAL2006 (prediction)

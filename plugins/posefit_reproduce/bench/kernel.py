@@ -20,6 +20,7 @@ from posefit.silhouette.mask import Silhouette
 from posefit.testing.problem import walking_angles
 from posefit_priors.pca import PCA
 
+SIZE = (320, 240)  # pixels
 ROUNDS = 12  # of all jobs in turn; of each, the fastest run counts
 TURN = 0.05  # seconds; a job runs again until its turn is over
 
@@ -49,9 +50,6 @@ def processor() -> dict[str, str]:
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     _, compiled_for, _ = cpu_target.target_context.codegen().magic_tuple()
     return {"name": names[0] if names else platform.processor() or platform.machine(), "compiled_for": compiled_for}
-
-
-SIZE = (320, 240)
 
 
 def bench_problem(threads: int = 1) -> PoseProblem:
@@ -90,8 +88,8 @@ def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
     r0, r1 = radius0[..., None], radius1[..., None]
     corners = np.stack([first + r0 * up, second + r1 * up, second + r1 * down, first + r0 * down], axis=2)
     corners = np.rint((corners - 0.5) * 16).astype(np.int32)
-    a, b = (np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second))
-    r, s = (np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1))
+    starts, ends = (np.rint((points - 0.5) * 16).astype(int).tolist() for points in (first, second))
+    start_radii, end_radii = (np.rint(radii * 16).astype(int).tolist() for radii in (radius0, radius1))
     observed = silhouette.mask.view(np.uint8)
     total = cv2.countNonZero(observed)
     image = np.zeros_like(observed)
@@ -100,8 +98,8 @@ def opencv_costs(problem: PoseProblem, proposals: Array) -> Array:
         image[:] = 0
         for j in range(len(parents)):
             cv2.fillConvexPoly(image, corners[i, j], 1, cv2.LINE_8, 4)
-            cv2.circle(image, a[i][j], r[i][j], 1, -1, cv2.LINE_8, 4)
-            cv2.circle(image, b[i][j], s[i][j], 1, -1, cv2.LINE_8, 4)
+            cv2.circle(image, starts[i][j], start_radii[i][j], 1, -1, cv2.LINE_8, 4)
+            cv2.circle(image, ends[i][j], end_radii[i][j], 1, -1, cv2.LINE_8, 4)
         overlap = cv2.countNonZero(cv2.bitwise_and(image, observed))
         areas[i] = total - overlap, cv2.countNonZero(image) - overlap, overlap
     return mismatch(areas)

@@ -1,7 +1,8 @@
 """How fast is the loop? All figures from one run, so that their ratios hold on any machine."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, cast
 
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from posefit.arrays import Array
 from posefit.fitting.box import draw_population
 from posefit.fitting.optimiser import Filter, minimise, populations
+from posefit.fitting.problem import PoseProblem
 from posefit.fitting.space import SearchSpace
 from posefit.registry import Offer, registry
 from posefit.settings import planned
@@ -25,14 +27,15 @@ EVALUATIONS = PARTICLES * (ITERATIONS + 1)
 SEEDS = 8  # a frame's time is the mean over so many
 ENVIRONMENTS = 40
 ENDLESS: dict[str, dict[str, Any]] = {
-    "FitImage-v0": {"max_evaluations": 10**9, "target_cost": -1.0},
+    "FitImage-v0": {"max_evaluations": 10**9},
     "Race-v0": {"generations": (10**9, 10**9)},
 }
-SEARCHES, SLOW_SECONDS = 5, 3.0  # of each optimiser; seconds after which a slow one has no other
+SEARCHES = 5  # of each optimiser, of which the fastest counts
+SLOW_SECONDS = 3.0  # after which an optimiser begins no other search
 
 
 def loop_figures(threads: int | None = None) -> dict[str, Any]:
-    """Return the timings; `threads` is how many "all" are, by default every core this process may use.
+    """Return the timings; `all_threads` are `threads`, by default every core that this process may use.
 
     `opencv` is a cost function called for one pose at a time, as it is usually written; `opencv_batched` has its
     kinematics and outlines computed for 200 poses at once, the fastest way that still draws with OpenCV.
@@ -42,10 +45,6 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
     proposals = draw_population(alone.space, np.random.default_rng(0), POSES)
     few = proposals[: POSES // 5]
 
-    def frame(seed: int) -> None:
-        optimiser = SAPSO(alone.space, np.random.default_rng(seed), population_size=PARTICLES, iterations=ITERATIONS)
-        minimise(alone.evaluate, optimiser, EVALUATIONS, budget_known=True)
-
     steps = {f"{name} {kind}": _step(name, kind) for name in ENDLESS for kind in ("native", "sync")}
     jobs: dict[str, Callable[[], object]] = {
         "one": lambda: alone.evaluate(proposals),
@@ -53,26 +52,22 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "population": lambda: alone.evaluate(proposals[:PARTICLES]),
         "opencv": lambda: [opencv_costs(alone, few[i : i + 1]) for i in range(len(few))],
         "opencv_batched": lambda: opencv_costs(alone, few),
-        **{f"frame {seed}": partial(frame, seed) for seed in range(SEEDS)},
+        **{f"frame {seed}": partial(_search_frame, alone, seed) for seed in range(SEEDS)},
         **{name: step for name, (step, _) in steps.items()},
     }
-    cv2_threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
+    with _single_threaded_opencv():
         seconds = fastest(jobs)
-    finally:
-        cv2.setNumThreads(cv2_threads)
-    one = seconds["one"] / POSES
-    whole = float(np.mean([seconds[f"frame {seed}"] for seed in range(SEEDS)]))
+    pose_seconds = seconds["one"] / POSES
+    frame_seconds = float(np.mean([seconds[f"frame {seed}"] for seed in range(SEEDS)]))
     difference = np.abs(alone.evaluate(proposals) - opencv_costs(alone, proposals))
     return {
-        "kernel_us_per_pose_1_thread": 1e6 * one,
+        "kernel_us_per_pose_1_thread": 1e6 * pose_seconds,
         "kernel_us_per_pose_all_threads": 1e6 * seconds["all"] / POSES,
         "kernel_us_per_pose_in_populations": 1e6 * seconds["population"] / PARTICLES,
         "opencv_us_per_pose": 1e6 * seconds["opencv"] / len(few),
         "opencv_batched_us_per_pose": 1e6 * seconds["opencv_batched"] / len(few),
-        "sapso_frame_ms": 1e3 * whole,
-        "sapso_overhead": whole / (EVALUATIONS * one),
+        "sapso_frame_ms": 1e3 * frame_seconds,
+        "sapso_overhead": frame_seconds / (EVALUATIONS * pose_seconds),
         "mean_cost_difference_to_opencv": float(difference.mean()),
         "environments_us_per_proposal": {name: 1e6 * seconds[name] / count for name, (_, count) in steps.items()},
         "ask_and_tell_us_per_proposal": ask_and_tell(alone.space),
@@ -80,6 +75,21 @@ def loop_figures(threads: int | None = None) -> dict[str, Any]:
         "size": list(SIZE),
         "cpu": processor(),
     }
+
+
+def _search_frame(problem: PoseProblem, seed: int) -> None:
+    optimiser = SAPSO(problem.space, np.random.default_rng(seed), population_size=PARTICLES, iterations=ITERATIONS)
+    minimise(problem.evaluate, optimiser, EVALUATIONS, budget_known=True)
+
+
+@contextmanager
+def _single_threaded_opencv() -> Iterator[None]:
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
 
 
 def _step(name: str, kind: str) -> tuple[Callable[[], object], int]:

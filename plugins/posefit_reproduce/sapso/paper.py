@@ -55,6 +55,6 @@ TRAINING_FRAMES = {"walk": 386, "turn": 386, "run": 198}
 CONVERGED = 30  # iterations, section 5.2 and figure 6
 SMALL_DEGREES = 5.0  # most dimensions' errors are below it: section 5.3 and figure 7
 TRACK_DEGREES = 4.0  # about the mean error of its tracks: section 5.4
-ENOUGH, VARIANCE = 5, 0.95  # components at most that keep this share, section 2.1
+ENOUGH_COMPONENTS, EXPLAINED_VARIANCE = 5, 0.95  # so many components explain this share at least: section 2.1
 SHOWN_ITERATIONS, SHOWN_PARTICLES = (0, 10, 40, 60), 100  # figure 5
 SWARMS = (20, 40, 60, 100)  # N of figure 6; the paper's own are not in its text

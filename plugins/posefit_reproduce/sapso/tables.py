@@ -63,10 +63,22 @@ class Analysis:
 
 def paper_tables(analysis: Analysis) -> list[Table]:
     """Return all tables."""
-    return [section(analysis) for section in (motions_table, judged, parts, table_2, flaws, turn, by_view, table_1)]
+    return [
+        section(analysis)
+        for section in (
+            motions_table,
+            verdicts_table,
+            parts_table,
+            table_2,
+            flaws_table,
+            turn_table,
+            views_table,
+            table_1,
+        )
+    ]
 
 
-def judged(analysis: Analysis) -> Table:
+def verdicts_table(analysis: Analysis) -> Table:
     """Return the paper's claims with their verdicts, each on one motion."""
     sections = (track_claims, ("walk", "run")), (image_claims, analysis.motions)
     return claims_table(
@@ -128,8 +140,8 @@ def table_2(analysis: Analysis) -> Table:
     return Table("table-2", ["(9) / (10) / seconds", *heads], rows)
 
 
-def flaws(analysis: Analysis) -> Table:
-    """Return how often tracks of each motion go wrong, and their error where the first yaw is unknown."""
+def flaws_table(analysis: Analysis) -> Table:
+    """Return how often each method goes wrong on each motion, and its error where the first yaw is unknown."""
     rows = []
     for name in (*PAPER, *OTHERS):
         figures: list[list[str]] = [[], [], []]
@@ -151,7 +163,7 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
     seconds = [results.of("cpu_seconds", "track", motion, name) for name in (OURS, "sapso@full")]
     # the walk with a turn is followed in the space of the straight walk
     space = PCA().fit(analysis.motions["turn" if motion == "walk" else motion].angles)
-    explained = np.asarray(100.0 * space.explained[: paper.ENOUGH].sum())
+    explained = np.asarray(100.0 * space.explained[: paper.ENOUGH_COMPONENTS].sum())
     few, degrees, milliseconds = 100.0 * few_joints(analysis, motion), "degrees of (8)", "CPU ms a frame"
     faster = 1e3 * seconds[0] - 1e3 * seconds[1]
     claims = [
@@ -160,7 +172,15 @@ def track_claims(analysis: Analysis, motion: str) -> list[Claim]:
         Claim("PCA + SAPSO takes less time than SAPSO", "table 2", label, faster, milliseconds),
         Claim("a track's error is about 4 degrees at most", "5.4", label, ours, degrees, paper.TRACK_DEGREES),
         Claim("a few joints make up high errors", "5.4", label, few, "% by 3 of 22", 50.0, above=True),
-        Claim("five components keep 95 % of the variance", "2.1", label, explained, "%", 100.0 * paper.VARIANCE, True),
+        Claim(
+            "five components keep 95 % of the variance",
+            "2.1",
+            label,
+            explained,
+            "%",
+            100.0 * paper.EXPLAINED_VARIANCE,
+            True,
+        ),
     ]
     for name, form in ((OURS, ""), (LETTER, ", the letter")):
         history = results.of("history", "first", motion, name)  # (views, seeds, swarms, populations)
@@ -210,7 +230,7 @@ def few_joints(analysis: Analysis, motion: str) -> Array:
     return shares
 
 
-def by_view(analysis: Analysis) -> Table:
+def views_table(analysis: Analysis) -> Table:
     """Return single images by view, all around: the yaw unknown, each frame by itself."""
     views = sorted({run.view for run in analysis.results.runs if run.kind == "image"})
     rows = []
@@ -227,8 +247,8 @@ def by_view(analysis: Analysis) -> Table:
     return Table("views", ["motion", "", *(f"{view:.0f}°" for view in views), "mean"], rows, 2)
 
 
-def parts(analysis: Analysis) -> Table:
-    """Return by how much PCA + SAPSO is worse without each part, and others than it is, paired by view and seed."""
+def parts_table(analysis: Analysis) -> Table:
+    """Return by how much PCA + SAPSO without a part, or another method, is worse than it, paired by view and seed."""
     labels = {"sapso@full": "no PCA space: all angles"} | {name: LABELS[name] for name in (*PARTS, *OTHERS)}
     rows = [["PCA + SAPSO itself", *(bounded(interval(analysis.errors(motion))) for motion in analysis.motions)]]
     for name, label in labels.items():
@@ -237,7 +257,7 @@ def parts(analysis: Analysis) -> Table:
     return Table("parts", ["without, or instead", *(MOTIONS[motion] for motion in analysis.motions)], rows)
 
 
-def turn(analysis: Analysis) -> Table:
+def turn_table(analysis: Analysis) -> Table:
     """Return the errors on the walk with a turn, by view."""
     views = sorted({run.view for run in analysis.results.runs if run.kind == "track"})
     rows = []

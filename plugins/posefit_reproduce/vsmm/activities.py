@@ -1,4 +1,4 @@
-"""The sequence that the VSMM patent was tried on, made anew: four activities before a camera, with a known truth.
+"""The sequence that the VSMM patent was tried on, re-created: four activities before a camera, with a known truth.
 
 The patent's own recording is not public. Here the four activities are built-in motions, each in another phase, speed
 and view for every seed, that no motion model was fitted to; between them lie a few frames of blending.

@@ -21,7 +21,7 @@ from posefit_vsmm.groups import read_topology
 from posefit_vsmm.motion import library
 
 TUNED = 5  # films on which defaults were chosen
-WARMING = 3  # frames that are tracked beforehand, so that no frame's time is that of compiling
+WARM_UP = 3  # frames that are tracked beforehand, so that no time includes compilation
 LABELS = ("walk", "arms-out", "jacks", "squat", "jump")  # of the film's activities; a jump is none of them
 DETAILS = ("lost", "joints", "confidence", "filter_seconds", "detection_seconds")  # of frames that are stored
 MODELS = library().models.names
@@ -32,7 +32,7 @@ METHODS: dict[str, TrackOptions] = {
     "all six models": TrackOptions(method="vsmm", settings={"vsmm.structure": "all"}),
     "patent, all six": TrackOptions(method="vsmm:patent", settings={"vsmm.structure": "all"}),
 }
-# One setting each otherwise than by default, on the films that defaults are chosen on; one of them on the others, too.
+# one setting other than by default in each, on the films that defaults are chosen on; `BEST` on the others, too
 ALTERNATIVES: dict[str, TrackOptions] = {
     f"{name}={value}": TrackOptions(method="vsmm", settings={f"vsmm.{name}": value})
     for name, value in {"recovery": False, "process_noise": 2.0, "joint_noise": 2.0}.items()
@@ -70,13 +70,13 @@ def perform(run: Run) -> Arrays:
     film, options = film_of(run.seed), ALL[run.method]
     task = film_task(film, options.evaluations or EVALUATIONS)
     with threadpool_limits(1):
-        for observations in (film.observations[:WARMING], film.observations):
+        for observations in (film.observations[:WARM_UP], film.observations):
             frames = list(prepare(options, task).follow(task, observations, np.random.default_rng(run.seed)))
     return arrays_of(frames)
 
 
 def arrays_of(frames: list[Frame]) -> Arrays:
-    """Return what a tracker with models holds in every frame: -1 is no group, no candidate_group, no label."""
+    """Return the arrays of a track, a row a frame; -1 stands for no group, no candidate and no label."""
     probabilities = np.zeros((len(frames), len(MODELS)))
     for row, frame in zip(probabilities, frames, strict=True):
         row[[MODELS.index(name) for name in frame.details["models"]]] = frame.details.get("probabilities", 0.0)

@@ -1,4 +1,4 @@
-"""The figures of the VSMM patent, made again: detected joints and poses (9), probabilities (10), joint errors (11)."""
+"""The figures of the VSMM patent, redrawn: detected joints and poses (9), probabilities (10), joint errors (11)."""
 
 from collections.abc import Iterator
 from typing import Any

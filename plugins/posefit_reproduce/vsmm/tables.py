@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.fitting import metrics
@@ -44,7 +45,7 @@ BOTH = ("default", "patent")
 Films = Mapping[str, Array]  # by the names of `FIGURES`, those of all films (1, n)
 # what is shown film by film
 CHIEF = ("elbow_detected", "hand_detected", "mpjpe", "model", "group", "delay", "delay_change")
-# what a filter over all models has none of
+# figures that a filter over all models does not have
 SWITCHING = {"group", "delay", "delay_change", "activations", "wrong_activations", "wrong_terminations"}
 
 
@@ -69,7 +70,7 @@ def joint_errors(film: Film, arrays: Arrays) -> dict[str, Array]:
 
 
 def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:
-    """Return what a track of a film comes to, by the names of `FIGURES`."""
+    """Return the figures of a track of a film, by the names of `FIGURES`."""
     film, figures = film_of(seed), dict[str, Any]()
     skeleton, poses = film.body.skeleton, arrays["poses"]
     for name, values in joint_errors(film, arrays).items():
@@ -83,34 +84,49 @@ def film_figures(seed: int, arrays: Arrays) -> dict[str, float]:
 
 
 def switching_figures(labels: list[int], arrays: Arrays) -> dict[str, float]:
-    """Return how the models' probabilities and the groups in force fare; frames that try all models have no group."""
-    activity, probabilities = np.array(labels), arrays["probabilities"]
-    likely = probabilities.argmax(axis=1)
-    sets = [set(), *({MODELS.index(name) for name in names} for _, names in GROUPS)]
-    pairs_in_force = zip(arrays["group"], arrays["candidate_group"], strict=True)
-    force = [sets[group + 1] | sets[other + 1] for group, other in pairs_in_force]
+    """Return how often models and groups in force are right; frames that try all models have no group."""
+    probabilities, candidates = arrays["probabilities"], arrays["candidate_group"]
+    likeliest = probabilities.argmax(axis=1)
+    models_of = [set(), *({MODELS.index(name) for name in names} for _, names in GROUPS)]  # of a group's number + 1
+    in_force = [
+        models_of[group + 1] | models_of[candidate + 1]
+        for group, candidate in zip(arrays["group"], candidates, strict=True)
+    ]
     right = [set(RIGHT[label]) for label in labels]
-    right_group = np.array([bool(models & wanted) for models, wanted in zip(force, right, strict=True)])
+    right_group = np.array([bool(models & wanted) for models, wanted in zip(in_force, right, strict=True)])
+    delays = _delays(labels, right_group)
+    activated = [
+        models_of[now + 1] & wanted
+        for (before, now), wanted in zip(pairwise(candidates), right[1:], strict=True)
+        if now not in (-1, before)
+    ]
+    terminated = [
+        bool(before & wanted) and not now & wanted
+        for (before, now), wanted in zip(pairwise(in_force), right[1:], strict=True)
+    ]
+    return {
+        "dominant": 100.0 * np.mean(probabilities.max(axis=1) > 0.5),
+        "model": 100.0 * np.mean([model in models for model, models in zip(likeliest, right, strict=True)]),
+        "group": 100.0 * right_group.mean(),
+        "label": 100.0 * np.mean(arrays["label"] == np.array(labels)),
+        "delay": max(delays),
+        "delay_change": max(delays[1:]),
+        "activations": len(activated),
+        "wrong_activations": sum(not models for models in activated),
+        "wrong_terminations": sum(terminated),
+        "filter": 1e3 * np.median(arrays["filter_seconds"]),
+        "detection": 1e3 * np.median(arrays["detection_seconds"]),
+    }
+
+
+def _delays(labels: list[int], right_group: NDArray[np.bool_]) -> list[int]:
+    """Return the frames of each activity until a right group is in force; all of them where none ever is."""
     starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1])]
     delays = []
     for start, stop in pairwise([*starts, len(labels)]):
         hits = np.flatnonzero(right_group[start:stop])
-        delays.append(hits[0] if len(hits) else stop - start)
-    pairs = list(zip(pairwise(arrays["candidate_group"]), pairwise(force), right[1:], strict=True))
-    new = [sets[now + 1] & wanted for (before, now), _, wanted in pairs if now not in (-1, before)]
-    return {
-        "dominant": 100.0 * np.mean(probabilities.max(axis=1) > 0.5),
-        "model": 100.0 * np.mean([model in models for model, models in zip(likely, right, strict=True)]),
-        "group": 100.0 * right_group.mean(),
-        "label": 100.0 * np.mean(arrays["label"] == activity),
-        "delay": max(delays),
-        "delay_change": max(delays[1:]),
-        "activations": len(new),
-        "wrong_activations": sum(not models for models in new),
-        "wrong_terminations": sum(bool(before & wanted) and not now & wanted for _, (before, now), wanted in pairs),
-        "filter": 1e3 * np.median(arrays["filter_seconds"]),
-        "detection": 1e3 * np.median(arrays["detection_seconds"]),
-    }
+        delays.append(int(hits[0]) if len(hits) else stop - start)
+    return delays
 
 
 def patent_tables(results: Results) -> Iterator[Table]:
@@ -123,15 +139,15 @@ def patent_tables(results: Results) -> Iterator[Table]:
     }
     methods = {name: films[f"reported {name}"] for name in METHODS}
     yield claims_table("claims", list(claims(methods)))
-    yield compared("compared", methods)
-    yield by_film("films", {name: methods[name] for name in BOTH})
+    yield means_table("compared", methods)
+    yield films_table("films", {name: methods[name] for name in BOTH})
     for name in BOTH:
         yield labels_table(f"labels-{name}", results, name)
-    yield alternatives(films)
-    yield predictions()
+    yield settings_table(films)
+    yield predictions_table()
 
 
-def compared(name: str, methods: Mapping[str, Films]) -> Table:
+def means_table(name: str, methods: Mapping[str, Films]) -> Table:
     """Return the mean over films of each figure, with the interval that other films would give."""
     rows = [
         [
@@ -146,7 +162,7 @@ def compared(name: str, methods: Mapping[str, Films]) -> Table:
     return Table(name, ["mean of the films", *methods], rows)
 
 
-def by_film(name: str, methods: Mapping[str, Films]) -> Table:
+def films_table(name: str, methods: Mapping[str, Films]) -> Table:
     """Return the chief figures of each film, and their deviation over the films."""
     rows = []
     for figure in CHIEF:
@@ -193,7 +209,7 @@ def labels_table(name: str, results: Results, method: str) -> Table:
     return Table(name, [f"% (by chance {chance:.0f})", *LABELS, "none"], rows)
 
 
-def alternatives(methods: Mapping[str, Films]) -> Table:
+def settings_table(methods: Mapping[str, Films]) -> Table:
     """Return by how many mm of MPJPE another setting is worse than the default, on the films that it was chosen on.
 
     The last row is of the films that are reported.
@@ -209,7 +225,7 @@ def alternatives(methods: Mapping[str, Films]) -> Table:
     return Table("settings", ["", *heads, "CPU ms"], cells)
 
 
-def predictions() -> Table:
+def predictions_table() -> Table:
     """Return the models' errors in degrees, one and ten frames ahead, on clips that they were not fitted to."""
     keys = ("still_1", "identity_1", "zero_1", "still_10", "identity_10", "zero_10")
     heads = ["degrees ahead", *(f"{name}, {count}" for count in (1, 10) for name in ("still", "default", "patent"))]

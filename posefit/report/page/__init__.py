@@ -24,7 +24,7 @@ MARK = "<!doctype html>\n<!-- a report of posefit -->\n"  # how every report beg
 SCRIPTS = ("methods", "charts", "first", "tables", "compare", "main")  # in this order
 _LIGHT = ("#00775a", "#a63d80", "#7a5c00", "#6b4cc0", "#111111", "#b0123b", "#3d6b7d")
 _DARK = ("#2cc79a", "#e39cc6", "#d9cf6a", "#b9a3ff", "#f2f2f2", "#ff8095", "#8fb8c9")
-COLOURS = len(_LIGHT)
+COLOUR_COUNT = len(_LIGHT)
 
 LIGHT = {f"c{k}": colour for k, colour in enumerate(_LIGHT)}
 DARK = {f"c{k}": colour for k, colour in enumerate(_DARK)}

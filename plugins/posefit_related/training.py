@@ -1,0 +1,28 @@
+"""What is learned from: the poses of the training motions, checked, and as many of them as a model takes."""
+
+import numpy as np
+
+from posefit.plugin import Array, Task
+
+
+def training_poses(task: Task) -> Array:
+    """Return the poses (T, 66) of all training motions. Raises ValueError where there is none."""
+    if not task.training:
+        raise ValueError("training must hold a motion to learn from, got none")
+    return np.concatenate([motion.poses for motion in task.training])
+
+
+def training_angles(angles: Array, least: int) -> Array:
+    """Return joint angles as an array (T, 63). Raises ValueError for another shape, or for less than `least` frames."""
+    angles = np.asarray(angles, dtype=np.float64)
+    if angles.ndim != 2 or angles.shape[1] != 63 or not np.isfinite(angles).all():
+        raise ValueError(f"angles must be finite and (T, 63), got {angles.shape}")
+    if len(angles) < least:
+        raise ValueError(f"angles must hold at least {least} frames, got {len(angles)}")
+    return angles
+
+
+def evenly(angles: Array, count: int) -> Array:
+    """Return at most `count` of the angles (T, 63), evenly spaced."""
+    rows = np.unique(np.linspace(0, len(angles) - 1, min(count, len(angles))).astype(int))
+    return np.asarray(angles[rows])
