@@ -147,7 +147,7 @@ def upright(calibrations: Sequence[Calibration], up: Up | None = None) -> Array:
     """Return the rotation (3, 3) that turns the world of calibrations so that +y is up.
 
     It is `up`, or else +y where the file states it; otherwise the axis, in either direction, that points up in the
-    images most. Raises ValueError where `up` is none.
+    images most. Raises InputError where `up` is none.
     """
     if up is not None and up not in TURNS:
         raise InputError(f"up must be one of x, y, z, got {quoted(up)}")
@@ -186,7 +186,7 @@ def _axis(direction: Array) -> Up:
 def read_calibrations(path: str | Path) -> list[Calibration]:
     """Return the cameras of a calibration file, in its order; of `FILE:NAME` that of this name.
 
-    Raises ValueError naming the file and what is wrong.
+    Raises InputError naming the file and what is wrong.
     """
     path, chosen = Path(path), ""
     file, colon, name = str(path).rpartition(":")
@@ -311,7 +311,7 @@ def _counts(value: Any) -> bool:
 
 
 def _is_fisheye(known: Mapping[str, Any]) -> bool:
-    """Return whether the lens is OpenCV's fisheye. Raises ValueError for a model that OpenCV has not."""
+    """Return whether the lens is OpenCV's fisheye. Raises InputError for a model that OpenCV has not."""
     for key in (name for name in MODEL if name in known):
         model = _plain(known[key])
         if model in _FISHEYES:
@@ -423,7 +423,7 @@ def _orthonormal(rotation: Array) -> Array:
 
 
 def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
-    """Return the values of a file by name. Raises ValueError where it is none of the four formats."""
+    """Return the values of a file by name. Raises InputError where it is none of the four formats."""
     if path.suffix.lower() == ".toml":
         return parsed_toml(text)
     if not (start.startswith(("<", "{", "%")) or path.suffix.lower() in (".yml", ".yaml")):
@@ -435,7 +435,7 @@ def _stored_values(path: Path, start: str, text: str) -> dict[str, Any]:
 
 
 def _matrix_of(value: Any) -> Array:
-    """Return a matrix, or numbers in one row. Raises ValueError where there are none, too many, or another number."""
+    """Return a matrix, or numbers in one row. Raises InputError where there are none, too many, or another number."""
     stated = value if isinstance(value, dict) and "data" in value else {"data": value}
     cells = np.array(stated["data"].split() if isinstance(stated["data"], str) else stated["data"], dtype=object)
     numbers = np.array([_number_of(cell) for cell in cells.flat], dtype=np.float64)
@@ -454,7 +454,7 @@ def _matrix_of(value: Any) -> Array:
 
 
 def _number_of(value: Any) -> float:
-    """Return a number, which may be text. Raises ValueError where it is none."""
+    """Return a number, which may be text. Raises InputError where it is none."""
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
@@ -482,7 +482,7 @@ def _xml(text: str) -> dict[str, Any]:
 
 
 def _xml_of(text: str) -> Any:
-    """Return the root of an XML text. Raises ValueError where it is broken or has a document type, which may expand."""
+    """Return the root of an XML text. Raises InputError where it is broken or has a document type, which may expand."""
     from xml.etree.ElementTree import ParseError
 
     from defusedxml import DefusedXmlException

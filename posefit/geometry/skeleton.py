@@ -164,7 +164,7 @@ class Skeleton:
         """Return joint positions (..., 27, 3) in metres, world frame, of poses (..., 66).
 
         `translations` (..., 3) places the root joint; without it the root is at the origin.
-        Raises ValueError where a shape does not fit.
+        Raises InputError where a shape does not fit.
         """
         poses = np.asarray(poses, dtype=np.float64)
         if poses.ndim < 1 or poses.shape[-1] != ANGLES:

@@ -37,7 +37,7 @@ class GaitEvents:
 def gait_events(motion: Motion) -> GaitEvents:
     """Return when the feet of a motion strike and lift off; no event at all where they do not move to and fro.
 
-    Raises ValueError where there are too few frames a second.
+    Raises InputError where there are too few frames a second.
     """
     if motion.fps < MIN_FPS:
         raise InputError(f"fps must be at least {MIN_FPS:g} to find the events of gait, got {motion.fps:g}")

@@ -13,6 +13,6 @@
 | what the joints of other programs are, by their names | joint_names.py |
 | a motion of another program's skeleton, as one of posefit's | rig.py |
 
-A file is hostile until parsed: what is wrong with it raises ValueError with the file, the line, what was expected
+A file is hostile until parsed: what is wrong with it raises InputError with the file, the line, what was expected
 and what came. Degrees and file units stay in the files; in memory there are radians and metres.
 """

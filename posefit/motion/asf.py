@@ -41,7 +41,7 @@ def read_asf(path: str | Path, unit: Unit | None = None) -> Skeleton:
     """Return the skeleton of an .asf file, named after it, in metres; see `parse_asf`.
 
     Only the 26 bones of `posefit.geometry.skeleton.BONES` are chosen; other bones may be there and keep their place
-    in `channels`. Raises ValueError with file and line where the file is not an Acclaim skeleton of this tree.
+    in `channels`. Raises InputError with file and line where the file is not an Acclaim skeleton of this tree.
     """
     return parse_asf(path, unit).skeleton
 

@@ -72,7 +72,7 @@ def motion(name: str, *, frames: int = 60, fps: float = 30.0, speed: float = 1.0
 
     `speed` multiplies the cadence and with it the pace; `phase`, in cycles, is where in its cycle it starts. The
     lowest joint of the cycle is about 3 cm above the ground y = 0, as thick as a toe; a mean of styles may be 2 cm
-    off. Raises ValueError for an unknown name, and where a number is not what it should be.
+    off. Raises InputError for an unknown name, and where a number is not what it should be.
     """
     angles, series, period, pace = _model(name)
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 1:

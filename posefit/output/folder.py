@@ -44,7 +44,7 @@ class Recorder:
 
 
 class OutputFolder(Recorder):
-    """Writes beside the target and renames at the end. Raises ValueError where the target may not be written.
+    """Writes beside the target and renames at the end. Raises InputError where the target may not be written.
 
     `spec` is what a track has to have in common with the one that it resumes.
     """

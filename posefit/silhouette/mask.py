@@ -83,7 +83,7 @@ class Silhouette:
         """Return the silhouette of a mask (height, width), any value but 0 being the person.
 
         Pixels where `valid` is 0 are unknown and count for nothing. Both arrays are read-only: what a method writes
-        into them would falsify its own audit. Raises ValueError where shapes differ.
+        into them would falsify its own audit. Raises InputError where shapes differ.
         """
         values = np.asarray(mask)
         if values.ndim != 2 or 0 in values.shape:
@@ -141,7 +141,7 @@ def coarser_camera(camera: Camera, factor: int) -> Camera:
     """Return the camera whose pixels are every `factor`th of every `factor`th row: their centres see the same rays.
 
     So a body drawn by it is the same body drawn at full size and looked at there, pixel for pixel. The first one is
-    number `factor // 2`. Raises ValueError where that is no pixel.
+    number `factor // 2`. Raises InputError where that is no pixel.
     """
     first = _first(factor, (camera.width, camera.height))
     width, height = (len(range(first, side, factor)) for side in (camera.width, camera.height))
