@@ -53,10 +53,11 @@ def cleaned(
     parts, words = people.chosen(choice, lambda frame: Path(masks.names[frame]).name)
     if words:
         warnings.append(f"{name}: {words}")
-        known = empty_planes(len(masks), masks.size) if masks.valid is None else masks.valid
-        known[:] = 255 if masks.valid is None else known
-        masks = replace(masks, valid=known)
-    others = [one for person in people.persons() for one in person if one not in parts]
+        if masks.valid is None:
+            known = empty_planes(len(masks), masks.size)
+            known[:] = 255
+            masks = replace(masks, valid=known)
+    others = people.others(parts)
     areas, cut = np.zeros(len(masks)), np.zeros(len(masks), dtype=bool)
     for k in range(len(masks)):
         silhouette = silhouette_of(k)

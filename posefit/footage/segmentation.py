@@ -272,7 +272,7 @@ class Segmentation:
         parts, several = people.chosen(self.how.person, lambda k: f"frame {self.start + k}", 1.0 / segmenter.scale)
         if several:
             rows = [blank if (part := part_at(parts, k)) is None else part.rows[k] for k, blank in enumerate(blanks)]
-            others = [part for person in people.persons() for part in person if part not in parts]
+            others = people.others(parts)
             for k in range(count):
                 planes = planes_of(parts, others, k, unpacked(valid[k], self.size))
                 masks[k], valid[k] = (np.packbits(plane) for plane in planes)
