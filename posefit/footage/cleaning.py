@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from posefit.arrays import Array
 from posefit.errors import InputError
 from posefit.footage.masks import PackedMasks, empty_planes
 from posefit.footage.people import Choice, People, planes_of
@@ -71,10 +72,15 @@ def cleaned(
         masks.masks[k] = np.packbits(mask)
         if words and masks.valid is not None:
             masks.valid[k] = np.packbits(valid)
-    whole = np.flatnonzero(usable & ~cut)
+    return replace(masks, usable=usable & _shows_enough(usable, areas, cut)), warnings
+
+
+def _shows_enough(usable: NDArray[np.bool_], areas: Array, cut: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which frames (T,) have most of the person's area in the nearest usable frame that is not cut."""
+    enough, whole = np.ones(len(areas), dtype=bool), np.flatnonzero(usable & ~cut)
     for frame in np.flatnonzero(usable & cut) if len(whole) else ():
-        usable[frame] = areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
-    return replace(masks, usable=usable), warnings
+        enough[frame] = areas[frame] >= CUT_SHOWN * areas[whole[np.abs(whole - frame).argmin()]]
+    return enough
 
 
 def _is_inverted(masks: PackedMasks) -> bool:
