@@ -12,7 +12,7 @@ from posefit.errors import InputError
 from posefit.footage.masks import PackedMasks, empty_planes
 from posefit.footage.people import Choice, People, planes_of
 from posefit.motion.clips import FPS
-from posefit.silhouette.foreground import HOLE, NEAR, PIECE, without_holes
+from posefit.silhouette.foreground import MAX_HOLE_AREA, MIN_PIECE_AREA, PIECE_REACH, without_holes
 from posefit.silhouette.mask import Mask, Silhouette, touches_border
 
 INVERSION_FRAMES = 40  # masks by which it is decided whether they are inverted
@@ -67,7 +67,7 @@ def cleaned(
             mask = people_in(silhouette)[0]
             if words:
                 mask, valid = planes_of(parts, others, k, silhouette.valid)
-            mask = without_holes(mask, HOLE if holes is None else holes) & valid
+            mask = without_holes(mask, MAX_HOLE_AREA if holes is None else holes) & valid
             usable[k], areas[k], cut[k] = mask.any(), mask.sum(), touches_border(mask)
         masks.masks[k] = np.packbits(mask)
         if words and masks.valid is not None:
@@ -105,7 +105,7 @@ def people_in(silhouette: Silhouette) -> list[Mask]:
     mask = silhouette.mask
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA]
-    large = [k for k in range(1, count) if areas[k] >= PIECE * areas[1:].max()]
+    large = [k for k in range(1, count) if areas[k] >= MIN_PIECE_AREA * areas[1:].max()]
     if len(large) < 2:
         return [mask]
     through = cv2.connectedComponents((mask | ~silhouette.valid).astype(np.uint8), connectivity=8)[1]
@@ -127,7 +127,7 @@ def people_in(silhouette: Silhouette) -> list[Mask]:
 
 def _is_one_person(first: NDArray[np.int32], second: NDArray[np.int32], distance: float, joined: bool) -> bool:
     left, top, wide, tall = (np.array([piece[k] for piece in (first, second)]) for k in range(4))
-    if joined or distance <= NEAR * tall.max():
+    if joined or distance <= PIECE_REACH * tall.max():
         return True
     across = (left + wide).min() - left.max()
     between = top.max() - (top + tall).min()
