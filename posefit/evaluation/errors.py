@@ -57,7 +57,7 @@ Table = dict[str, Array]  # (T,) a column, by the names of `FRAME`; NaN where a 
 
 
 def unseen(table: Table) -> set[int]:
-    """Return the numbers, as filmed, of the frames that were held or are called lost; files leave their places blank."""
+    """Return the numbers, as filmed, of frames that were held or are called lost; files leave their places blank."""
     return set(table["frame"][(table["usable"] == 0.0) | (table["lost"] >= LOST)].tolist())
 
 
