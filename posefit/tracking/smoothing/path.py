@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from posefit.arrays import Array
 from posefit.footage.scene import Scene
-from posefit.geometry.skeleton import turns_of
+from posefit.geometry.skeleton import angles_of
 from posefit.motion.motion import Motion
 from posefit.motion.steadiness import BALLS, low, runs
 from posefit.silhouette.cost import only_camera
@@ -140,7 +140,7 @@ ANGLE_DIFFERENCE = 1e-4  # radians: of a difference quotient
 PATH_WINDOW, PATH_OVERLAP = 900, 60  # frames that are solved for at once, and those that two windows share
 
 # the angles of both
-LEGS = tuple(turns_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
+LEGS = tuple(angles_of([side + bone for side in "lr" for bone in ("femur", "tibia", "foot")]).tolist())
 
 
 @dataclass(frozen=True, eq=False)
