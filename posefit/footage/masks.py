@@ -101,7 +101,7 @@ class Views(Sequence[Observation]):
         landmarks = None
         if any(masks.landmarks is not None for masks in self.masks):
             unknown = np.zeros((len(JOINTS), 3))
-            landmarks = np.array([unknown if one.landmarks is None else one.landmarks[k] for one in self.masks])
+            landmarks = np.array([unknown if view.landmarks is None else view.landmarks[k] for view in self.masks])
         yaw = float(self.yaws[k]) if known else None
         return Observation(silhouettes, usable=usable, yaw=yaw, landmarks=landmarks)
 
