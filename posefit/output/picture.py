@@ -1,6 +1,6 @@
 """Pictures of a track: the observed silhouette with the fitted body on it, beside a view of the body from its side.
 
-Where a method says how sure it is, limbs that are unsure are faint, another mode is drawn as thin bones, and lost
+Where a method reports its uncertainty, uncertain limbs are faint, another mode is drawn as thin bones, and lost
 frames have a border.
 """
 
