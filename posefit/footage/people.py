@@ -133,8 +133,6 @@ class People:
 
     def add(self, masks: Sequence[Mask], image: Image | None = None) -> list[Tracklet]:
         """Return who is in the next frame, of which the blobs (height, width) are the largest first."""
-        from scipy.optimize import linear_sum_assignment  # takes a tenth of a second to import
-
         self._frame += 1
         frame, blobs = self._frame, [_Blob(mask, image) for mask in masks]
         active = []
@@ -143,12 +141,7 @@ class People:
                 active.append(tracklet)
             else:
                 tracklet.forget_pictures()
-        distances = np.array([[tracklet.distance(blob, frame) for blob in blobs] for tracklet in active])
-        owners: dict[int, Tracklet] = {}
-        if distances.size:
-            for row, column in zip(*linear_sum_assignment(np.minimum(distances, 1e6)), strict=True):
-                if np.isfinite(distances[row, column]):
-                    owners[int(column)] = active[row]
+        owners = _owners(active, blobs, frame)
         confirmed = [tracklet for tracklet in active if tracklet.confirmed() and tracklet not in owners.values()]
         outlines = [tracklet.outline(frame) for tracklet in confirmed] if blobs else []
         present = []
@@ -224,6 +217,18 @@ class People:
         listed = "; ".join(f"{k} at {spot}" for k, spot in enumerate(spots, 1))
         words = f"{len(persons)} people, first visible: {listed}; person {number} is followed, --person N another"
         return persons[number - 1], words
+
+
+def _owners(tracklets: Sequence[Tracklet], blobs: Sequence[_Blob], frame: int) -> dict[int, Tracklet]:
+    """Return whose each blob is, by its number, so that all are as near as possible to where they are expected."""
+    from scipy.optimize import linear_sum_assignment  # takes a tenth of a second to import
+
+    distances = np.array([[tracklet.distance(blob, frame) for blob in blobs] for tracklet in tracklets])
+    if not distances.size:
+        return {}
+    rows, columns = linear_sum_assignment(np.minimum(distances, 1e6))
+    pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+    return {column: tracklets[row] for row, column in pairs if np.isfinite(distances[row, column])}
 
 
 def _distance(tracklet: Tracklet, other: Tracklet) -> float:
