@@ -25,7 +25,7 @@ CUT_SHOWN = 0.5  # of the person's area: where the picture's edge leaves less of
 def cleaned(
     masks: PackedMasks, name: object, holes: float | None = None, choice: Choice | None = None
 ) -> tuple[PackedMasks, list[str]]:
-    """Return the masks of one person, and warnings; the bits of `masks` are overwritten.
+    """Return the masks of one person, and warnings, in the memory of `masks`, which are overwritten.
 
     Of several people `choice` is followed, see `People.chosen`; the pixels of the others are unknown. Frames that show
     no person before a background are not usable, nor are those in which the picture's edge leaves only a little of the

@@ -66,6 +66,7 @@ _POLYNOMIALS = (
     *("opencv", "fullopencv", "polynomial", "rationalpolynomial", "radtan", "radialtangential", "standard"),
 )
 _OTHERS = re.compile("omni|mei|unified|ucm|sphere|spherical|fov|prism|ocam|division|rectangular")  # models not read
+# keys that seem to describe a lens, such as radial_distortion, kappa1, k7 or xi; not distance, lens_mm or lens_serial
 _OF_LENS = re.compile(
     r".*(dist(?!an)|coef|lens(?!.*(focal|mm|serial))|fish|radial|tangential|omni).*|(k|kappa)[0-9]*|xi"
 )
