@@ -93,12 +93,8 @@ def pose_costs(
     """
     views = zip(cameras, silhouettes, strict=True)
     counts = [areas(body, *view, poses, translations, threads) for view in views]
-    return mean_cost(counts, silhouettes, beta), counts[0][None] if len(counts) == 1 else np.stack(counts)
-
-
-def mean_cost(counts: Areas | Sequence[Areas], silhouettes: Sequence[Silhouette], beta: float = BETA) -> Array:
-    """Return the cost (n,) of areas R, B, Y (n, 3), one array a view; a view of which nothing is known is left out."""
-    return mean_over_views([mismatch(view, beta) for view in known_views(list(counts), silhouettes)])
+    costs = [mismatch(view, beta) for view in known_views(counts, silhouettes)]
+    return mean_over_views(costs), counts[0][None] if len(counts) == 1 else np.stack(counts)
 
 
 def mean_over_views(costs: Sequence[Array]) -> Array:
