@@ -1,7 +1,8 @@
-"""Write the page of the plan `related` from its ledger: the methods in a table, who wins where, the paper's sentences.
+"""Write the tables of the plan `related` from its ledger: the methods, who wins where, the paper's sentences.
 
     posefit sweep docs/studies/related.toml --out results
-    python docs/studies/related.py results > page.md
+    python docs/studies/related.py results tables
+    python docs/studies/reproduced_pages.py related=tables
 
 Sentences are those of SAPSO's paper, section 1, about other methods. Each is a comparison of two methods in paired
 cells: the mean difference with its 95 % interval, for other conditions of the same motions, by
@@ -66,13 +67,6 @@ def condition_of(row: Row) -> Condition:
     return str(spec["motion"]), cameras, not spec.get("yaw_off_degrees"), not spec.get("corruption")
 
 
-def words_of(condition: Condition) -> str:
-    """Return a condition in words."""
-    motion, cameras, known, clean = condition
-    views = "one camera" if cameras == 1 else f"{cameras} cameras"
-    return f"{motion}, {views}, {'known' if known else 'unknown'} yaw, {'clean' if clean else 'damaged'} masks"
-
-
 def methods(rows: Sequence[Row]) -> Iterator[str]:
     """Yield the table of methods, the most accurate first: medians of their tracks, and those of parts of them."""
     parts: dict[str, Callable[[Condition], bool]] = {
@@ -112,22 +106,23 @@ def paired(rows: Sequence[Row], method: str, reference: str, figure: str) -> dic
 
 
 def winners(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the table of who wins where: the least mean MPJPE, and how far the next one is behind over paired seeds."""
-    lines = []
-    for condition in dict.fromkeys(map(condition_of, rows)):
+    """Yield the table of who wins where, by the mean MPJPE; "or" names the next one where it is not surely behind."""
+    lines: dict[tuple[str, int], list[str]] = {}
+    for condition in sorted(set(map(condition_of, rows)), key=lambda at: (at[0], at[1], not at[2], not at[3])):
         mine = [row for row in rows if condition_of(row) == condition]
-        means = {
-            name: float(np.mean([row[WORSE] for row in mine if name_of(row) == name])) for name in map(name_of, mine)
-        }
+        means = {name: np.mean([row[WORSE] for row in mine if name_of(row) == name]) for name in map(name_of, mine)}
         first, *others = sorted(means, key=lambda name: means[name])
-        second, behind = "-", ["-", "-"]
-        if others and (pairs := paired(mine, others[0], first, WORSE)):
-            second = f"`{others[0]}`"
-            behind = list(difference(list(pairs.values()), [""] * len(pairs), list(pairs))[:2])
-        place = str(1 + [first, *others].index("sapso@pca")) if "sapso@pca" in means else "-"
-        lines.append([words_of(condition), f"`{first}`", number(WORSE, means[first]), second, *behind, place])
-    heads = ["where", "leads", "MPJPE mm", "next", "behind mm", "95 % interval", "place of `sapso@pca`"]
-    yield from markdown(heads, lines, words=2)
+        cell = f"`{first}` {number(WORSE, float(means[first]))}"
+        pairs = paired(mine, others[0], first, WORSE) if others else {}
+        if pairs and difference(list(pairs.values()), [""] * len(pairs), list(pairs))[2] != "holds":
+            cell += f" or `{others[0]}`"
+        lines.setdefault(condition[:2], []).append(cell)
+    heads = [
+        "motion",
+        "cameras",
+        *(f"{yaw} yaw, {masks}" for yaw in ("known", "unknown") for masks in ("clean", "damaged")),
+    ]
+    yield from markdown(heads, [[motion, str(count), *cells] for (motion, count), cells in lines.items()], words=6)
 
 
 def difference(values: Sequence[float], strata: Sequence[object], clusters: Sequence[object]) -> tuple[str, str, str]:
@@ -158,18 +153,16 @@ def verdicts(rows: Sequence[Row]) -> Iterator[str]:
 
 @click.command(cls=Command, help=__doc__)
 @click.argument("ledger", type=click.Path(exists=True, path_type=Path))
-def main(ledger: Path) -> None:
+@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+def main(ledger: Path, out: Path) -> None:
     rows = list(Ledger(ledger).rows())
     if not rows:
         raise InputError(f"{ledger}: expected finished cells of docs/studies/related.toml, got none")
-    click.echo(
-        f"{len(rows)} tracks, {len(set(map(condition_of, rows)))} conditions, source {Ledger(ledger).version}.\n"
-    )
-    for title, part in (("Methods", methods), ("Who wins where", winners), ("The paper's sentences", verdicts)):
-        click.echo(f"## {title}\n")
-        for line in part(rows):
-            click.echo(line)
-        click.echo("")
+    out.mkdir(parents=True, exist_ok=True)
+    for name, table in (("methods", methods), ("winners", winners), ("sentences", verdicts)):
+        (out / f"{name}.md").write_text("\n".join(table(rows)) + "\n", encoding="utf-8")
+    conditions, seeds = (len(set(map(of, rows))) for of in (condition_of, lambda row: row["spec"]["seed"]))
+    click.echo(f"{out}: {len(rows):,} tracks, {conditions} conditions, {seeds} seeds, {Ledger(ledger).version}")
 
 
 if __name__ == "__main__":

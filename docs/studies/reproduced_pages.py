@@ -1,6 +1,6 @@
-"""Put what `posefit reproduce` wrote into the pages that show it, and its figures into docs/pictures.
+"""Put what `posefit reproduce` or a study wrote into the pages that show it, and its figures into docs/pictures.
 
-    python docs/studies/reproduced_pages.py sapso=OUT vsmm=OUT footage=OUT
+    python docs/studies/reproduced_pages.py sapso=OUT vsmm=OUT footage=OUT related=OUT
 
 A page has `<!-- sapso: parts -->`, the table, and `<!-- end -->`: what is between them is OUT/parts.md. A picture that
 a page shows as ../pictures/sapso-NAME is OUT/NAME. Nothing else of a page changes.
@@ -16,7 +16,7 @@ from posefit.cli.output import Command
 from posefit.errors import InputError
 
 DOCS = Path(__file__).parents[1]
-PAGES = ("sapso.md", "patent.md")
+PAGES = ("sapso.md", "patent.md", "related.md")
 
 
 def filled(text: str, name: str, folder: Path) -> str:
@@ -25,7 +25,7 @@ def filled(text: str, name: str, folder: Path) -> str:
     def table(match: re.Match[str]) -> str:
         path = folder / f"{match[1]}.md"
         if not path.is_file():
-            raise InputError(f"{path}: expected a table of posefit reproduce, got none")
+            raise InputError(f"{path}: expected a table of posefit reproduce or a study, got none")
         return f"<!-- {name}: {match[1]} -->\n\n{path.read_text('utf-8').strip()}\n\n<!-- end -->"
 
     return re.sub(rf"<!-- {name}: ([\w-]+) -->.*?<!-- end -->", table, text, flags=re.DOTALL)
@@ -34,7 +34,7 @@ def filled(text: str, name: str, folder: Path) -> str:
 @click.command(cls=Command)
 @click.argument("folders", nargs=-1, required=True, metavar="NAME=OUT ...")
 def main(folders: tuple[str, ...]) -> None:
-    """Write the tables and figures of folders of `posefit reproduce` into the handbook."""
+    """Write the tables and figures of such folders into the handbook."""
     for page in (DOCS / "measured" / name for name in PAGES):
         text = page.read_text("utf-8")
         for name, _, out in (item.partition("=") for item in folders):

@@ -12,7 +12,8 @@ def test_a_page_gets_the_tables_and_pictures_of_a_folder(tmp_path: Path, monkeyp
     for folder in ("docs/measured", "docs/pictures", "out"):
         (tmp_path / folder).mkdir(parents=True)
     page, out = tmp_path / "docs" / "measured" / "sapso.md", tmp_path / "out"
-    (tmp_path / "docs" / "measured" / "patent.md").write_text("Nothing of it.\n")
+    for other in ("patent.md", "related.md"):
+        (tmp_path / "docs" / "measured" / other).write_text("Nothing of it.\n")
     before = "Words.\n\n<!-- sapso: parts -->\nold\n<!-- end -->\n\n<!-- vsmm: parts -->\n<!-- end -->\n"
     page.write_text(f"{before}![A swarm](../pictures/sapso-figure-5.png)\n")
     (out / "parts.md").write_text("| a |\n|---|\n| 1 |\n")
@@ -28,4 +29,4 @@ def test_a_page_gets_the_tables_and_pictures_of_a_folder(tmp_path: Path, monkeyp
     (out / "parts.md").unlink()
     result = CliRunner().invoke(reproduced_pages.main, [f"sapso={out}"])
     assert result.exit_code == 2
-    assert "parts.md: expected a table of posefit reproduce, got none" in result.output
+    assert "parts.md: expected a table of posefit reproduce or a study, got none" in result.output
